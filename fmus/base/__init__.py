@@ -1,0 +1,1 @@
+"""What all components share: declarations of ports and the hardened slave."""

@@ -1,0 +1,133 @@
+"""Build the FMU of every component folder: `python -m fmus.build --out DIR`.
+
+Runs in a process of its own, because PythonFMU imports what it builds. Writes a file only if
+the sources have changed since it was written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import shutil
+import sys
+import tempfile
+from modulefinder import ModuleFinder
+from pathlib import Path
+
+import auv_fmu
+import fmus
+import pythonfmu
+from fmus.sealing import seal
+
+_FOLDERS = {
+    "auv_fmu": Path(auv_fmu.__file__).parent,
+    "fmus": Path(fmus.__file__).parent,
+}
+_PYTHONFMU = Path(pythonfmu.__file__).parent
+
+_SCRIPT = """\
+from fmus.base.loading import settle
+from {module} import {component}
+
+settle(globals())
+"""
+
+#: What a folder of built FMUs was built from.
+MANIFEST = "build.json"
+
+
+def components() -> dict[str, str]:
+    """Class name of every component and the module of its slave: one a folder."""
+    return {
+        "".join(word.capitalize() for word in slave.parent.name.split("_")): (
+            f"fmus.{slave.parent.name}.slave"
+        )
+        for slave in sorted(_FOLDERS["fmus"].glob("*/slave.py"))
+    }
+
+
+def fingerprint() -> str:
+    """Hash of everything that a built FMU depends on."""
+    digest = hashlib.sha256()
+    for root in (*_FOLDERS.values(), _PYTHONFMU):
+        for path in sorted(root.rglob("*")):
+            if path.suffix in (".py", ".md", ".so", ".dll"):
+                digest.update(f"{path.relative_to(root)}\0".encode())
+                digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _stage(component: str, module: str, stage: Path) -> Path:
+    """Lay out a script and the modules it needs the way PythonFMU wants them."""
+    script = stage / f"{component}.py"
+    script.write_text(_SCRIPT.format(module=module, component=component), encoding="utf-8")
+    roots = [str(folder.parent) for folder in _FOLDERS.values()]
+    finder = ModuleFinder(path=roots)
+    finder.run_script(str(script))
+    for name, found in finder.modules.items():
+        top = name.split(".")[0]
+        if top in _FOLDERS and found.__file__ is not None:
+            source = Path(found.__file__)
+            target = stage / top / source.relative_to(_FOLDERS[top])
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, target)
+    return script
+
+
+def _build(component: str, module: str, destination: Path) -> None:
+    with tempfile.TemporaryDirectory(prefix="auv_fmu_build_") as temporary:
+        stage, built = Path(temporary, "stage"), Path(temporary, "built")
+        stage.mkdir()
+        script = _stage(component, module, stage)
+        raw = pythonfmu.FmuBuilder.build_FMU(
+            script, dest=built, project_files=[stage / name for name in _FOLDERS]
+        )
+        seal(Path(raw), destination / f"{component}.fmu")
+
+
+def build(destination: Path) -> list[Path]:
+    """Bring a folder of FMUs up to date.
+
+    Args:
+        destination: folder, made if it does not exist.
+
+    Returns:
+        The files that had to be written.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    destination.mkdir(parents=True, exist_ok=True)
+    manifest = destination / MANIFEST
+    built_from = fingerprint()
+    try:
+        current = json.loads(manifest.read_text(encoding="utf-8"))["fingerprint"] == built_from
+    except (OSError, ValueError, KeyError):
+        current = False
+    written = []
+    for component, module in components().items():
+        path = destination / f"{component}.fmu"
+        if not current or not path.is_file():
+            _build(component, module, destination)
+            written.append(path)
+    if written:
+        manifest.write_text(json.dumps({"fingerprint": built_from}) + "\n", encoding="utf-8")
+    return written
+
+
+def main() -> int:
+    """Command line of the module."""
+    parser = argparse.ArgumentParser(prog="python -m fmus.build", description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("fmus", "dist"), help="folder to write")
+    try:
+        for path in build(parser.parse_args().out):
+            print(path)
+    except OSError as error:
+        print(f"cannot build the FMUs: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,80 @@
+"""Turn an FMU as PythonFMU builds it into one that is reproducible and alone in its process.
+
+All PythonFMU FMUs of a process share one interpreter and import their modules by bare name:
+of two FMUs that bundle a module of the same name, the second silently runs the first one's
+code. Sealing gives every top-level module in `resources` a name that carries a hash of the
+FMU's contents, and the FMU a GUID made from the same hash.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import uuid
+import zipfile
+from pathlib import Path, PurePosixPath
+
+_RESOURCES = "resources/"
+_SLAVE_MODULE = "resources/slavemodule.txt"
+_DESCRIPTION = "modelDescription.xml"
+_GUID = re.compile(rb'guid="[^"]*"')
+
+#: The oldest time a zip archive can hold: the time of a build is no part of its result.
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+
+
+def write_archive(path: Path, entries: dict[str, bytes], compression: int) -> None:
+    """Write a zip archive whose bytes depend on nothing but its entries, all at once."""
+    partial = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+    try:
+        with zipfile.ZipFile(partial, "w") as archive:
+            for name in sorted(entries):
+                info = zipfile.ZipInfo(name, _EPOCH)
+                info.compress_type = compression
+                info.create_system = 3
+                info.external_attr = 0o644 << 16
+                archive.writestr(info, entries[name], compresslevel=9)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def seal(fmu: Path, destination: Path) -> None:
+    """Write the sealed twin of an FMU.
+
+    Args:
+        fmu: as PythonFMU has built it.
+        destination: file to write.
+    """
+    with zipfile.ZipFile(fmu) as archive:
+        entries = {name: archive.read(name) for name in archive.namelist()}
+    entries[_DESCRIPTION] = _GUID.sub(b'guid=""', entries[_DESCRIPTION], count=1)
+    digest = hashlib.sha256()
+    for name in sorted(entries):
+        digest.update(f"{name}\0{len(entries[name])}\0".encode())
+        digest.update(entries[name])
+    guid = uuid.UUID(bytes=digest.digest()[:16])
+    entries = _renamed(entries, digest.hexdigest()[:12])
+    entries[_DESCRIPTION] = _GUID.sub(
+        f'guid="{{{guid}}}"'.encode(), entries[_DESCRIPTION], count=1
+    )
+    write_archive(destination, entries, zipfile.ZIP_DEFLATED)
+
+
+def _renamed(entries: dict[str, bytes], suffix: str) -> dict[str, bytes]:
+    modules = {
+        PurePosixPath(name.removeprefix(_RESOURCES)).parts[0].removesuffix(".py")
+        for name in entries
+        if name.startswith(_RESOURCES) and name.endswith(".py")
+    }
+    alternatives = "|".join(sorted(map(re.escape, modules)))
+    import_statement = re.compile(rf"^(\s*(?:from|import)\s+(?:{alternatives}))\b", re.MULTILINE)
+    resource = re.compile(rf"^({_RESOURCES}(?:{alternatives}))(?=/|\.py$)")
+    renamed = {}
+    for name, content in entries.items():
+        if name.startswith(_RESOURCES) and name.endswith(".py"):
+            content = import_statement.sub(rf"\1_{suffix}", content.decode("utf-8")).encode()
+        elif name == _SLAVE_MODULE:
+            content = content.strip() + f"_{suffix}".encode()
+        renamed[resource.sub(rf"\1_{suffix}", name)] = content
+    return renamed

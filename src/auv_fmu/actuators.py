@@ -1,0 +1,28 @@
+"""The limits of the actuators: equation (3)."""
+
+from __future__ import annotations
+
+from auv_fmu.types import Vector3
+
+
+def limit(tau_k: float, tau_min: float, tau_max: float) -> float:
+    """One actuator that cannot leave its limits: equation (3).
+
+    Args:
+        tau_k: commanded force [N] or moment [N.m].
+        tau_min, tau_max: limits in the same unit, tau_min < tau_max.
+    """
+    if tau_k > tau_max:
+        return tau_max
+    if tau_k < tau_min:
+        return tau_min
+    return tau_k
+
+
+def limit_all(tau: Vector3, tau_min: Vector3, tau_max: Vector3) -> Vector3:
+    """Equation (3) for k = u, q, r."""
+    return (
+        limit(tau[0], tau_min[0], tau_max[0]),
+        limit(tau[1], tau_min[1], tau_max[1]),
+        limit(tau[2], tau_min[2], tau_max[2]),
+    )

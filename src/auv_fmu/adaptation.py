@@ -1,0 +1,62 @@
+"""The adaptive bound on the uncertainty: (22) and (49), shared by (58), with Lemma 2."""
+
+from __future__ import annotations
+
+from math import sqrt, tanh
+
+from auv_fmu.types import Vector3, Vector4
+
+#: The constant of Lemma 2, nu = exp(-(nu + 1)), with the digits the paper gives (reading 9).
+NU = 0.2785
+
+
+def norm(x: Vector3) -> float:
+    """Euclidean norm."""
+    return sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
+
+
+def regressor(velocity: Vector3, acceleration: Vector3) -> Vector4:
+    """G = [1, |velocity|, |velocity|^2, |acceleration|], below (20) and below (57).
+
+    Args:
+        velocity: dy_r/dt in (21), dy_d/dt in (57) [m/s].
+        acceleration: d2y_r/dt2 in (21), d2y_d/dt2 in (57) [m/s2].
+    """
+    speed = norm(velocity)
+    return 1.0, speed, speed * speed, norm(acceleration)
+
+
+def bound(G: Vector4, theta_hat: Vector4) -> float:
+    """rho_hat = G theta_hat [N]: the estimated bound on the uncertainty, below (21)."""
+    return G[0] * theta_hat[0] + G[1] * theta_hat[1] + G[2] * theta_hat[2] + G[3] * theta_hat[3]
+
+
+def robust_force(rho_hat: float, r: float, eps_t: float) -> float:
+    """rho_hat tanh(nu rho_hat r / eps_t) [N], one axis: the last term of (21), (48) and (57).
+
+    Args:
+        rho_hat: estimated bound [N].
+        r: composite error of the axis [m/s].
+        eps_t: width of the boundary layer [W].
+    """
+    return rho_hat * tanh(NU * rho_hat * r / eps_t)
+
+
+def theta_hat_rate(
+    G: Vector4, r_norm: float, theta_hat: Vector4, theta_0: Vector4, gamma: float, sigma: float
+) -> Vector4:
+    """d theta_hat/dt = Gamma G^T |r| - Gamma Sigma (theta_hat - theta_0): (22), (49), (58).
+
+    Args:
+        G: regressor.
+        r_norm: norm of the composite error [m/s].
+        theta_hat, theta_0: estimate and prior [N, kg/s, kg/m, kg].
+        gamma: diagonal entry of Gamma.
+        sigma: diagonal entry of Sigma [1/s].
+    """
+    return (
+        gamma * (G[0] * r_norm - sigma * (theta_hat[0] - theta_0[0])),
+        gamma * (G[1] * r_norm - sigma * (theta_hat[1] - theta_0[1])),
+        gamma * (G[2] * r_norm - sigma * (theta_hat[2] - theta_0[2])),
+        gamma * (G[3] * r_norm - sigma * (theta_hat[3] - theta_0[3])),
+    )

@@ -1,0 +1,104 @@
+"""The control point, ell ahead of the centre of mass: equations (9) to (13).
+
+The columns of (11) are R e1, -ell R e3 and ell R e2, with R the rotation from body to earth
+at zero roll. Written with the full R the same three lines hold for a vehicle that rolls
+(reading 3), so every function here takes R and leaves the choice to its caller.
+"""
+
+from __future__ import annotations
+
+from auv_fmu.attitude import rotate
+from auv_fmu.types import Rotation, Vector3, Vector6
+
+#: Distance of the control point from the centre of mass in section 4.1 [m].
+ELL = 0.35
+
+
+def control_point(position: Vector3, rotation: Rotation, ell: float) -> Vector3:
+    """y = h(eta): equation (9).
+
+    Args:
+        position: centre of mass (x, y, z) [m], earth frame.
+        rotation: body to earth.
+        ell: distance of the control point [m].
+
+    Returns:
+        Control point (x, y, z) [m], earth frame.
+    """
+    e1 = rotation[0]
+    return (
+        position[0] + ell * e1[0],
+        position[1] + ell * e1[1],
+        position[2] + ell * e1[2],
+    )
+
+
+def control_point_velocity(rotation: Rotation, nu: Vector6, ell: float) -> Vector3:
+    """dy/dt = J v + J_delta: equation (10), its two terms (11) and (12) added up in R.
+
+    Args:
+        rotation: body to earth.
+        nu: (u, v, w, p, q, r) [m/s, rad/s]; p turns about the line through the control point
+            and leaves it where it is.
+        ell: distance of the control point [m].
+
+    Returns:
+        Velocity of the control point [m/s], earth frame.
+    """
+    u, v, w, _, q, r = nu
+    return rotate(rotation, (u, v + ell * r, w - ell * q))
+
+
+def jacobian(rotation: Rotation, ell: float) -> tuple[Vector3, Vector3, Vector3]:
+    """J(eta) of (11) as its columns, for (u, q, r)."""
+    e1, e2, e3 = rotation
+    return (
+        e1,
+        (-ell * e3[0], -ell * e3[1], -ell * e3[2]),
+        (ell * e2[0], ell * e2[1], ell * e2[2]),
+    )
+
+
+def actuator_command(rotation: Rotation, ell: float, force: Vector3) -> Vector3:
+    """tau_a = J^T F: the force-torque transformation before (15), as used by (21) and (57).
+
+    Args:
+        rotation: body to earth; for (11) as printed, with the roll left out.
+        ell: distance of the control point [m].
+        force: F [N] at the control point, earth frame.
+
+    Returns:
+        (tau_u [N], tau_q [N.m], tau_r [N.m]).
+    """
+    e1, e2, e3 = rotation
+    f0, f1, f2 = force
+    return (
+        e1[0] * f0 + e1[1] * f1 + e1[2] * f2,
+        -ell * (e3[0] * f0 + e3[1] * f1 + e3[2] * f2),
+        ell * (e2[0] * f0 + e2[1] * f1 + e2[2] * f2),
+    )
+
+
+def actuated_velocity(
+    rotation: Rotation, ell: float, dy: Vector3, w: tuple[float, float]
+) -> Vector3:
+    """v = J^-1 (dy/dt - J_delta): equation (13).
+
+    J^-1 needs no elimination: the columns of J are multiples of the columns of R.
+
+    Args:
+        rotation: body to earth.
+        ell: distance of the control point [m], not zero.
+        dy: velocity of the control point [m/s], earth frame.
+        w: sway and heave (v, w) [m/s].
+
+    Returns:
+        (u [m/s], q [rad/s], r [rad/s]).
+    """
+    e1, e2, e3 = rotation
+    d0, d1, d2 = dy
+    return (
+        e1[0] * d0 + e1[1] * d1 + e1[2] * d2,
+        (w[1] - (e3[0] * d0 + e3[1] * d1 + e3[2] * d2)) / ell,
+        ((e2[0] * d0 + e2[1] * d1 + e2[2] * d2) - w[0]) / ell,
+    )

@@ -1,0 +1,31 @@
+"""Saturation functions: Definition 2, the subject of Lemma 1 and Theorem 2.
+
+Each function returns its value and its derivative together, because Remark 3 needs both.
+"""
+
+from __future__ import annotations
+
+from math import sqrt, tanh
+from typing import Callable
+
+#: xi -> (s(xi), s'(xi))
+Saturation = Callable[[float], "tuple[float, float]"]
+
+
+def hyperbolic_tangent(xi: float) -> tuple[float, float]:
+    """s(xi) = tanh(xi), s'(xi) = sech^2(xi): M = 1, s'_M = 1."""
+    s = tanh(xi)
+    return s, 1.0 - s * s
+
+
+def algebraic(xi: float) -> tuple[float, float]:
+    """s(xi) = xi / sqrt(1 + xi^2), s'(xi) = (1 + xi^2)^(-3/2): M = 1, s'_M = 1."""
+    inverse_root = 1.0 / sqrt(1.0 + xi * xi)
+    return xi * inverse_root, inverse_root * inverse_root * inverse_root
+
+
+#: The saturation functions named in the paper, by the names users select them with.
+SATURATIONS: dict[str, Saturation] = {"tanh": hyperbolic_tangent, "algebraic": algebraic}
+
+#: Largest slope s'_M of Lemma 1 of each.
+MAXIMUM_SLOPE: dict[str, float] = {"tanh": 1.0, "algebraic": 1.0}
