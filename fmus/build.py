@@ -12,19 +12,22 @@ import json
 import shutil
 import sys
 import tempfile
+from importlib import import_module
 from modulefinder import ModuleFinder
 from pathlib import Path
 
-import auv_fmu
-import fmus
 import pythonfmu
+
 from fmus.sealing import seal
 
-_FOLDERS = {
-    "auv_fmu": Path(auv_fmu.__file__).parent,
-    "fmus": Path(fmus.__file__).parent,
-}
-_PYTHONFMU = Path(pythonfmu.__file__).parent
+
+def _folder(package: str) -> Path:
+    [folder] = import_module(package).__path__
+    return Path(folder)
+
+
+_FOLDERS = {package: _folder(package) for package in ("auv_fmu", "fmus")}
+_PYTHONFMU = _folder("pythonfmu")
 
 _SCRIPT = """\
 from fmus.base.loading import settle
@@ -67,9 +70,9 @@ def _stage(component: str, module: str, stage: Path) -> Path:
     finder.run_script(str(script))
     for name, found in finder.modules.items():
         top = name.split(".")[0]
-        if top in _FOLDERS and found.__file__ is not None:
-            source = Path(found.__file__)
-            target = stage / top / source.relative_to(_FOLDERS[top])
+        source = getattr(found, "__file__", None)
+        if top in _FOLDERS and source is not None:
+            target = stage / top / Path(source).relative_to(_FOLDERS[top])
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, target)
     return script
@@ -97,6 +100,7 @@ def build(destination: Path) -> list[Path]:
 
     Raises:
         OSError: the folder cannot be written.
+
     """
     destination.mkdir(parents=True, exist_ok=True)
     manifest = destination / MANIFEST

@@ -45,6 +45,7 @@ def seal(fmu: Path, destination: Path) -> None:
     Args:
         fmu: as PythonFMU has built it.
         destination: file to write.
+
     """
     with zipfile.ZipFile(fmu) as archive:
         entries = {name: archive.read(name) for name in archive.namelist()}
@@ -55,9 +56,7 @@ def seal(fmu: Path, destination: Path) -> None:
         digest.update(entries[name])
     guid = uuid.UUID(bytes=digest.digest()[:16])
     entries = _renamed(entries, digest.hexdigest()[:12])
-    entries[_DESCRIPTION] = _GUID.sub(
-        f'guid="{{{guid}}}"'.encode(), entries[_DESCRIPTION], count=1
-    )
+    entries[_DESCRIPTION] = _GUID.sub(f'guid="{{{guid}}}"'.encode(), entries[_DESCRIPTION], count=1)
     write_archive(destination, entries, zipfile.ZIP_DEFLATED)
 
 

@@ -1,10 +1,8 @@
 """Ports of AuvPlant."""
 
-from auv_fmu.control_point import ELL
 from auv_fmu.plant import RollAxis
-from auv_fmu.vehicle import Vehicle
-
 from fmus.base.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters
+from fmus.base.vehicle_ports import CONTROL_POINT, VEHICLE
 
 _TAU = {"u": "N", "q": "N.m", "r": "N.m"}
 _TAU_W = {"u": "N", "v": "N", "w": "N", "p": "N.m", "q": "N.m", "r": "N.m"}
@@ -19,7 +17,7 @@ _ETA_0 = (2.0, 6.0, 0.0, 0.0, 0.0, 0.0)
 #: Standard deviation of the measured position [m]; the paper gives none.
 _NOISE_STD = 0.001
 
-_VEHICLE, _ROLL = Vehicle(), RollAxis()
+_ROLL = RollAxis()
 _COMMAND = inputs("tau", _TAU, "Commanded force and moments")
 
 
@@ -33,36 +31,18 @@ PORTS: tuple[Port, ...] = (
     *outputs("eta", {**_POSITION, **_EULER}, "Position of the centre of mass and Euler angles"),
     *outputs("nu", _NU, "Velocity in the body frame"),
     *outputs("y", _POSITION, "Measured control point, with noise"),
-    *outputs("dy", {k: "m/s" for k in _POSITION}, "True velocity of the control point"),
+    *outputs("dy", dict.fromkeys(_POSITION, "m/s"), "True velocity of the control point"),
     *outputs("tau_applied", _TAU, "Force and moments after the limits of (3)", _COMMAND),
-    *parameters(
-        "m",
-        (*_VEHICLE[:3], _ROLL.m44, *_VEHICLE[3:5]),
-        {
-            **{str(11 * k): "kg" for k in (1, 2, 3)},
-            **{str(11 * k): "kg.m2" for k in (4, 5, 6)},
-        },
-        "Mass or inertia with added mass",
-        minimum=POSITIVE,
-    ),
-    *parameters(
-        "d",
-        (*_VEHICLE[5:8], _ROLL.d44, *_VEHICLE[8:10]),
-        {
-            **{str(11 * k): "kg/s" for k in (1, 2, 3)},
-            **{str(11 * k): "kg.m2/s" for k in (4, 5, 6)},
-        },
-        "Linear damping",
-        minimum=0.0,
-    ),
-    parameter("righting.pitch", _VEHICLE.righting_pitch, "N.m", "Righting moment in pitch"),
+    *VEHICLE,
+    parameter("m44", _ROLL.m44, "kg.m2", "Roll inertia with added inertia", POSITIVE),
+    parameter("d44", _ROLL.d44, "kg.m2/s", "Linear damping of roll", minimum=0.0),
     parameter(
         "righting.roll",
         _ROLL.righting_roll,
         "N.m",
         "Righting moment in roll; the paper gives none, ours is that of pitch",
     ),
-    parameter("ell", ELL, "m", "Distance of the control point ahead of the centre", POSITIVE),
+    CONTROL_POINT,
     *parameters("tau_max", 3 * (_TAU_MAX,), _dotted(_TAU), "Upper limit of (3)", minimum=0.0),
     *parameters("tau_min", 3 * (-_TAU_MAX,), _dotted(_TAU), "Lower limit of (3)", maximum=0.0),
     *parameters("eta0", _ETA_0, _dotted({**_POSITION, **_EULER}), "Initial posture"),

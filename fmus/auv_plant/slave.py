@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from random import Random
-from typing import Any, Sequence
+from typing import Any
 
 from auv_fmu import plant
 from auv_fmu.actuators import limit_all
 from auv_fmu.plant import PlantState, RollAxis
 from auv_fmu.types import Vector3
-from auv_fmu.vehicle import Vehicle
-
 from fmus.auv_plant.ports import PORTS
 from fmus.base.component import Component
 from fmus.base.port import Refusal
+from fmus.base.vehicle_ports import vehicle
+
+_OUTPUTS = [port.name for port in PORTS if port.causality == "output"]
+#: The measured control point among the outputs.
+_Y = slice(_OUTPUTS.index("y.x"), _OUTPUTS.index("y.z") + 1)
 
 
 class AuvPlant(Component):
@@ -24,11 +28,7 @@ class AuvPlant(Component):
     state_type = PlantState
 
     def configure(self, values: dict[str, Any]) -> None:
-        self._vehicle = Vehicle(
-            *(values[name] for name in ("m11", "m22", "m33", "m55", "m66")),
-            *(values[name] for name in ("d11", "d22", "d33", "d55", "d66")),
-            values["righting.pitch"],
-        )
+        self._vehicle = vehicle(values)
         self._roll = RollAxis(values["m44"], values["d44"], values["righting.roll"])
         self._ell = values["ell"]
         self._tau_min = values["tau_min.u"], values["tau_min.q"], values["tau_min.r"]
@@ -43,7 +43,7 @@ class AuvPlant(Component):
 
     def begin(self, inputs: Sequence[float], t: float) -> tuple[PlantState, list[float]]:
         self._random = Random(self._seed)
-        state = plant.initial_state(self._eta0[:3], self._eta0[3:], self._nu0)  # type: ignore[arg-type]
+        state = plant.initial_state(self._eta0[:3], self._eta0[3:], self._nu0)
         return state, self._seen(state, self._limited(inputs))
 
     def advance(
@@ -65,7 +65,8 @@ class AuvPlant(Component):
     def sample(self, outputs: list[float]) -> None:
         gauss = self._random.gauss
         n = gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)
-        outputs[12:15] = plant.measure(tuple(outputs[12:15]), self._noise_std, n)  # type: ignore[arg-type]
+        x, y, z = outputs[_Y]
+        outputs[_Y] = plant.measure((x, y, z), self._noise_std, n)
 
     def hidden_state(self) -> Any:
         return self._random.getstate() if self._state is not None else None

@@ -14,18 +14,23 @@ PythonFMU turns a Python class into an FMU. What it leaves to the class is done 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from math import ceil, isfinite
-from typing import Any, Callable, ClassVar, Sequence
+from typing import Any, Callable, ClassVar
 from xml.etree.ElementTree import Element
 
-from auv_fmu import __version__
 from pythonfmu import DefaultExperiment, Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
+from auv_fmu import __version__
+from fmus.base.description import describe
 from fmus.base.port import FAULT, Port, Refusal, Value
 
 #: A step may exceed `h_max` by this share without being split: hosts round their time.
 ROUNDING = 1e-9
+
+#: Longest step of a component that has no internal steps [s].
+_NO_LIMIT = 1e300
 
 #: More internal steps than this in one communication step are taken for a mistake.
 MOST_INTERNAL_STEPS = 1_000_000
@@ -106,14 +111,19 @@ class Component(Fmi2Slave):  # type: ignore[misc]
             if port.causality == causality and port.kind == kind
         ]
 
-    # Faults
+    # Faults and messages
 
     def _report(self, message: str) -> None:
         """Raise `fault` and log; a message that repeats itself is logged once."""
         self._fault = True
         if message != self._last_message:
             self._last_message = message
-            self.log(f"{self.instance_name}: {message}", Fmi2Status.discard)
+            self.say(message, Fmi2Status.discard)
+
+    def say(self, message: str, status: Fmi2Status) -> None:
+        """Log a message; the host adds the name of the instance."""
+        # FMI defines a log message as a format: a host would take a % for a directive.
+        self.log(message.replace("%", "%%"), status)
 
     def _guarded(self, action: str, function: Callable[[], None]) -> bool:
         """Run a callback's body; whatever it raises is reported instead."""
@@ -163,7 +173,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
 
     def _configure(self, parameters: dict[str, Any]) -> None:
         self.configure(parameters)
-        self._longest_step = parameters.get("h_max", float("inf")) * (1.0 + ROUNDING)
+        self._longest_step = parameters.get("h_max", _NO_LIMIT) * (1.0 + ROUNDING)
 
     # Steps
 
@@ -182,9 +192,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
                     return True
             if self._refused or self._mode != _STEPPING:
                 raise Refusal("; ".join(self._refused.values()) or "not initialised")
-            state, outputs = self.advance(
-                self._state, self._inputs, current_time, step_size / n, n
-            )
+            state, outputs = self.advance(self._state, self._inputs, current_time, step_size / n, n)
             if not isfinite(sum(outputs)):
                 raise Refusal("an output is no longer finite")
             self._state, self._outputs = state, outputs
@@ -251,7 +259,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
         return self._ports[reference]
 
     def _get(self, vrs: list[int], kind: str) -> list[Any]:
-        values = []
+        values: list[Any] = []
         for reference in vrs:
             try:
                 values.append(self._value(reference, self._port(reference, kind)))
@@ -371,6 +379,4 @@ class Component(Fmi2Slave):  # type: ignore[misc]
     # Description
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
-        from fmus.base.description import describe
-
         return describe(self, self._ports, super().to_xml)

@@ -6,7 +6,8 @@ such a file, and hosts cannot derive an order of evaluation from it.
 
 from __future__ import annotations
 
-from typing import Any, Callable, Sequence
+from collections.abc import Sequence
+from typing import Any, Callable
 from xml.etree.ElementTree import Element, SubElement
 
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Initial, Fmi2Variability, Integer, Real, String
@@ -44,6 +45,7 @@ def describe(slave: Any, ports: Sequence[Port], pythonfmu_xml: Callable[[], Elem
         slave: instance of the component; its variables are registered anew.
         ports: all ports, in the order of their value references.
         pythonfmu_xml: PythonFMU's own `to_xml`, bound to the slave.
+
     """
     slave.vars.clear()
     for port in ports:

@@ -6,9 +6,10 @@ documentation and the tests all read these declarations, directly or through the
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import Mapping, Sequence, Union
+from typing import Union
 
 Value = Union[float, int, bool, str]
 
@@ -35,6 +36,7 @@ class Port:
         minimum, maximum: inclusive bounds of a number.
         choices: values that a String may have.
         feedthrough: of an output, the inputs it depends on without a state between.
+
     """
 
     name: str
@@ -54,6 +56,7 @@ class Port:
 
         Raises:
             Refusal: it is not finite, out of range, or not one of the choices.
+
         """
         if self.kind == "String":
             if value not in self.choices:
@@ -117,9 +120,7 @@ def parameter(
 ) -> Port:
     """A Real parameter."""
     variability = "tunable" if tunable else "fixed"
-    return Port(
-        name, "parameter", variability, "Real", description, unit, start, minimum, maximum
-    )
+    return Port(name, "parameter", variability, "Real", description, unit, start, minimum, maximum)
 
 
 def parameters(
@@ -134,8 +135,13 @@ def parameters(
     """Real parameters `group + member`, with the members' units; a member brings its own dot."""
     return tuple(
         parameter(
-            f"{group}{member}", start, unit, f"{description}: {member.strip('.[]')}",
-            minimum, maximum, tunable,
+            f"{group}{member}",
+            start,
+            unit,
+            f"{description}: {member.strip('.[]')}",
+            minimum,
+            maximum,
+            tunable,
         )
         for start, (member, unit) in zip(starts, members.items())
     )

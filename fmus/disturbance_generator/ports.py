@@ -1,7 +1,6 @@
 """Ports of DisturbanceGenerator."""
 
 from auv_fmu.disturbance import Disturbance
-
 from fmus.base.port import Port, inputs, outputs, parameter
 
 _NU = {"u": "m/s", "v": "m/s", "w": "m/s", "p": "rad/s", "q": "rad/s", "r": "rad/s"}
@@ -15,7 +14,9 @@ PORTS: tuple[Port, ...] = (
     *(
         port
         for k, velocity in zip(_TAU_W, _INPUTS)
-        for port in outputs("tau_w", {k: _TAU_W[k]}, "Disturbance, with the sign of (2)", [velocity])
+        for port in outputs(
+            "tau_w", {k: _TAU_W[k]}, "Disturbance, with the sign of (2)", [velocity]
+        )
     ),
     parameter("A_f", _DISTURBANCE.A_f, "N", "Friction; in moments, N.m", tunable=True),
     parameter("A_d", _DISTURBANCE.A_d, "N", "Waves and currents; in moments, N.m", tunable=True),

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Sequence
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 from auv_fmu.disturbance import Disturbance, disturbance
-
 from fmus.base.component import Component
 from fmus.disturbance_generator.ports import PORTS
 

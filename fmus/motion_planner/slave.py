@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 from auv_fmu import motion_planner
 from auv_fmu.motion_planner import PlannerState
-from auv_fmu.vehicle import Vehicle
-
 from fmus.base.component import Component
+from fmus.base.vehicle_ports import vehicle
 from fmus.motion_planner.ports import PORTS
 
 
@@ -20,11 +20,7 @@ class MotionPlanner(Component):
     state_type = PlannerState
 
     def configure(self, values: dict[str, Any]) -> None:
-        self._vehicle = Vehicle(
-            *(values[name] for name in ("m11", "m22", "m33", "m55", "m66")),
-            *(values[name] for name in ("d11", "d22", "d33", "d55", "d66")),
-            values["righting.pitch"],
-        )
+        self._vehicle = vehicle(values)
         self._ell = values["ell"]
         self._tau_d = values["tau_d.u"], values["tau_d.q"], values["tau_d.r"]
         self._rest = PlannerState(

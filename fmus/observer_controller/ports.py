@@ -2,8 +2,8 @@
 
 from auv_fmu.output_feedback import Gains
 from auv_fmu.saturation import SATURATIONS
-
 from fmus.base.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters
+from fmus.base.vehicle_ports import CONTROL_POINT
 
 _AXES = ("x", "y", "z")
 _POSITION = dict.fromkeys(_AXES, "m")
@@ -41,7 +41,7 @@ PORTS: tuple[Port, ...] = (
     parameter("sigma", _GAINS.sigma, "1/s", "Sigma = sigma I", minimum=0.0, tunable=True),
     *parameters("theta_0", _GAINS.theta_0, _THETA, "Prior of the parameters"),
     parameter("eps_t", _GAINS.eps_t, "W", "Boundary layer of (21)", POSITIVE, tunable=True),
-    parameter("ell", _GAINS.ell, "m", "Distance of the control point", POSITIVE),
+    CONTROL_POINT,
     Port(
         "saturation",
         "parameter",

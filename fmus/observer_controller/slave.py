@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, Sequence
+from collections.abc import Sequence
+from typing import Any
+
+from pythonfmu.enums import Fmi2Status
 
 from auv_fmu import output_feedback
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement, Signals
 from auv_fmu.saturation import SATURATIONS
-from pythonfmu.enums import Fmi2Status
-
 from fmus.base.component import Component
 from fmus.observer_controller.ports import PORTS
 
@@ -56,9 +57,9 @@ class ObserverController(Component):
         measurement = _measurement(inputs)
         credible = output_feedback.gated(self._gains, state, measurement.y)
         if credible is not state:
-            self.log(
-                f"{self.instance_name}: observer restarted at t = {t:g} s: the measured position "
-                "moved further than innovation_gate",
+            self.say(
+                f"observer restarted at t = {t:g} s: the measured position moved further than "
+                "innovation_gate",
                 Fmi2Status.warning,
             )
         signals = output_feedback.evaluate(self._gains, credible, measurement)

@@ -11,6 +11,7 @@ def limit(tau_k: float, tau_min: float, tau_max: float) -> float:
     Args:
         tau_k: commanded force [N] or moment [N.m].
         tau_min, tau_max: limits in the same unit, tau_min < tau_max.
+
     """
     if tau_k > tau_max:
         return tau_max

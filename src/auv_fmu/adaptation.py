@@ -21,6 +21,7 @@ def regressor(velocity: Vector3, acceleration: Vector3) -> Vector4:
     Args:
         velocity: dy_r/dt in (21), dy_d/dt in (57) [m/s].
         acceleration: d2y_r/dt2 in (21), d2y_d/dt2 in (57) [m/s2].
+
     """
     speed = norm(velocity)
     return 1.0, speed, speed * speed, norm(acceleration)
@@ -38,6 +39,7 @@ def robust_force(rho_hat: float, r: float, eps_t: float) -> float:
         rho_hat: estimated bound [N].
         r: composite error of the axis [m/s].
         eps_t: width of the boundary layer [W].
+
     """
     return rho_hat * tanh(NU * rho_hat * r / eps_t)
 
@@ -45,7 +47,7 @@ def robust_force(rho_hat: float, r: float, eps_t: float) -> float:
 def theta_hat_rate(
     G: Vector4, r_norm: float, theta_hat: Vector4, theta_0: Vector4, gamma: float, sigma: float
 ) -> Vector4:
-    """d theta_hat/dt = Gamma G^T |r| - Gamma Sigma (theta_hat - theta_0): (22), (49), (58).
+    """D theta_hat/dt = Gamma G^T |r| - Gamma Sigma (theta_hat - theta_0): (22), (49), (58).
 
     Args:
         G: regressor.
@@ -53,6 +55,7 @@ def theta_hat_rate(
         theta_hat, theta_0: estimate and prior [N, kg/s, kg/m, kg].
         gamma: diagonal entry of Gamma.
         sigma: diagonal entry of Sigma [1/s].
+
     """
     return (
         gamma * (G[0] * r_norm - sigma * (theta_hat[0] - theta_0[0])),

@@ -20,6 +20,7 @@ def rotation_from_euler(phi: float, theta: float, psi: float) -> Rotation:
 
     Returns:
         Columns (R e1, R e2, R e3).
+
     """
     c_phi, s_phi = cos(phi), sin(phi)
     c_theta, s_theta = cos(theta), sin(theta)

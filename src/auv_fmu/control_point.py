@@ -15,7 +15,7 @@ ELL = 0.35
 
 
 def control_point(position: Vector3, rotation: Rotation, ell: float) -> Vector3:
-    """y = h(eta): equation (9).
+    """Y = h(eta): equation (9).
 
     Args:
         position: centre of mass (x, y, z) [m], earth frame.
@@ -24,6 +24,7 @@ def control_point(position: Vector3, rotation: Rotation, ell: float) -> Vector3:
 
     Returns:
         Control point (x, y, z) [m], earth frame.
+
     """
     e1 = rotation[0]
     return (
@@ -44,6 +45,7 @@ def control_point_velocity(rotation: Rotation, nu: Vector6, ell: float) -> Vecto
 
     Returns:
         Velocity of the control point [m/s], earth frame.
+
     """
     u, v, w, _, q, r = nu
     return rotate(rotation, (u, v + ell * r, w - ell * q))
@@ -69,6 +71,7 @@ def actuator_command(rotation: Rotation, ell: float, force: Vector3) -> Vector3:
 
     Returns:
         (tau_u [N], tau_q [N.m], tau_r [N.m]).
+
     """
     e1, e2, e3 = rotation
     f0, f1, f2 = force
@@ -82,7 +85,7 @@ def actuator_command(rotation: Rotation, ell: float, force: Vector3) -> Vector3:
 def actuated_velocity(
     rotation: Rotation, ell: float, dy: Vector3, w: tuple[float, float]
 ) -> Vector3:
-    """v = J^-1 (dy/dt - J_delta): equation (13).
+    """V = J^-1 (dy/dt - J_delta): equation (13).
 
     J^-1 needs no elimination: the columns of J are multiples of the columns of R.
 
@@ -94,6 +97,7 @@ def actuated_velocity(
 
     Returns:
         (u [m/s], q [rad/s], r [rad/s]).
+
     """
     e1, e2, e3 = rotation
     d0, d1, d2 = dy

@@ -33,6 +33,7 @@ def disturbance(parameters: Disturbance, nu: Vector6, t: float) -> Vector6:
 
     Returns:
         tau_w (u, v, w, p, q, r) [N, N.m]; it enters (2) with a minus.
+
     """
     A_f, A_d, omega_d = parameters
     waves = A_d * sin(omega_d * t)

@@ -45,6 +45,7 @@ def step(vehicle: Vehicle, state: PlannerState, tau_d: Vector3, h: float) -> Pla
 
     Raises:
         ZeroDivisionError: the cosine of the pitch angle is exactly zero.
+
     """
     (x, y, z), theta, psi, (u, v, w, q, r) = state
     rotation = rotation_from_euler(0.0, theta, psi)
@@ -70,6 +71,7 @@ def reference(vehicle: Vehicle, state: PlannerState, tau_d: Vector3, ell: float)
         state: of the reference vehicle.
         tau_d: (tau_ud, tau_qd, tau_rd) [N, N.m].
         ell: distance of the control point [m].
+
     """
     position, theta, psi, nu = state
     u, v, w, q, r = nu

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 
 def velocity_estimate(dy_o: float, s_z: float, z: float, lambda_: float, k_d: float) -> float:
-    """d y_hat/dt: equations (23) and (50), which are (18) solved for it.
+    """D y_hat/dt: equations (23) and (50), which are (18) solved for it.
 
     Args:
         dy_o: observer state [m/s].
@@ -16,18 +16,20 @@ def velocity_estimate(dy_o: float, s_z: float, z: float, lambda_: float, k_d: fl
         z: estimation error y - y_hat [m].
         lambda_: diagonal entry of Lambda [m/s].
         k_d: observer gain [1/s].
+
     """
     return dy_o + lambda_ * s_z + k_d * z
 
 
 def observer_acceleration(ddy_r: float, s_z: float, lambda_: float, k_d: float) -> float:
-    """d dy_o/dt: equation (51), the derivative of (24) (reading 4).
+    """D dy_o/dt: equation (51), the derivative of (24) (reading 4).
 
     Args:
         ddy_r: acceleration of the virtual reference [m/s2].
         s_z: s(z) of the estimation error.
         lambda_: diagonal entry of Lambda [m/s].
         k_d: observer gain [1/s].
+
     """
     return ddy_r + k_d * lambda_ * s_z
 

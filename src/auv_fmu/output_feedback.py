@@ -91,6 +91,7 @@ def gated(gains: Gains, state: ControllerState, y: Vector3) -> ControllerState:
 
     Returns:
         `state` itself when the measurement is credible.
+
     """
     y_hat = state.y_hat
     gate = gains.innovation_gate
@@ -126,6 +127,7 @@ def axis(
         virtual reference (16) [m/s] and its derivative (Remark 3) [m/s2], r_1 + r_2 with the
         estimated velocity (below (21)) [m/s], the first three terms of (21) [N], the observer
         acceleration (51) [m/s2] and the estimation error [m].
+
     """
     z = y - y_hat
     s_z, _ = s(z)
@@ -145,6 +147,7 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement) -> 
         gains: of the controller.
         state: of observer and adaptive law.
         measurement: at the same instant.
+
     """
     K1, K2, lambda_, k_d, gamma, sigma, theta_0, eps_t, ell, s, printed_jacobian, _ = gains
     y, (phi, theta, psi), y_d, dy_d, ddy_d = measurement
@@ -183,6 +186,7 @@ def step(state: ControllerState, signals: Signals, h: float) -> ControllerState:
         state: at the beginning of the step.
         signals: evaluated there.
         h: step [s]; stable only while k_d h stays below 2, without ringing below 1.
+
     """
     (a0, a1, a2), (b0, b1, b2), (c0, c1, c2, c3) = state
     v0, v1, v2 = signals.dy_hat

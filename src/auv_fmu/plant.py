@@ -66,6 +66,7 @@ def accelerations_6dof(
 
     Returns:
         d/dt (u, v, w, p, q, r) [m/s2, rad/s2].
+
     """
     m44, d44, righting_roll = roll
     u, v, w, p, q, r = nu
@@ -106,6 +107,7 @@ def step(
         tau: applied (tau_u, tau_q, tau_r), after the limits of (3) [N, N.m].
         tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
         h: step [s].
+
     """
     (x, y, z), quaternion, nu = state
     rotation = rotation_from_quaternion(quaternion)
@@ -127,6 +129,7 @@ def outputs(state: PlantState, ell: float) -> PlantOutputs:
     Args:
         state: of the vehicle.
         ell: distance of the control point [m].
+
     """
     position, quaternion, nu = state
     rotation = rotation_from_quaternion(quaternion)
@@ -144,5 +147,6 @@ def measure(y: Vector3, std: float, n: Vector3) -> Vector3:
         y: control point [m], earth frame.
         std: standard deviation of each axis [m]; not in the paper (reading 7).
         n: three independent standard normal numbers.
+
     """
     return y[0] + std * n[0], y[1] + std * n[1], y[2] + std * n[2]

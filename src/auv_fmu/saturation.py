@@ -5,7 +5,7 @@ Each function returns its value and its derivative together, because Remark 3 ne
 
 from __future__ import annotations
 
-from math import sqrt, tanh
+from math import hypot, tanh
 from typing import Callable
 
 #: xi -> (s(xi), s'(xi))
@@ -20,8 +20,8 @@ def hyperbolic_tangent(xi: float) -> tuple[float, float]:
 
 def algebraic(xi: float) -> tuple[float, float]:
     """s(xi) = xi / sqrt(1 + xi^2), s'(xi) = (1 + xi^2)^(-3/2): M = 1, s'_M = 1."""
-    inverse_root = 1.0 / sqrt(1.0 + xi * xi)
-    return xi * inverse_root, inverse_root * inverse_root * inverse_root
+    root = hypot(1.0, xi)
+    return xi / root, 1.0 / (root * root * root)
 
 
 #: The saturation functions named in the paper, by the names users select them with.

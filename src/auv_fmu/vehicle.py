@@ -36,6 +36,7 @@ def euler_rates(theta: float, q: float, r: float) -> tuple[float, float]:
 
     Raises:
         ZeroDivisionError: cos(theta) is exactly zero.
+
     """
     return q, r / cos(theta)
 
@@ -54,6 +55,7 @@ def accelerations(
 
     Returns:
         d/dt (u, v, w, q, r) [m/s2, rad/s2].
+
     """
     m11, m22, m33, m55, m66, d11, d22, d33, d55, d66, righting_pitch = vehicle
     u, v, w, q, r = nu

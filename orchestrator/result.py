@@ -1,0 +1,74 @@
+"""What a run has produced: a table of all ports over time."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.system import PortName
+
+
+@dataclass
+class Result:
+    """Rows of all inputs and outputs of a run, one at the start and one a step.
+
+    A row holds, at time t_k, the outputs after the step that ended there, and the inputs that
+    this step was made with.
+
+    Attributes:
+        columns: `component.port` of every column behind the time.
+        times: of all rows that were asked for [s].
+        order: in which the components were stepped.
+        step: communication step [s].
+        parameters: of all components, as the FMUs reported them after initialisation.
+        messages: what the FMUs logged with status warning or worse.
+        failure: why the run ended early, or None.
+        computed: rows that were computed.
+
+    """
+
+    columns: tuple[str, ...]
+    times: np.ndarray
+    order: str
+    step: float
+    parameters: Mapping[PortName, Any] = field(default_factory=dict)
+    messages: list[str] = field(default_factory=list)
+    failure: str | None = None
+    computed: int = 0
+
+    def __post_init__(self) -> None:
+        """Make room for all rows."""
+        self.rows = np.empty((len(self.times), 1 + len(self.columns)))
+        self.rows[:, 0] = self.times
+        self._index = {name: i for i, name in enumerate(self.columns, start=1)}
+
+    def __contains__(self, column: str) -> bool:
+        """Whether there is a column `component.port`."""
+        return column in self._index
+
+    def __getitem__(self, column: str) -> np.ndarray:
+        """The computed values of one column."""
+        view: np.ndarray = self.rows[: self.computed, self._index[column]]
+        return view
+
+    def group(self, *columns: str) -> np.ndarray:
+        """Several columns side by side, (rows, columns)."""
+        return np.column_stack([self[column] for column in columns])
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times of the computed rows [s]."""
+        view: np.ndarray = self.rows[: self.computed, 0]
+        return view
+
+    def write_csv(self, path: Path) -> None:
+        """Write the computed rows; numbers are written so that they read back exactly."""
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(("time", *self.columns))
+            writer.writerows(self.rows[: self.computed].tolist())

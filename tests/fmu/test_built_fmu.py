@@ -1,0 +1,341 @@
+"""Each built FMU through fmpy, as a foreign host would use it."""
+
+from __future__ import annotations
+
+import ast
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import inf, nan
+from pathlib import Path
+
+import auv_fmu
+import fmpy
+import pytest
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave, fmi2Discard
+from fmpy.validation import validate_fmu
+
+import fmus
+
+NAMES = ["AuvPlant", "DisturbanceGenerator", "MotionPlanner", "ObserverController"]
+each = pytest.mark.parametrize("name", NAMES)
+
+
+class Loaded:
+    """An instance of an unpacked FMU, driven by names."""
+
+    def __init__(self, folder: Path, instance: str = "under_test") -> None:
+        self.description = fmpy.read_model_description(folder)
+        self.variables = {v.name: v for v in self.description.modelVariables}
+        self.fmu = FMU2Slave(
+            instanceName=instance,
+            guid=self.description.guid,
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            unzipDirectory=str(folder),
+        )
+        self.fmu.instantiate()
+        self.time = 0.0
+
+    def initialise(self, **values: float) -> Loaded:
+        self.fmu.setupExperiment(startTime=0.0)
+        self.set(**values)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+        self.time = 0.0
+        return self
+
+    def set(self, **values: float | str) -> None:
+        for name, value in values.items():
+            variable = self.variables[name.replace("__", ".")]
+            getattr(self.fmu, f"set{variable.type}")([variable.valueReference], [value])
+
+    def get(self, name: str):
+        variable = self.variables[name]
+        return getattr(self.fmu, f"get{variable.type}")([variable.valueReference])[0]
+
+    def references(self, causality: str) -> list[int]:
+        return [
+            v.valueReference
+            for v in self.description.modelVariables
+            if v.causality == causality and v.type == "Real"
+        ]
+
+    def outputs(self) -> list[float]:
+        return self.fmu.getReal(self.references("output"))
+
+    def step(self, h: float = 0.02, k: int | None = None) -> None:
+        references = self.references("input")
+        if k is not None and references:
+            self.fmu.setReal(references, [0.05 * ((i * 7 + k) % 11) - 0.2 for i in references])
+        self.fmu.doStep(self.time, h)
+        self.time += h
+
+    def run(self, first: int, last: int) -> list[list[float]]:
+        rows = []
+        for k in range(first, last):
+            self.step(k=k)
+            rows.append(self.outputs())
+        return rows
+
+
+@contextmanager
+def loaded(fmu: Path, folder: Path) -> Iterator[Loaded]:
+    fmpy.extract(fmu, unzipdir=folder)
+    instance = Loaded(folder)
+    try:
+        yield instance
+    finally:
+        instance.fmu.freeInstance()
+
+
+@pytest.fixture(params=NAMES)
+def fmu(request: pytest.FixtureRequest, dist: Path, tmp_path: Path) -> Iterator[Loaded]:
+    with loaded(dist / f"{request.param}.fmu", tmp_path) as instance:
+        yield instance
+
+
+@each
+def test_description_is_valid_and_complete(dist: Path, name: str):
+    path = str(dist / f"{name}.fmu")
+    assert validate_fmu(path) == []
+    description = fmpy.read_model_description(path)
+    for variable in description.modelVariables:
+        assert variable.variability is not None
+        assert variable.description
+        if variable.type == "Real":
+            assert variable.unit == variable.declaredType.unit
+    outputs = [v for v in description.modelVariables if v.causality == "output"]
+    assert len(description.outputs) == len(description.initialUnknowns) == len(outputs)
+    assert all(unknown.dependencies is not None for unknown in description.outputs)
+    simulation = description.coSimulation
+    assert not simulation.needsExecutionTool
+    assert simulation.canGetAndSetFMUstate
+    assert simulation.canSerializeFMUstate
+    assert simulation.canHandleVariableCommunicationStepSize
+
+
+def test_start_values_are_what_the_fmu_holds(fmu: Loaded):
+    fmu.initialise()
+    for variable in fmu.description.modelVariables:
+        if variable.causality in ("parameter", "input"):
+            value = fmu.get(variable.name)
+            if variable.type == "String":
+                assert value.decode() == variable.start
+            elif variable.type == "Boolean":
+                assert bool(value) == (variable.start == "true")
+            else:
+                assert value == float(variable.start)
+
+
+def test_reset_is_a_new_beginning(fmu: Loaded):
+    expected = fmu.initialise().run(0, 30)
+    fmu.fmu.reset()
+    assert fmu.initialise().run(0, 30) == expected
+
+
+def test_reset_clears_a_fault(fmu: Loaded):
+    fmu.initialise()
+    with pytest.raises(FMICallException):
+        fmu.step(-1.0)
+    assert fmu.get("fault")
+    fmu.fmu.reset()
+    assert not fmu.initialise().get("fault")
+
+
+@pytest.mark.parametrize("serialised", [False, True])
+def test_state_round_trip_continues_bit_for_bit(fmu: Loaded, serialised: bool):
+    fmu.initialise().run(0, 50)
+    time, state = fmu.time, fmu.fmu.getFMUstate()
+    if serialised:
+        content = fmu.fmu.serializeFMUstate(state)
+        fmu.fmu.freeFMUstate(state)
+        state = fmu.fmu.deSerializeFMUstate(content)
+    expected = fmu.run(50, 100)
+    fmu.fmu.setFMUstate(state)
+    fmu.fmu.freeFMUstate(state)
+    fmu.time = time
+    assert fmu.run(50, 100) == expected
+
+
+def test_serialised_state_continues_in_another_instance(fmu: Loaded):
+    fmu.initialise().run(0, 50)
+    content = fmu.fmu.serializeFMUstate(fmu.fmu.getFMUstate())
+    expected = fmu.run(50, 100)
+    other = Loaded(Path(fmu.fmu.unzipDirectory), "other").initialise()
+    other.fmu.setFMUstate(other.fmu.deSerializeFMUstate(content))
+    other.time = 50 * 0.02
+    try:
+        assert other.run(50, 100) == expected
+    finally:
+        other.fmu.freeInstance()
+
+
+def test_two_instances_do_not_know_of_each_other(fmu: Loaded):
+    other = Loaded(Path(fmu.fmu.unzipDirectory), "other").initialise()
+    try:
+        expected = fmu.initialise().run(0, 20)
+        assert other.run(0, 20) == expected
+    finally:
+        other.fmu.freeInstance()
+
+
+@pytest.mark.parametrize("bad", [nan, inf])
+def test_bad_input_ends_in_discard_and_fault_not_in_a_crash(fmu: Loaded, bad: float):
+    fmu.initialise().run(0, 5)
+    references = fmu.references("input")
+    if not references:
+        pytest.skip("has no inputs")
+    before = fmu.outputs()
+    fmu.fmu.setReal(references[:1], [bad])
+    with pytest.raises(FMICallException) as failure:
+        fmu.step()
+    assert failure.value.status == fmi2Discard
+    assert fmu.get("fault")
+    assert fmu.outputs() == before
+    fmu.step(k=6)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "value"),
+    [
+        ("AuvPlant", "m22", -17.5),
+        ("ObserverController", "eps_t", 0.0),
+        ("ObserverController", "saturation", "sigmoid"),
+        ("MotionPlanner", "h_max", nan),
+        ("DisturbanceGenerator", "A_f", inf),
+    ],
+)
+def test_wrong_parameter_ends_in_discard(dist, tmp_path, name, parameter, value):
+    with loaded(dist / f"{name}.fmu", tmp_path) as fmu:
+        fmu.initialise(**{parameter: value})
+        assert fmu.get("fault")
+        with pytest.raises(FMICallException) as failure:
+            fmu.step()
+        assert failure.value.status == fmi2Discard
+
+
+@pytest.mark.parametrize("h", [-0.02, nan])
+def test_impossible_step_ends_in_discard(fmu: Loaded, h: float):
+    fmu.initialise().run(0, 5)
+    before = fmu.outputs()
+    with pytest.raises(FMICallException) as failure:
+        fmu.fmu.doStep(fmu.time, h)
+    assert failure.value.status == fmi2Discard
+    assert fmu.outputs() == before
+
+
+def test_zero_and_long_steps_are_accepted(fmu: Loaded):
+    fmu.initialise().run(0, 5)
+    before = fmu.outputs()
+    fmu.step(0.0)
+    assert fmu.outputs() == before
+    fmu.step(0.5)
+    assert not fmu.get("fault")
+
+
+def test_unknown_value_reference_does_not_end_the_process(fmu: Loaded):
+    fmu.initialise()
+    fmu.fmu.getReal([4711])
+    fmu.fmu.setReal([4711], [1.0])
+    assert fmu.get("fault")
+
+
+def test_many_instances_leave_the_interpreter_as_it_was(dist: Path, tmp_path: Path):
+    """PythonFMU drops a reference to the script's namespace with every instance."""
+    fmpy.extract(dist / "MotionPlanner.fmu", unzipdir=tmp_path)
+    Loaded(tmp_path).fmu.freeInstance()
+    script = (tmp_path / "resources" / "slavemodule.txt").read_text()
+    before = sys.getrefcount(vars(sys.modules[script]))
+    path = list(sys.path)
+    for _ in range(200):
+        Loaded(tmp_path).fmu.freeInstance()
+    after = sys.getrefcount(vars(sys.modules[script]))
+    assert after == before
+    assert sys.path == path
+
+
+def build(folder: Path, packages: Path) -> None:
+    """Build all FMUs from the sources in a folder, in a process of its own."""
+    subprocess.run(
+        [sys.executable, "-m", "fmus.build", "--out", str(folder)],
+        env={"PYTHONPATH": str(packages), "PYTHONHASHSEED": "random", "PATH": ""},
+        check=True,
+        capture_output=True,
+        cwd=packages,
+    )
+
+
+@pytest.fixture
+def sources(tmp_path: Path) -> Path:
+    """A copy of the sources that FMUs are built from."""
+    packages = tmp_path / "packages"
+    for package in (auv_fmu, fmus):
+        [folder] = package.__path__
+        shutil.copytree(
+            folder, packages / package.__name__, ignore=shutil.ignore_patterns("dist", "*.pyc")
+        )
+    return packages
+
+
+def test_two_versions_of_the_bundle_run_their_own_code_in_one_process(dist, tmp_path, sources):
+    disturbance = sources / "auv_fmu" / "disturbance.py"
+    text = disturbance.read_text()
+    assert "A_f * sign(u)" in text
+    disturbance.write_text(text.replace("A_f * sign(u)", "4.0 * A_f * sign(u)"))
+    build(tmp_path / "other", sources)
+    with (
+        loaded(dist / "DisturbanceGenerator.fmu", tmp_path / "a") as ours,
+        loaded(tmp_path / "other" / "DisturbanceGenerator.fmu", tmp_path / "b") as theirs,
+    ):
+        for fmu in (ours, theirs):
+            fmu.initialise(nu__u=1.0, A_d=0.0)
+            fmu.step()
+        assert ours.get("tau_w.u") == 0.5
+        assert theirs.get("tau_w.u") == 2.0
+
+
+def test_same_sources_give_the_same_bytes(dist: Path, tmp_path: Path, sources: Path):
+    build(tmp_path / "again", sources)
+    for name in NAMES:
+        assert (tmp_path / "again" / f"{name}.fmu").read_bytes() == (
+            dist / f"{name}.fmu"
+        ).read_bytes()
+
+
+@each
+def test_resources_need_nothing_but_an_old_standard_library(dist: Path, name: str):
+    """Python 3.9 syntax; imports from the standard library or, under their hash, the bundle."""
+    with zipfile.ZipFile(dist / f"{name}.fmu") as archive:
+        scripts = {
+            entry: archive.read(entry).decode()
+            for entry in archive.namelist()
+            if entry.endswith(".py")
+        }
+    own = {entry.split("/")[1].removesuffix(".py") for entry in scripts}
+    suffixes = {module.rsplit("_", 1)[1] for module in own}
+    assert len(suffixes) == 1, "all top-level modules carry the same hash"
+    imported = set()
+    for entry, text in scripts.items():
+        for node in ast.walk(ast.parse(text, filename=entry, feature_version=(3, 9))):
+            if isinstance(node, ast.Import):
+                imported |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                imported.add(str(node.module).split(".")[0])
+    assert imported <= own | set(sys.stdlib_module_names)
+
+
+@each
+def test_runs_alone_from_the_command_line_of_fmpy(dist: Path, tmp_path: Path, name: str):
+    output = tmp_path / "result.csv"
+    subprocess.run(
+        [sys.executable, "-m", "fmpy", "simulate", str(dist / f"{name}.fmu"), "--stop-time", "2",
+         "--output-file", str(output)],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    lines = output.read_text().splitlines()
+    assert len(lines) == 1 + 101
+    assert lines[-1].startswith("2.0,")

@@ -1,0 +1,225 @@
+"""The loop of FMUs against a straight line of Python, and the claims of Fig. 4."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi2 import FMU2Slave
+from straight_line import Instant, closed_loop
+
+from orchestrator import bundle
+from orchestrator.master import simulate
+from orchestrator.metrics import effort, final_error, tracking_error, true_control_point
+from orchestrator.result import Result
+from orchestrator.system import PortName, System
+
+STEPS = 5000
+UQR, XYZ = ("u", "q", "r"), ("x", "y", "z")
+QUIET = {PortName("plant", "noise.std"): 0.0}
+
+
+@pytest.fixture(scope="module")
+def system(dist: Path) -> System:
+    return bundle.closed_loop(dist)
+
+
+@pytest.fixture(scope="module")
+def noisy(system: System) -> Result:
+    return simulate(system, 100.0, 0.02)
+
+
+@pytest.fixture(scope="module")
+def quiet(system: System) -> Result:
+    return simulate(system.with_parameters(QUIET), 100.0, 0.02)
+
+
+def ports(instant: Instant) -> dict[str, float]:
+    """What every port of the FMU loop must hold at an instant of the straight line."""
+    values: dict[str, float] = {}
+
+    def group(name: str, members, numbers) -> None:
+        values.update(zip((f"{name}.{m}" for m in members), numbers, strict=True))
+
+    signals, seen, measurement = instant.signals, instant.plant_outputs, instant.measurement
+    group("plant.tau", UQR, signals.tau)
+    group("plant.tau_w", "uvwpqr", instant.tau_w)
+    group("plant.eta", (*XYZ, "phi", "theta", "psi"), (*instant.plant_state.position, *seen.euler))
+    group("plant.nu", "uvwpqr", instant.plant_state.nu)
+    group("plant.y", XYZ, instant.measured)
+    group("plant.dy", XYZ, seen.dy)
+    group("plant.tau_applied", UQR, instant.tau_applied)
+    group("controller.y", XYZ, measurement.y)
+    group("controller.eta", ("phi", "theta", "psi"), measurement.euler)
+    group("controller.y_d", XYZ, measurement.y_d)
+    group("controller.dy_d", XYZ, measurement.dy_d)
+    group("controller.ddy_d", XYZ, measurement.ddy_d)
+    group("controller.tau", UQR, signals.tau)
+    group("controller.y_hat", XYZ, instant.controller_state.y_hat)
+    group("controller.dy_hat", XYZ, signals.dy_hat)
+    for i, estimate in enumerate(instant.controller_state.theta_hat, start=1):
+        values[f"controller.theta_hat[{i}]"] = estimate
+    group("controller.e", XYZ, signals.e)
+    group("controller.z", XYZ, signals.z)
+    group("disturbance.tau_w", "uvwpqr", instant.tau_w)
+    group("planner.y_d", XYZ, instant.reference.y_d)
+    group("planner.dy_d", XYZ, instant.reference.dy_d)
+    group("planner.ddy_d", XYZ, instant.reference.ddy_d)
+    planned = instant.planner_state
+    group("planner.eta_d", (*XYZ, "theta", "psi"), (*planned.position, planned.theta, planned.psi))
+    return values
+
+
+def test_loop_of_fmus_is_the_straight_line_bit_for_bit(noisy: Result):
+    """Every port, 5,000 steps, with noise and disturbance on."""
+    assert noisy.failure is None
+    rows = [ports(instant) for instant in closed_loop(STEPS)]
+    # An input of the disturbance is the plant's velocity at the beginning of the step.
+    velocities = [f"nu.{k}" for k in "uvwpqr"]
+    before = [rows[0], *rows[:-1]]
+    for row, previous in zip(rows, before, strict=True):
+        row.update({f"disturbance.{k}": previous[f"plant.{k}"] for k in velocities})
+    faults = {name for name in noisy.columns if name.endswith(".fault")}
+    assert set(noisy.columns) == set(rows[0]) | faults
+    for name in rows[0]:
+        expected = np.array([row[name] for row in rows])
+        assert np.array_equal(noisy[name], expected), name
+    for name in faults:
+        assert not noisy[name].any()
+
+
+def test_fig4_without_noise_never_reaches_a_limit(quiet: Result):
+    """ "The AUV successfully tracks the desired trajectory without the actuator saturation"."""
+    commands = quiet.group(*(f"controller.tau.{k}" for k in UQR))
+    assert np.abs(commands).max() < 80.0
+    applied = quiet.group(*(f"plant.tau_applied.{k}" for k in UQR))
+    assert np.array_equal(applied, commands)
+
+
+def test_fig4_without_noise_ends_within_10_cm_on_every_axis(quiet: Result):
+    assert (final_error(quiet) < 0.1).all()
+
+
+def test_fig4_estimates_stay_within_the_bound_of_their_law(quiet: Result):
+    """(22) cannot carry theta_hat beyond G |r| / sigma; ours stay below 25 in 100 s."""
+    estimates = quiet.group(*(f"controller.theta_hat[{i}]" for i in range(1, 5)))
+    assert np.isfinite(estimates).all()
+    assert estimates.min() >= 0.0
+    assert estimates.max() < 25.0
+
+
+def test_no_velocity_of_the_vehicle_reaches_the_controller(system: System):
+    sources = {str(c.source) for c in system.connections if c.target.component == "controller"}
+    from_plant = {name for name in sources if not name.startswith("planner.")}
+    assert from_plant == {
+        *(f"plant.y.{k}" for k in XYZ),
+        *(f"plant.eta.{k}" for k in ("phi", "theta", "psi")),
+    }
+    units = {
+        v.name: v.unit
+        for v in system.components["controller"].description.modelVariables
+        if v.causality == "input" and not v.name.startswith(("dy_d", "ddy_d"))
+    }
+    assert set(units.values()) == {"m", "rad"}
+
+
+def test_estimated_velocity_is_the_true_one_after_the_transient(quiet: Result):
+    """The observer lags by about 1 / k_d = 20 ms: 1 cm/s at the accelerations of the helix."""
+    true = quiet.group(*(f"plant.dy.{k}" for k in XYZ))[1500:-1]
+    estimated = quiet.group(*(f"controller.dy_hat.{k}" for k in XYZ))[1501:]
+    assert np.abs(true - estimated).max() < 0.01
+
+
+def test_jacobi_changes_the_efforts_by_less_than_4_percent(system: System, noisy: Result):
+    delayed = simulate(system, 100.0, 0.02, "jacobi")
+    change = np.divide(effort(delayed)["l2_effort"], effort(noisy)["l2_effort"]) - 1.0
+    assert np.abs(change).max() < 0.04
+    assert np.abs(change).max() > 1e-6, "the order must make a difference"
+
+
+def test_true_control_point_is_the_measured_one_without_noise(quiet: Result, noisy: Result):
+    measured = quiet.group(*(f"plant.y.{k}" for k in XYZ))
+    np.testing.assert_allclose(true_control_point(quiet), measured, atol=1e-12)
+    error = quiet.group(*(f"controller.e.{k}" for k in XYZ))[1:]
+    np.testing.assert_allclose(tracking_error(quiet)[:-1], error, atol=1e-12)
+    noise = noisy.group(*(f"plant.y.{k}" for k in XYZ)) - true_control_point(noisy)
+    assert noise.std() == pytest.approx(0.001, rel=0.03)
+    assert abs(noise.mean()) < 5e-5
+
+
+def test_finer_steps_converge_to_the_same_motion(system: System, quiet: Result):
+    """Halving the step halves the distance of a first-order scheme from its limit."""
+    halves = [
+        simulate(system.with_parameters(QUIET), 20.0, 0.02 / 2**n)["plant.eta.x"][-1]
+        for n in range(4)
+    ]
+    differences = np.abs(np.diff(halves))
+    assert quiet["plant.eta.x"][1000] == halves[0]
+    np.testing.assert_allclose(differences[:-1] / differences[1:], 2.0, rtol=0.25)
+
+
+def test_host_without_initial_exchange_ends_where_the_others_end(system: System):
+    """Zeros in the controller's first step, the true measurement in the second."""
+    with_exchange = simple_jacobi_host(system, initial_exchange=True)
+    without = simple_jacobi_host(system, initial_exchange=False)
+    assert np.abs(without - with_exchange).max() < 1e-3
+    ungated = simple_jacobi_host(system, initial_exchange=False, innovation_gate=0.0)
+    assert np.abs(ungated - with_exchange).max() > 1e-2, "the gate is what makes the difference"
+
+
+def simple_jacobi_host(
+    system: System, initial_exchange: bool, innovation_gate: float = 1.0
+) -> np.ndarray:
+    """Position of the vehicle after 100 s in a host that knows no more than it must."""
+    with TemporaryDirectory(prefix="auvfmu") as folder:
+        fmus = {}
+        for name, component in system.components.items():
+            unpacked = Path(folder, name)
+            fmpy.extract(component.fmu, unzipdir=unpacked)
+            fmus[name] = FMU2Slave(
+                instanceName=name,
+                guid=component.description.guid,
+                modelIdentifier=component.description.coSimulation.modelIdentifier,
+                unzipDirectory=str(unpacked),
+            )
+            fmus[name].instantiate()
+        gate = system.components["controller"].variables["innovation_gate"].valueReference
+        fmus["controller"].setReal([gate], [innovation_gate])
+
+        wires: dict[tuple[str, str], tuple[list[int], list[int]]] = {}
+        for connection in system.connections:
+            source, target = connection.source, connection.target
+            outs, ins = wires.setdefault((source.component, target.component), ([], []))
+            outs.append(system.components[source.component].variables[source.port].valueReference)
+            ins.append(system.components[target.component].variables[target.port].valueReference)
+
+        def read() -> list[list[float]]:
+            return [fmus[source].getReal(outs) for (source, _), (outs, _) in wires.items()]
+
+        def write(values: list[list[float]]) -> None:
+            for ((_, target), (_, ins)), numbers in zip(wires.items(), values, strict=True):
+                fmus[target].setReal(ins, numbers)
+
+        for fmu in fmus.values():
+            fmu.setupExperiment(startTime=0.0)
+            fmu.enterInitializationMode()
+        for _ in range(3 if initial_exchange else 0):
+            write(read())
+        for fmu in fmus.values():
+            fmu.exitInitializationMode()
+        values = [[0.0] * len(outs) for outs, _ in wires.values()]
+        if initial_exchange:
+            values = read()
+        for k in range(STEPS):
+            write(values)
+            for fmu in fmus.values():
+                fmu.doStep(k * 0.02, 0.02)
+            values = read()
+        position = [system.components["plant"].variables[f"eta.{k}"].valueReference for k in XYZ]
+        final = np.array(fmus["plant"].getReal(position))
+        for fmu in fmus.values():
+            fmu.freeInstance()
+        return final

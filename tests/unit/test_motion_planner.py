@@ -1,0 +1,52 @@
+"""The reference and its derivatives."""
+
+import numpy as np
+import pytest
+from auv_fmu import motion_planner
+from auv_fmu.motion_planner import PlannerState
+from auv_fmu.vehicle import Vehicle
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import angles, forces, lengths, speeds, vectors
+
+VEHICLE = Vehicle()
+
+
+@given(theta=st.floats(-1.2, 1.2), psi=angles, nu=vectors(speeds, 5), tau_d=vectors(forces, 3),
+       ell=lengths)  # fmt: skip
+def test_closed_form_derivatives_agree_with_differences_of_the_trajectory(
+    theta, psi, nu, tau_d, ell
+):
+    """Euler steps of +-h differ from the trajectory by O(h^2) that central differences cancel."""
+    state, h = PlannerState((1.0, 2.0, 3.0), theta, psi, nu), 1e-5
+
+    def at(dt):
+        moved = motion_planner.step(VEHICLE, state, tau_d, dt)
+        return motion_planner.reference(VEHICLE, moved, tau_d, ell)
+
+    now, after, before = at(0.0), at(h), at(-h)
+    difference = np.subtract(after.y_d, before.y_d) / (2 * h)
+    np.testing.assert_allclose(now.dy_d, difference, rtol=1e-6, atol=1e-5)
+    difference = np.subtract(after.dy_d, before.dy_d) / (2 * h)
+    np.testing.assert_allclose(now.ddy_d, difference, rtol=1e-5, atol=1e-4)
+
+
+def test_steady_turn_is_an_equilibrium_of_equation_2():
+    """Under constant yaw moment without pitch, (2) rests where its right side is zero."""
+    state = PlannerState((0.0,) * 3, 0.0, 0.0, (0.0,) * 5)
+    for _ in range(10_000):
+        state = motion_planner.step(VEHICLE, state, (20.0, 0.0, 4.0), 0.02)
+    u, v, w, q, r = state.nu
+    assert (w, q) == (0.0, 0.0)
+    assert v == pytest.approx(-VEHICLE.m11 * u * r / VEHICLE.d22, rel=1e-9)
+    assert VEHICLE.d11 * u == pytest.approx(VEHICLE.m22 * v * r + 20.0, rel=1e-9)
+    assert VEHICLE.d66 * r == pytest.approx((VEHICLE.m11 - VEHICLE.m22) * u * v + 4.0, rel=1e-9)
+
+
+def test_reference_at_rest_accelerates_by_the_driving_torques_alone():
+    """At rest ddy_d = J M_1^-1 tau_d, which is (14) without velocities."""
+    state = PlannerState((0.0, 0.0, -2.0), 0.0, 0.0, (0.0,) * 5)
+    reference = motion_planner.reference(VEHICLE, state, (5.0, 1.0, 2.0), 0.35)
+    assert reference.y_d == (0.35, 0.0, -2.0)
+    assert reference.dy_d == (0.0, 0.0, 0.0)
+    assert reference.ddy_d == pytest.approx((5.0 / 25.0, 0.35 * 2.0 / 15.0, -0.35 * 1.0 / 22.5))

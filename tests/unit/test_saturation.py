@@ -1,0 +1,97 @@
+"""Definition 2, Lemma 1 and Lemma 2."""
+
+from math import cosh, exp, log, sqrt
+
+import numpy as np
+import pytest
+from auv_fmu.adaptation import NU
+from auv_fmu.saturation import MAXIMUM_SLOPE, SATURATIONS
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import vectors
+
+numbers = st.floats(-50.0, 50.0)
+positive = st.floats(0.01, 20.0)
+both = pytest.mark.parametrize("name", SATURATIONS)
+
+#: Integral of s(k r) dr from 0 to xi, by hand.
+INTEGRALS = {
+    "tanh": lambda k, xi: (abs(k * xi) + np.log1p(np.exp(-2 * abs(k * xi))) - log(2)) / k,
+    "algebraic": lambda k, xi: (sqrt(1 + (k * xi) ** 2) - 1) / k,
+}
+ROUNDING = 1e-12
+
+
+@both
+@given(xi=st.floats(allow_nan=False, allow_infinity=False), other=numbers)
+def test_definition_2(name, xi, other):
+    value = SATURATIONS[name](xi)[0]
+    assert abs(value) <= 1.0
+    assert xi * value >= 0.0
+    assert (value > 0) == (xi > 0) or abs(xi) < 1e-300
+    assert (value <= SATURATIONS[name](other)[0]) or xi > other
+
+
+@both
+@given(xi=numbers)
+def test_slope_is_the_derivative(name, xi):
+    s, h = SATURATIONS[name], 1e-5
+    difference = (s(xi + h)[0] - s(xi - h)[0]) / (2 * h)
+    assert s(xi)[1] == pytest.approx(difference, abs=1e-9)
+    assert 0.0 <= s(xi)[1] <= MAXIMUM_SLOPE[name]
+
+
+@both
+@given(xi=numbers, k=positive)
+def test_lemma_1_i_and_ii(name, xi, k):
+    s, integral = SATURATIONS[name], INTEGRALS[name](k, xi)
+    slope = MAXIMUM_SLOPE[name]
+    slack = ROUNDING * (1 + abs(integral))
+    assert s(k * xi)[0] ** 2 / (2 * k * slope) <= integral + slack
+    assert integral <= k * slope * xi**2 / 2 + slack
+    assert integral > 0.0 or abs(k * xi) < 1e-7
+    assert integral >= abs(xi) - 1.0 / k - slack
+
+
+@given(xi=st.floats(-20.0, 20.0))
+def test_integral_of_tanh_is_the_logarithm_of_cosh(xi):
+    assert INTEGRALS["tanh"](1.0, xi) == pytest.approx(log(cosh(xi)), abs=1e-12)
+
+
+@both
+@given(x=numbers, y=numbers, k_1=positive, k_2=positive)
+def test_lemma_1_iii(name, x, y, k_1, k_2):
+    s, slope = SATURATIONS[name], MAXIMUM_SLOPE[name]
+    assert abs(s(k_1 * x + k_2 * y)[0] - s(k_2 * y)[0]) <= slope * k_1 * abs(x) + ROUNDING
+    assert abs(s(x)[0] - s(x - y)[0]) <= slope * abs(y) + ROUNDING
+
+
+@both
+@given(x=vectors(numbers, 3), k=positive, psi=vectors(positive, 3))
+def test_lemma_1_iv_to_vi(name, x, k, psi):
+    s, slope = SATURATIONS[name], MAXIMUM_SLOPE[name]
+    for xi in x:
+        assert abs(s(k * xi)[0]) <= slope * k * abs(xi) * (1 + ROUNDING)
+        assert s(xi)[0] ** 2 <= slope * xi * s(xi)[0] * (1 + ROUNDING)
+        assert s(xi)[0] ** 2 <= slope * xi**2 * (1 + ROUNDING)
+    values = np.array([s(xi)[0] for xi in x])
+    left = np.array(x) @ np.diag(psi) @ values
+    assert left >= min(psi) * (values @ values) * (1 - ROUNDING)
+
+
+def test_constant_of_lemma_2_has_the_digits_it_is_printed_with():
+    assert exp(-(NU + 1)) == pytest.approx(NU, abs=5e-5)
+
+
+@given(x=vectors(numbers, 3), h=numbers, eps_t=positive)
+def test_lemma_2(x, h, eps_t):
+    """h |x| - x' h Tanh(nu h x / eps_t) <= n eps_t, checked in the norm that makes it true.
+
+    The lemma holds component by component, |h x_i| - h x_i tanh(nu h x_i / eps_t) <= eps_t, and
+    the Euclidean norm is not larger than the sum of the components.
+    """
+    slack = 1e-3 * eps_t  # nu has four digits
+    for x_i in x:
+        assert abs(h * x_i) - h * x_i * np.tanh(NU * h * x_i / eps_t) <= eps_t + slack
+    left = h * np.linalg.norm(x) - sum(h * x_i * np.tanh(NU * h * x_i / eps_t) for x_i in x)
+    assert left <= 3 * eps_t + 3 * slack

@@ -1,0 +1,138 @@
+"""(1), (2) and (3), and the plant that simulates them with six degrees of freedom."""
+
+from math import cos, sin
+
+import numpy as np
+import pytest
+from auv_fmu import plant
+from auv_fmu.actuators import limit, limit_all
+from auv_fmu.attitude import rotate, rotation_from_euler, rotation_from_quaternion
+from auv_fmu.plant import RollAxis
+from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
+from hypothesis import given
+from strategies import angles, forces, pitch_angles, speeds, vectors
+
+VEHICLE, ROLL = Vehicle(), RollAxis()
+MASSES = np.array([VEHICLE.m11, VEHICLE.m22, VEHICLE.m33, ROLL.m44, VEHICLE.m55, VEHICLE.m66])
+DAMPING = np.array([VEHICLE.d11, VEHICLE.d22, VEHICLE.d33, ROLL.d44, VEHICLE.d55, VEHICLE.d66])
+AT_REST = (0.0,) * 6
+UNDRIVEN = (0.0,) * 3
+
+
+@given(nu=vectors(speeds, 6), euler=vectors(angles, 3))
+def test_undriven_plant_loses_energy_to_damping_alone(nu, euler):
+    """d/dt (nu' M nu / 2 + U) = -nu' D nu with U = -G cos(theta) cos(phi), for equal G."""
+    G = VEHICLE.righting_pitch
+    phi, theta, _ = euler
+    rotation = rotation_from_euler(*euler)
+    acceleration = plant.accelerations_6dof(VEHICLE, ROLL, nu, rotation, UNDRIVEN, AT_REST)
+    _, _, _, p, q, r = nu
+    # d/dt (cos(theta) cos(phi)) = d/dt R33 for a body that turns at (p, q, r).
+    r33_rate = p * -cos(theta) * sin(phi) + q * -sin(theta)
+    power = np.dot(MASSES * nu, acceleration) - G * r33_rate
+    np.testing.assert_allclose(power, -np.dot(DAMPING * nu, nu), rtol=1e-10, atol=1e-9)
+
+
+@given(
+    nu=vectors(speeds, 5), theta=pitch_angles, psi=angles, tau=vectors(forces, 3),
+    tau_w=vectors(speeds, 5),
+)  # fmt: skip
+def test_plant_without_roll_is_equation_2(nu, theta, psi, tau, tau_w):
+    u, v, w, q, r = nu
+    a, b, c, d, e = tau_w
+    six = plant.accelerations_6dof(
+        VEHICLE, ROLL, (u, v, w, 0.0, q, r), rotation_from_euler(0.0, theta, psi), tau,
+        (a, b, c, 0.0, d, e),
+    )  # fmt: skip
+    five = accelerations(VEHICLE, nu, sin(theta), tau, tau_w)
+    assert (*six[:3], *six[4:]) == five
+
+
+@given(nu=vectors(speeds, 6), euler=vectors(angles, 3))
+def test_coriolis_terms_are_those_of_a_diagonal_mass_matrix(nu, euler):
+    """M dnu/dt + C(nu) nu + D nu + g = 0, with C from the cross products of Kirchhoff."""
+    M = np.diag(MASSES)
+    momentum = M @ np.array(nu)
+    linear, angular = np.array(nu[:3]), np.array(nu[3:])
+    coriolis = np.concatenate(
+        [
+            np.cross(angular, momentum[:3]),
+            np.cross(linear, momentum[:3]) + np.cross(angular, momentum[3:]),
+        ]
+    )
+    phi, theta, _ = euler
+    restoring = np.array([0, 0, 0, sin(phi) * cos(theta) * ROLL.righting_roll,
+                          sin(theta) * VEHICLE.righting_pitch, 0])  # fmt: skip
+    expected = np.linalg.solve(M, -coriolis - DAMPING * nu - restoring)
+    rotation = rotation_from_euler(*euler)
+    actual = plant.accelerations_6dof(VEHICLE, ROLL, nu, rotation, UNDRIVEN, AT_REST)
+    np.testing.assert_allclose(actual, expected, rtol=1e-12, atol=1e-12)
+
+
+def test_surge_under_constant_force_follows_the_analytic_solution_of_euler():
+    """u_k = tau/d (1 - (1 - h d/m)^k) when nothing turns."""
+    h, tau_u, n = 0.02, 10.0, 500
+    state = plant.initial_state((0.0,) * 3, (0.0,) * 3, AT_REST)
+    for _ in range(n):
+        state = plant.step(VEHICLE, ROLL, state, (tau_u, 0.0, 0.0), AT_REST, h)
+    expected = tau_u / VEHICLE.d11 * (1 - (1 - h * VEHICLE.d11 / VEHICLE.m11) ** n)
+    assert state.nu[0] == pytest.approx(expected, rel=1e-12)
+    assert state.nu[1:] == (0.0,) * 5
+
+
+def test_vehicle_that_passes_the_vertical_keeps_a_unit_quaternion_and_does_not_jump():
+    state = plant.initial_state((0.0,) * 3, (0.0, 1.3, 0.2), (1.0, 0.0, 0.0, 0.01, 0.9, 0.01))
+    steepest, largest_move = 0.0, 0.0
+    for _ in range(200):
+        before = plant.outputs(state, 0.35)
+        state = plant.step(VEHICLE, ROLL, state, (5.0, 6.0, 0.0), AT_REST, 0.02)
+        after = plant.outputs(state, 0.35)
+        assert np.linalg.norm(state.quaternion) == pytest.approx(1.0, abs=1e-12)
+        steepest = max(steepest, after.euler[1])
+        largest_move = max(largest_move, float(np.abs(np.subtract(after.y, before.y)).max()))
+    assert steepest > np.deg2rad(89)
+    # At 1.3 m/s and 1 rad/s the control point moves less than 4 cm in 20 ms.
+    assert largest_move < 0.04
+
+
+@given(theta=pitch_angles, psi=angles, nu=vectors(speeds, 5))
+def test_kinematics_is_equation_1(theta, psi, nu):
+    """T_1 and T_2 written out as the paper prints them."""
+    u, v, w, q, r = nu
+    T_1 = np.array(
+        [
+            [cos(psi) * cos(theta), -sin(psi), sin(theta) * cos(psi)],
+            [sin(psi) * cos(theta), cos(psi), sin(theta) * sin(psi)],
+            [-sin(theta), 0.0, cos(theta)],
+        ]
+    )
+    np.testing.assert_allclose(
+        rotate(rotation_from_euler(0.0, theta, psi), (u, v, w)), T_1 @ (u, v, w), atol=1e-14
+    )
+    assert euler_rates(theta, q, r) == (q, r / cos(theta))
+
+
+@given(tau=forces, limits=vectors(forces, 2))
+def test_actuator_stays_within_its_limits_and_is_linear_between_them(tau, limits):
+    tau_min, tau_max = sorted(limits)
+    limited = limit(tau, tau_min, tau_max)
+    assert tau_min <= limited <= tau_max
+    assert limited == tau or tau != np.clip(tau, tau_min, tau_max)
+
+
+def test_limits_of_each_actuator_are_its_own():
+    assert limit_all((9.0, -9.0, 0.5), (-1.0, -2.0, -3.0), (1.0, 2.0, 3.0)) == (1.0, -2.0, 0.5)
+
+
+def test_noise_is_scaled_by_its_standard_deviation():
+    assert plant.measure((1.0, 2.0, 3.0), 0.5, (1.0, -1.0, 0.0)) == (1.5, 1.5, 3.0)
+    assert plant.measure((1.0, 2.0, 3.0), 0.0, (1.0, -1.0, 0.0)) == (1.0, 2.0, 3.0)
+
+
+@given(euler=vectors(angles, 3), position=vectors(speeds, 3))
+def test_initial_attitude_is_the_one_asked_for(euler, position):
+    state = plant.initial_state(position, euler, AT_REST)
+    assert state.position == position
+    np.testing.assert_allclose(
+        rotation_from_quaternion(state.quaternion), rotation_from_euler(*euler), atol=1e-15
+    )
