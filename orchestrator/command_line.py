@@ -103,10 +103,11 @@ def _run(options: argparse.Namespace) -> int:
     with TemporaryDirectory(prefix="auvfmu") as unpacked:
         system = read_ssp(archive, Path(unpacked))
         system = system.with_parameters(scenario.parameters).with_parameters(changes)
-        stop_time = options.stop_time or scenario.stop_time or system.stop_time
+        stop_time = _first_given(options.stop_time, scenario.stop_time, system.stop_time)
         if stop_time is None:
             raise InputError(f"{options.scenario}: names no stop time; give one with --stop-time")
-        step = options.step or scenario.step or system.step or DEFAULT_STEP
+        step = _first_given(options.step, scenario.step, system.step, DEFAULT_STEP)
+        assert step is not None
         result = simulate(system, stop_time, step, options.order, progress=True)
         _write(system, scenario, result, folder)
     for message in result.messages:
@@ -115,6 +116,10 @@ def _run(options: argparse.Namespace) -> int:
         print(f"auv-fmu: {scenario.name} {result.failure}", file=sys.stderr)
         return FAILED
     return OK
+
+
+def _first_given(*values: float | None) -> float | None:
+    return next((value for value in values if value is not None), None)
 
 
 def _assignment(text: str) -> tuple[PortName, str]:

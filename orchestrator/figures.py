@@ -31,6 +31,7 @@ _SETTINGS: Any = {
     "axes.titlelocation": "left",
     "axes.titlesize": "medium",
     "figure.constrained_layout.use": True,
+    "figure.constrained_layout.w_pad": 0.15,
     "font.size": 10,
     "grid.alpha": 0.3,
     "legend.edgecolor": "none",
@@ -100,7 +101,7 @@ def _draw_path(axes: Any, result: Result) -> None:
     axes.set(xlabel="x north [m]", ylabel="y east [m]", zlabel="z down [m]")
     axes.invert_zaxis()
     axes.invert_yaxis()
-    axes.legend(loc="upper left", fontsize="small")
+    axes.legend(loc="upper left", bbox_to_anchor=(-0.45, 1.0), fontsize="small")
 
 
 def _draw_lines(

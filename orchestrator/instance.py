@@ -136,6 +136,7 @@ class Block:
             self._values = (c_type * self._n).from_buffer(row)
         else:
             self._values = (c_type * self._n)()
+            self._integers = np.frombuffer(self._values, dtype=np.intc)
 
     def _call(self, fmu: FMU2Slave, action: str) -> Callable[[], Any]:
         return partial(
@@ -153,7 +154,7 @@ class Block:
             return call
 
         def set_converted() -> None:
-            self._values[:] = [int(value) for value in self._row]
+            self._integers[:] = self._row
             call()
 
         return set_converted
@@ -166,7 +167,7 @@ class Block:
 
         def get_converted() -> None:
             call()
-            self._row[:] = self._values
+            self._row[:] = self._integers
 
         return get_converted
 

@@ -24,6 +24,7 @@ LIMIT = (80.0, 80.0, 80.0)
 NOISE_STD, NOISE_SEED = 0.001, 1
 TAU_D = (5.0, 1.0, 2.0)
 STEP = 0.02
+PAPER = Gains()
 
 
 class Instant(NamedTuple):
@@ -42,7 +43,7 @@ class Instant(NamedTuple):
 
 
 def closed_loop(
-    steps: int, noise_std: float = NOISE_STD, gains: Gains = Gains(), h: float = STEP
+    steps: int, noise_std: float = NOISE_STD, gains: Gains = PAPER, h: float = STEP
 ) -> Iterator[Instant]:
     """Fig. 4: the values at the start, then after every step.
 

@@ -90,6 +90,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
         self._ports = (*self.ports, FAULT)
         self._input_vrs = self._references("input", "Real")
         self._output_vrs = self._references("output", "Real")
+        self._fault_vrs = [len(self._ports) - 1]
         self._inputs = [0.0] * len(self._input_vrs)
         self._outputs = [0.0] * len(self._output_vrs)
         self._parameters: dict[str, Any] = {
@@ -227,7 +228,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
     def get_boolean(self, vrs: list[int]) -> list[bool]:
         if self._stale:
             self._refresh()
-        return self._get(vrs, "Boolean")
+        return [self._fault] if vrs == self._fault_vrs else self._get(vrs, "Boolean")
 
     def get_string(self, vrs: list[int]) -> list[str]:
         return self._get(vrs, "String")

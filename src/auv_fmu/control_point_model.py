@@ -7,6 +7,7 @@ the conditions of its theorems, and never run inside an FMU, so they are numpy a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import jacobian
 from auv_fmu.vehicle import Vehicle
 
-Matrix = np.ndarray
+Matrix = np.ndarray[Any, Any]
 
 
 def kinematic_matrix(theta: float, psi: float) -> Matrix:
@@ -22,6 +23,7 @@ def kinematic_matrix(theta: float, psi: float) -> Matrix:
 
     Args:
         theta, psi: pitch and yaw [rad]; the last row has a pole at theta = +-pi/2.
+
     """
     S = np.zeros((5, 3))
     S[:3, 0] = rotation_from_euler(0.0, theta, psi)[0]
@@ -100,18 +102,19 @@ def J_dot(theta: float, psi: float, dtheta: float, dpsi: float, ell: float) -> M
     R = np.column_stack(rotation_from_euler(0.0, theta, psi))
     p, q, r = -dpsi * np.sin(theta), dtheta, dpsi * np.cos(theta)
     S_omega = np.array([[0.0, -r, q], [r, 0.0, -p], [-q, p, 0.0]])
-    return R @ S_omega @ R.T @ J(theta, psi, ell)
+    rate: Matrix = R @ S_omega @ R.T @ J(theta, psi, ell)
+    return rate
 
 
 def M_2(vehicle: Vehicle, theta: float, psi: float, ell: float) -> Matrix:
     """M_2 = J^-T M_1 J^-1 of (15), (3, 3) [kg]."""
-    J_inverse = np.linalg.inv(J(theta, psi, ell))
+    J_inverse: Matrix = np.linalg.inv(J(theta, psi, ell))
     return J_inverse.T @ ActuatedDynamics(vehicle).M_1 @ J_inverse
 
 
 def D_2(vehicle: Vehicle, theta: float, psi: float, ell: float) -> Matrix:
     """D_2 = J^-T D_1 J^-1 of (15), (3, 3) [kg/s]."""
-    J_inverse = np.linalg.inv(J(theta, psi, ell))
+    J_inverse: Matrix = np.linalg.inv(J(theta, psi, ell))
     return J_inverse.T @ ActuatedDynamics(vehicle).D_1 @ J_inverse
 
 
@@ -129,8 +132,9 @@ def C_2(vehicle: Vehicle, theta: float, psi: float, dy: Matrix, ell: float) -> M
         dy: velocity of the control point [m/s]; the attitude turns as (4) says for
             (u, q, r) = J^-1 dy.
         ell: distance of the control point [m].
+
     """
-    J_inverse = np.linalg.inv(J(theta, psi, ell))
+    J_inverse: Matrix = np.linalg.inv(J(theta, psi, ell))
     *_, dtheta, dpsi = kinematic_matrix(theta, psi) @ J_inverse @ dy
     rate = J_dot(theta, psi, dtheta, dpsi, ell)
     return -J_inverse.T @ ActuatedDynamics(vehicle).M_1 @ J_inverse @ rate @ J_inverse

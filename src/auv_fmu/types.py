@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 Vector3 = tuple[float, float, float]
 Vector4 = tuple[float, float, float, float]
 Vector5 = tuple[float, float, float, float, float]

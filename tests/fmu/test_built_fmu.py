@@ -12,16 +12,17 @@ from contextlib import contextmanager
 from math import inf, nan
 from pathlib import Path
 
-import auv_fmu
 import fmpy
 import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave, fmi2Discard
 from fmpy.validation import validate_fmu
 
+import auv_fmu
 import fmus
 
 NAMES = ["AuvPlant", "DisturbanceGenerator", "MotionPlanner", "ObserverController"]
+WITH_INPUTS = [name for name in NAMES if name != "MotionPlanner"]
 each = pytest.mark.parametrize("name", NAMES)
 
 
@@ -163,11 +164,11 @@ def test_state_round_trip_continues_bit_for_bit(fmu: Loaded, serialised: bool):
 
 def test_serialised_state_continues_in_another_instance(fmu: Loaded):
     fmu.initialise().run(0, 50)
-    content = fmu.fmu.serializeFMUstate(fmu.fmu.getFMUstate())
+    time, content = fmu.time, fmu.fmu.serializeFMUstate(fmu.fmu.getFMUstate())
     expected = fmu.run(50, 100)
     other = Loaded(Path(fmu.fmu.unzipDirectory), "other").initialise()
     other.fmu.setFMUstate(other.fmu.deSerializeFMUstate(content))
-    other.time = 50 * 0.02
+    other.time = time
     try:
         assert other.run(50, 100) == expected
     finally:
@@ -184,13 +185,11 @@ def test_two_instances_do_not_know_of_each_other(fmu: Loaded):
 
 
 @pytest.mark.parametrize("bad", [nan, inf])
+@pytest.mark.parametrize("fmu", WITH_INPUTS, indirect=True)
 def test_bad_input_ends_in_discard_and_fault_not_in_a_crash(fmu: Loaded, bad: float):
     fmu.initialise().run(0, 5)
-    references = fmu.references("input")
-    if not references:
-        pytest.skip("has no inputs")
     before = fmu.outputs()
-    fmu.fmu.setReal(references[:1], [bad])
+    fmu.fmu.setReal(fmu.references("input")[:1], [bad])
     with pytest.raises(FMICallException) as failure:
         fmu.step()
     assert failure.value.status == fmi2Discard

@@ -4,6 +4,8 @@ from math import cos, pi, sin, tan
 
 import numpy as np
 import pytest
+from hypothesis import given
+
 from auv_fmu.attitude import (
     euler_from_rotation,
     normalised,
@@ -13,7 +15,6 @@ from auv_fmu.attitude import (
     rotation_from_euler,
     rotation_from_quaternion,
 )
-from hypothesis import given
 from strategies import angles, pitch_angles, speeds, vectors
 
 
@@ -45,8 +46,8 @@ def test_quaternion_and_euler_angles_give_the_same_rotation(euler):
 @given(phi=angles, theta=pitch_angles, psi=angles)
 def test_euler_angles_come_back_from_their_rotation(phi, theta, psi):
     found = euler_from_rotation(rotation_from_euler(phi, theta, psi))
-    np.testing.assert_allclose(np.exp(1j * np.array(found)), np.exp(1j * np.array([phi, theta, psi])),
-                               atol=1e-13)  # fmt: skip
+    given_angles = np.array([phi, theta, psi])
+    np.testing.assert_allclose(np.exp(1j * np.array(found)), np.exp(1j * given_angles), atol=1e-13)
 
 
 @pytest.mark.parametrize("theta", [pi / 2, -pi / 2])

@@ -4,6 +4,8 @@ from math import cos, sin
 
 import numpy as np
 import pytest
+from hypothesis import given
+
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import (
     actuated_velocity,
@@ -14,7 +16,6 @@ from auv_fmu.control_point import (
 )
 from auv_fmu.plant import RollAxis, initial_state, outputs, step
 from auv_fmu.vehicle import Vehicle
-from hypothesis import given
 from strategies import angles, forces, lengths, pitch_angles, speeds, vectors
 
 

@@ -2,21 +2,22 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import control_point_velocity
 from auv_fmu.control_point_model import (
     C_2,
     D_2,
     G_2,
-    J,
-    J_dot,
     M_2,
     ActuatedDynamics,
+    J,
+    J_dot,
     kinematic_disturbance,
     kinematic_matrix,
 )
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
-from hypothesis import given
 from strategies import angles, forces, lengths, pitch_angles, speeds, vectors
 
 VEHICLE, ELL = Vehicle(), 0.35

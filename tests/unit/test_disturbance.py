@@ -2,9 +2,10 @@
 
 from math import sin
 
-from auv_fmu.disturbance import Disturbance, disturbance
 from hypothesis import given
 from hypothesis import strategies as st
+
+from auv_fmu.disturbance import Disturbance, disturbance
 
 
 def test_friction_opposes_each_direction_and_vanishes_at_rest():

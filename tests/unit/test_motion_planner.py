@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from auv_fmu import motion_planner
 from auv_fmu.motion_planner import PlannerState
 from auv_fmu.vehicle import Vehicle
-from hypothesis import given
-from hypothesis import strategies as st
 from strategies import angles, forces, lengths, speeds, vectors
 
 VEHICLE = Vehicle()

@@ -4,6 +4,9 @@ from math import exp
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from auv_fmu import output_feedback
 from auv_fmu.adaptation import bound, regressor, robust_force, theta_hat_rate
 from auv_fmu.attitude import rotation_from_euler
@@ -11,8 +14,6 @@ from auv_fmu.control_point import jacobian
 from auv_fmu.observer import initial_dy_o, observer_acceleration, velocity_estimate
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement
 from auv_fmu.saturation import SATURATIONS, algebraic, hyperbolic_tangent
-from hypothesis import given
-from hypothesis import strategies as st
 from straight_line import closed_loop
 from strategies import angles, speeds, vectors
 
@@ -23,8 +24,10 @@ three = vectors(speeds, 3)
 
 @pytest.mark.parametrize("name", SATURATIONS)
 @pytest.mark.parametrize("printed_jacobian", [True, False])
-@given(y=three, euler=vectors(angles, 3), y_d=three, dy_d=three, ddy_d=three, y_hat=three,
-       dy_o=three, theta_hat=vectors(st.floats(0, 20), 4), gains=vectors(st.floats(0.1, 20), 6))  # fmt: skip
+@given(
+    y=three, euler=vectors(angles, 3), y_d=three, dy_d=three, ddy_d=three, y_hat=three,
+    dy_o=three, theta_hat=vectors(st.floats(0, 20), 4), gains=vectors(st.floats(0.1, 20), 6),
+)  # fmt: skip
 def test_law_is_48_to_51_in_matrices(
     name, printed_jacobian, y, euler, y_d, dy_d, ddy_d, y_hat, dy_o, theta_hat, gains
 ):

@@ -4,10 +4,11 @@ from math import cosh, exp, log, sqrt
 
 import numpy as np
 import pytest
-from auv_fmu.adaptation import NU
-from auv_fmu.saturation import MAXIMUM_SLOPE, SATURATIONS
 from hypothesis import given
 from hypothesis import strategies as st
+
+from auv_fmu.adaptation import NU
+from auv_fmu.saturation import MAXIMUM_SLOPE, SATURATIONS
 from strategies import vectors
 
 numbers = st.floats(-50.0, 50.0)

@@ -4,12 +4,13 @@ from math import cos, sin
 
 import numpy as np
 import pytest
+from hypothesis import given
+
 from auv_fmu import plant
 from auv_fmu.actuators import limit, limit_all
 from auv_fmu.attitude import rotate, rotation_from_euler, rotation_from_quaternion
 from auv_fmu.plant import RollAxis
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
-from hypothesis import given
 from strategies import angles, forces, pitch_angles, speeds, vectors
 
 VEHICLE, ROLL = Vehicle(), RollAxis()

@@ -1,0 +1,117 @@
+"""What the FMU loop costs beside a straight line of Python: `python benchmarks/closed_loop.py`.
+
+Every repetition times, one after the other in this process:
+
+- the straight-line loop of the tests, which calls the same equations without FMI or master;
+- the loop of FMUs, with all checks of the components on;
+- the same FMUs with an empty do_step, set on their loaded classes;
+- the master alone, with every FMI call replaced by nothing.
+
+The set-up of a run (unzip, load, initialise) is timed by a run of one step and subtracted.
+Printed are medians of the repetitions, ratios being taken within each repetition.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import sys
+from collections import deque
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from unittest.mock import patch
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from orchestrator import bundle
+from orchestrator.instance import Instance
+from orchestrator.master import simulate
+from orchestrator.system import System
+from straight_line import STEP, closed_loop
+
+
+def timed(function: Callable[[], object]) -> float:
+    """Wall-clock seconds of one call."""
+    start = perf_counter()
+    function()
+    return perf_counter() - start
+
+
+def loop_time(system: System, steps: int) -> float:
+    """Seconds of the steps of a run, without its set-up."""
+    whole = timed(lambda: simulate(system, steps * STEP, STEP))
+    return whole - timed(lambda: simulate(system, STEP, STEP))
+
+
+def slave_classes() -> list[type]:
+    """The classes of the FMUs that are loaded into this process."""
+    return [
+        getattr(module, name.rsplit("_", 1)[0])
+        for name, module in list(sys.modules.items())
+        if hasattr(module, name.rsplit("_", 1)[0]) and hasattr(module, "settle")
+    ]
+
+
+def with_empty_steps(system: System, steps: int) -> float:
+    """Seconds of the steps when the components compute nothing."""
+    with ExitStack() as stack:
+        for slave in slave_classes():
+            stack.enter_context(patch.object(slave, "do_step", lambda *_: True))
+        return loop_time(system, steps)
+
+
+def master_alone(system: System, steps: int) -> float:
+    """Seconds of the steps when no FMI function is called in them."""
+
+    def nothing(*_: object) -> None: ...
+
+    calls = ([nothing], nothing, [nothing])
+    with (
+        patch("orchestrator.master._calls", lambda _: calls),
+        patch.object(Instance, "parameters", lambda _: {}),
+    ):
+        return loop_time(system, steps)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--steps", type=int, default=5000)
+    parser.add_argument("--repetitions", type=int, default=9)
+    options = parser.parse_args()
+    rows = []
+    with TemporaryDirectory(prefix="auvfmu") as folder:
+        bundle.build(Path(folder))
+        system = bundle.closed_loop(Path(folder))
+        loop_time(system, 10)
+        for _ in range(options.repetitions):
+            straight = timed(lambda: deque(closed_loop(options.steps), maxlen=0))
+            fmus = loop_time(system, options.steps)
+            empty = with_empty_steps(system, options.steps)
+            master = master_alone(system, options.steps)
+            rows.append((straight, fmus, empty, master))
+
+    def per_step(index: int) -> float:
+        return 1e6 * median(row[index] for row in rows) / options.steps
+
+    def share(part: Callable[[float, float, float], float]) -> float:
+        return 100 * median(part(*row[1:]) / row[1] for row in rows)
+
+    print(f"{platform.python_implementation()} {platform.python_version()}, {platform.machine()}")
+    print(f"medians of {options.repetitions} repetitions of {options.steps} steps")
+    print(f"straight-line Python loop         {per_step(0):7.1f} us a step")
+    print(f"FMU loop                          {per_step(1):7.1f} us a step")
+    print(f"FMU loop, empty do_step           {per_step(2):7.1f} us a step")
+    print(f"FMU loop / straight-line loop     {median(b / a for a, b, *_ in rows):7.2f}")
+    print(f"FMU loop / FMUs with empty do_step{median(b / c for _, b, c, _ in rows):7.2f}")
+    print(f"share of the master               {share(lambda b, c, d: d):7.0f} %")
+    print(f"share of wrapper and FMI calls    {share(lambda b, c, d: c - d):7.0f} %")
+    print(f"share of the components' steps    {share(lambda b, c, d: b - c):7.0f} %")
+
+
+if __name__ == "__main__":
+    main()

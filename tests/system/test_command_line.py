@@ -1,0 +1,142 @@
+"""`auv-fmu` as a user types it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from fmpy.util import read_csv
+
+from orchestrator.command_line import main
+
+
+@pytest.fixture
+def workplace(dist: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder in which the bundle has been built, as the current one."""
+    shutil.copytree(dist, tmp_path / "fmus" / "dist")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def files(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def test_build_writes_every_fmu_and_the_bundle_once(workplace, capsys):
+    assert main(["build", "--out", "elsewhere"]) == 0
+    assert {"AuvPlant.fmu", "ObserverController.fmu", "auv.ssp"} <= files(workplace / "elsewhere")
+    before = {p: p.stat().st_mtime_ns for p in (workplace / "elsewhere").iterdir()}
+    capsys.readouterr()
+    assert main(["build", "--out", "elsewhere"]) == 0
+    assert "up to date" in capsys.readouterr().out
+    assert {p: p.stat().st_mtime_ns for p in (workplace / "elsewhere").iterdir()} == before
+
+
+def test_run_builds_what_is_missing_or_stale(workplace):
+    stale = workplace / "fmus/dist/build.json"
+    stale.write_text('{"fingerprint": "of other sources"}')
+    (workplace / "fmus/dist/AuvPlant.fmu").unlink()
+    assert main(["run", "fig4", "--stop-time", "0.1"]) == 0
+    assert (workplace / "fmus/dist/AuvPlant.fmu").is_file()
+    assert "other" not in stale.read_text()
+
+
+def test_list_names_the_scenarios(capsys):
+    assert main(["list"]) == 0
+    assert "fig4 " in capsys.readouterr().out
+
+
+def test_run_writes_table_metrics_and_figures(workplace, capsys):
+    assert main(["run", "fig4", "--stop-time", "2", "--set", "plant.noise.std=0"]) == 0
+    folder = workplace / "results" / "fig4"
+    figures = {f"{stem}.{end}" for stem in ("fig4", "fig4-velocity") for end in ("png", "svg")}
+    assert files(folder) == {"result.csv", "metrics.json"} | figures
+    table = read_csv(folder / "result.csv")
+    assert table.dtype.names[0] == "time"
+    assert len(table) == 101
+    values = json.loads((folder / "metrics.json").read_text())
+    assert values["scenario"] == "fig4"
+    assert values["parameters"] == {"plant.noise.std": 0.0}
+    assert (values["stop_time"], values["step"], values["order"]) == (2.0, 0.02, "gauss-seidel")
+    for key in ("l2_effort", "rms_effort", "peak_command", "saturated_fraction",
+                "total_variation", "final_error"):  # fmt: skip
+        assert len(values[key]) == 3
+    assert "written to" in capsys.readouterr().out
+
+
+def test_same_run_gives_the_same_files(workplace):
+    for name in ("a", "b"):
+        assert main(["run", "fig4", "--stop-time", "1", "--out", name]) == 0
+    for path in (workplace / "a").iterdir():
+        assert path.read_bytes() == (workplace / "b" / path.name).read_bytes(), path.name
+
+
+def test_own_scenario_file_and_ssp_run_the_same_way(workplace):
+    (workplace / "mine.toml").write_text(
+        'title = "Mine"\nstop_time = 0.2\n[parameters]\nplant.noise.std = 0.0\n'
+        '"controller.K1[1]" = 12.0\n'
+    )
+    assert main(["run", "mine.toml"]) == 0
+    values = json.loads((workplace / "results/mine/metrics.json").read_text())
+    assert values["parameters"] == {"controller.K1[1]": 12.0, "plant.noise.std": 0.0}
+    assert main(["run", "fmus/dist/auv.ssp", "--stop-time", "0.2", "--out", "from_ssp"]) == 0
+    assert (workplace / "from_ssp" / "result.csv").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["run", "fig99"], "no scenario 'fig99'; there are"),
+        (["run", "missing.ssp"], "missing.ssp"),
+        (["run", "fig4", "--set", "plant.m11"], "COMPONENT.PARAMETER=VALUE"),
+        (["run", "fig4", "--set", "m11=3"], "component.port"),
+        (["run", "fig4", "--set", "plant.m11=nan"], "must be finite"),
+        (["run", "fig4", "--set", "plant.mass=3"], "no port or parameter"),
+        (["run", "fig4", "--step", "-1"], "must be positive"),
+        (["run", "fig4", "--stop-time", "0"], "must be positive"),
+        (["run", "broken.toml"], "broken.toml"),
+        (["run", "unknown.toml"], "unknown entry 'stop_tme'"),
+        (["run", "wrong.toml"], "wrong type"),
+        (["run", "figure.toml"], "no figure 'none'"),
+        (["run", "broken.ssp"], "cannot be opened"),
+        (["run", "fig4", "--out", "file/below"], "--out"),
+        (["build", "--out", "file/below"], "cannot build"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(workplace, capsys, arguments, reason):
+    (workplace / "broken.toml").write_text("stop_time = ")
+    (workplace / "unknown.toml").write_text("stop_tme = 3")
+    (workplace / "wrong.toml").write_text("stop_time = 'long'")
+    (workplace / "figure.toml").write_text("figure = 'none'")
+    (workplace / "broken.ssp").write_bytes(b"no archive")
+    (workplace / "file").write_text("in the way")
+    assert main(arguments) == 2
+    error = capsys.readouterr().err
+    assert reason in error
+    assert error.count("\n") == 1
+    assert error.startswith("auv-fmu: ")
+
+
+def test_bad_usage_is_status_2():
+    with pytest.raises(SystemExit) as stop:
+        main(["run", "fig4", "--order", "random"])
+    assert stop.value.code == 2
+
+
+def test_failed_simulation_is_status_1_and_keeps_its_rows(workplace, capsys):
+    arguments = ["run", "fig4", "--set", "plant.d11=1e4", "--out", "failed"]
+    assert main(arguments) == 1
+    assert "stopped at t =" in capsys.readouterr().err
+    values = json.loads((workplace / "failed/metrics.json").read_text())
+    assert "stopped at t =" in values["failure"]
+    assert len((workplace / "failed/result.csv").read_text().splitlines()) > 10
+
+
+def test_command_is_installed(workplace):
+    command = Path(sys.executable).with_name("auv-fmu")
+    shown = subprocess.run([command, "--version"], capture_output=True, text=True, check=True)
+    assert shown.stdout.strip()
