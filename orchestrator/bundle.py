@@ -31,9 +31,10 @@ def build(folder: Path) -> list[Path]:
         InputError: the folder cannot be written, or the FMUs cannot be built.
 
     """
-    # In a process of its own: what PythonFMU imports to build must not stay in this one.
+    # In a process of its own: what PythonFMU imports to build must not stay in this one. Without
+    # -P it would import from a folder fmus in the current one.
     process = subprocess.run(
-        [sys.executable, "-m", "fmus.build", "--out", str(folder)],
+        [sys.executable, "-P", "-m", "fmus.build", "--out", str(folder)],
         capture_output=True,
         text=True,
         check=False,
