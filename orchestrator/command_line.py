@@ -22,7 +22,7 @@ from orchestrator.scenario import Scenario, names, port_name, read_scenario
 from orchestrator.ssp import read_ssp
 from orchestrator.system import PortName, System
 
-OK, FAILED, BAD_INPUT = 0, 1, 2
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 #: Communication step of the paper [s], for systems that name none.
 DEFAULT_STEP = 0.02
@@ -37,6 +37,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(f"auv-fmu: {error}", file=sys.stderr)
         return BAD_INPUT
+    except KeyboardInterrupt:
+        print("auv-fmu: interrupted", file=sys.stderr)
+        return INTERRUPTED
     except BrokenPipeError:
         # The reader of our output has gone; nothing more can be told to anybody.
         sys.stderr.close()

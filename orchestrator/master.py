@@ -11,8 +11,10 @@ outputs of a component are read as soon as it was stepped.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from graphlib import CycleError, TopologicalSorter
 from math import floor, isfinite
 from typing import Any
@@ -231,13 +233,16 @@ def _advance(
     rows = result.rows
     rows[0, 1:] = values
     result.computed = 1
-    with tqdm(
-        total=times[-1],
-        unit="s",
-        delay=_PATIENCE,
-        disable=None if progress else True,
-        bar_format="{l_bar}{bar}| {n:.0f}/{total:.0f} s [{elapsed}<{remaining}]",
-    ) as bar:
+    with (
+        _held_interrupts() as interrupts,
+        tqdm(
+            total=times[-1],
+            unit="s",
+            delay=_PATIENCE,
+            disable=None if progress else True,
+            bar_format="{l_bar}{bar}| {n:.0f}/{total:.0f} s [{elapsed}<{remaining}]",
+        ) as bar,
+    ):
         try:
             for k in range(len(times) - 1):
                 t = times[k]
@@ -255,12 +260,31 @@ def _advance(
                 result.computed = k + 2
                 if k % _CHUNK == 0:
                     bar.update(t - bar.n)
+                if interrupts:
+                    result.failure = f"interrupted at t = {times[k + 1]:g} s"
+                    return
             bar.update(times[-1] - bar.n)
         except FMICallException as error:
             reason = "; ".join(result.messages[-1:]) or str(error)
             result.failure = f"stopped at t = {t:g} s: {reason}"
-        except KeyboardInterrupt:
-            result.failure = f"interrupted at t = {t:g} s"
+
+
+@contextmanager
+def _held_interrupts() -> Iterator[list[int]]:
+    """The interrupts (Ctrl-C) that have come, collected instead of raised.
+
+    Python raises KeyboardInterrupt wherever it is, which may be inside an FMU: PythonFMU would
+    then release its objects twice and crash the process.
+    """
+    interrupts: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield interrupts
+        return
+    before = signal.signal(signal.SIGINT, lambda number, _: interrupts.append(number))
+    try:
+        yield interrupts
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 _Calls = tuple[list[Callable[[], Any]], Callable[[float, float, int], Any], list[Callable[[], Any]]]

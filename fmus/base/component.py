@@ -4,8 +4,9 @@ PythonFMU turns a Python class into an FMU. What it leaves to the class is done 
 
 - Values live in one indexed store. A host that passes all inputs or all outputs of a component
   in one call, in their order, costs one comparison instead of one accessor a value.
-- No exception leaves a callback: PythonFMU would report fmi2Fatal and release its objects
-  twice. A refusal is logged, raises `fault`, and makes the next step return fmi2Discard.
+- No exception leaves a callback, not even an interrupt: PythonFMU would report fmi2Fatal and
+  release its objects twice. A refusal is logged, raises `fault`, and ends the next step with
+  fmi2Discard.
 - A step is a transaction: state and outputs change together, after everything was computed and
   found finite.
 - The state of the FMU is complete and exact, in memory and serialised.
@@ -130,7 +131,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
         """Run a callback's body; whatever it raises is reported instead."""
         try:
             function()
-        except Exception as error:
+        except BaseException as error:
             self._report(f"{action}: {type(error).__name__}: {error}")
             return False
         return True
@@ -198,7 +199,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
                 raise Refusal("an output is no longer finite")
             self._state, self._outputs = state, outputs
             self.sample(outputs)
-        except Exception as error:
+        except BaseException as error:
             what = str(error) if isinstance(error, Refusal) else f"{type(error).__name__}: {error}"
             self._report(f"step refused at t = {current_time:g} s: {what}")
             return False
@@ -287,7 +288,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
                     self._set_input(reference, port, value)
                 else:
                     self._set_parameter(port, value)
-            except Exception as error:
+            except BaseException as error:
                 self._report(str(error))
 
     def _set_input(self, reference: int, port: Port, value: Value) -> None:

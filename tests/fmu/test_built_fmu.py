@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import shutil
 import subprocess
 import sys
@@ -255,6 +256,19 @@ def test_many_instances_leave_the_interpreter_as_it_was(dist: Path, tmp_path: Pa
     after = sys.getrefcount(vars(sys.modules[script]))
     assert after == before
     assert sys.path == path
+
+
+def test_process_with_an_instance_ends_in_peace(dist: Path, tmp_path: Path):
+    """PythonFMU frees one of its objects twice at exit, which a busy heap does not survive."""
+    fmpy.extract(dist / "MotionPlanner.fmu", unzipdir=tmp_path)
+    script = (
+        "import fmpy, sys; from fmpy.fmi2 import FMU2Slave; folder = sys.argv[1];"
+        "fmu = FMU2Slave(guid='', modelIdentifier='MotionPlanner', unzipDirectory=folder);"
+        "fmu.instantiate(); fmu.freeInstance()"
+    )
+    busy_heap = {**os.environ, "MALLOC_PERTURB_": "165", "MALLOC_CHECK_": "3"}
+    for _ in range(5):
+        subprocess.run([sys.executable, "-c", script, str(tmp_path)], env=busy_heap, check=True)
 
 
 def build(folder: Path, packages: Path) -> None:

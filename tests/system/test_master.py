@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import signal
 import tempfile
+import threading
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -124,6 +127,17 @@ def test_failure_keeps_the_rows_before_it_and_says_why(system: System):
     assert "stopped at t =" in result.failure
     assert "refused" in result.failure
     assert 10 < result.computed < 5001
+    assert np.isfinite(result.rows[: result.computed]).all()
+
+
+def test_interrupt_keeps_the_rows_and_does_not_reach_the_fmus(system: System):
+    """Ctrl-C after half a second of a run that would take minutes."""
+    timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    result = simulate(system, 1e5, 0.02)
+    assert result.failure is not None
+    assert "interrupted at t =" in result.failure
+    assert result.computed > 100
     assert np.isfinite(result.rows[: result.computed]).all()
 
 
