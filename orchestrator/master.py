@@ -230,9 +230,7 @@ def _advance(
         for names, connections in zip(plan, gathered, strict=True)
     ]
     times = result.times.tolist()
-    rows = result.rows
-    rows[0, 1:] = values
-    result.computed = 1
+    result.append(values)
     with (
         _held_interrupts() as interrupts,
         tqdm(
@@ -256,8 +254,7 @@ def _advance(
                         do_step(t, h, 1)
                         for call in get_outputs:
                             call()
-                rows[k + 1, 1:] = values
-                result.computed = k + 2
+                result.append(values)
                 if k % _CHUNK == 0:
                     bar.update(t - bar.n)
                 if interrupts:

@@ -43,8 +43,8 @@ class Result:
 
     def __post_init__(self) -> None:
         """Make room for all rows."""
+        # Memory is taken when a row is written, so a long run costs what it has computed.
         self.rows = np.empty((len(self.times), 1 + len(self.columns)))
-        self.rows[:, 0] = self.times
         self._index = {name: i for i, name in enumerate(self.columns, start=1)}
 
     def __contains__(self, column: str) -> bool:
@@ -65,6 +65,13 @@ class Result:
         """Times of the computed rows [s]."""
         view: np.ndarray = self.rows[: self.computed, 0]
         return view
+
+    def append(self, values: np.ndarray) -> None:
+        """Take the values of all columns as the next row."""
+        row = self.computed
+        self.rows[row, 0] = self.times[row]
+        self.rows[row, 1:] = values
+        self.computed = row + 1
 
     def write_csv(self, path: Path) -> None:
         """Write the computed rows; numbers are written so that they read back exactly."""

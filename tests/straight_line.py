@@ -57,7 +57,8 @@ def closed_loop(
     planned = PlannerState((0.0, 0.0, -2.0), 0.0, 0.0, (0.0,) * 5)
     seen = plant.outputs(state, gains.ell)
     y = plant.measure(seen.y, noise_std, (gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)))
-    reference = motion_planner.reference(vehicle, planned, TAU_D, gains.ell)
+    moving = motion_planner.motion(vehicle, planned, TAU_D)
+    reference = motion_planner.reference(planned, moving, gains.ell)
     measurement = Measurement(y, seen.euler, *reference)
     control = output_feedback.initial_state(gains, y)
     signals = output_feedback.evaluate(gains, control, measurement)
@@ -73,10 +74,11 @@ def closed_loop(
         evaluated = control
         control = output_feedback.step(control, signals, h)
         state = plant.step(vehicle, roll, state, tau, tau_w, h)
-        planned = motion_planner.step(vehicle, planned, TAU_D, h)
+        planned = motion_planner.step(planned, moving, h)
+        moving = motion_planner.motion(vehicle, planned, TAU_D)
         seen = plant.outputs(state, gains.ell)
         y = plant.measure(seen.y, noise_std, (gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)))
-        reference = motion_planner.reference(vehicle, planned, TAU_D, gains.ell)
+        reference = motion_planner.reference(planned, moving, gains.ell)
         yield Instant(
             state, seen, y, tau, evaluated, signals, measurement, tau_w, planned, reference
         )

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from auv_fmu import motion_planner
-from auv_fmu.motion_planner import PlannerState
+from auv_fmu.motion_planner import Motion, PlannerState
 from fmus.base.component import Component
 from fmus.base.vehicle_ports import vehicle
 from fmus.motion_planner.ports import PORTS
+
+
+class Planned(NamedTuple):
+    """The state and its motion, which the next step needs again."""
+
+    state: PlannerState
+    motion: Motion
 
 
 class MotionPlanner(Component):
@@ -17,7 +24,7 @@ class MotionPlanner(Component):
 
     description = "Motion planner: helical reference with velocity and acceleration"
     ports = PORTS
-    state_type = PlannerState
+    state_type = Planned
 
     def configure(self, values: dict[str, Any]) -> None:
         self._vehicle = vehicle(values)
@@ -30,16 +37,20 @@ class MotionPlanner(Component):
             (0.0, 0.0, 0.0, 0.0, 0.0),
         )
 
-    def begin(self, inputs: Sequence[float], t: float) -> tuple[PlannerState, list[float]]:
-        return self._rest, self._seen(self._rest)
+    def begin(self, inputs: Sequence[float], t: float) -> tuple[Planned, list[float]]:
+        return self._planned(self._rest)
 
     def advance(
-        self, state: PlannerState, inputs: Sequence[float], t: float, h: float, n: int
-    ) -> tuple[PlannerState, list[float]]:
-        for _ in range(n):
-            state = motion_planner.step(self._vehicle, state, self._tau_d, h)
-        return state, self._seen(state)
+        self, state: Planned, inputs: Sequence[float], t: float, h: float, n: int
+    ) -> tuple[Planned, list[float]]:
+        moved, moving = state
+        for _ in range(n - 1):
+            moved = motion_planner.step(moved, moving, h)
+            moving = motion_planner.motion(self._vehicle, moved, self._tau_d)
+        return self._planned(motion_planner.step(moved, moving, h))
 
-    def _seen(self, state: PlannerState) -> list[float]:
-        y_d, dy_d, ddy_d = motion_planner.reference(self._vehicle, state, self._tau_d, self._ell)
-        return [*y_d, *dy_d, *ddy_d, *state.position, state.theta, state.psi]
+    def _planned(self, state: PlannerState) -> tuple[Planned, list[float]]:
+        moving = motion_planner.motion(self._vehicle, state, self._tau_d)
+        y_d, dy_d, ddy_d = motion_planner.reference(state, moving, self._ell)
+        seen = [*y_d, *dy_d, *ddy_d, *state.position, state.theta, state.psi]
+        return Planned(state, moving), seen

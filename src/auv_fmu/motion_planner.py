@@ -26,6 +26,13 @@ class PlannerState(NamedTuple):
     nu: Vector5  #: (u, v, w, q, r) [m/s, rad/s], body frame
 
 
+class Motion(NamedTuple):
+    """What (1) and (2) say at a state; both its step and its reference follow from it."""
+
+    rotation: Rotation  #: body to earth
+    dnu: Vector5  #: d/dt (u, v, w, q, r) [m/s2, rad/s2]
+
+
 class Reference(NamedTuple):
     """Desired trajectory of the control point, earth frame."""
 
@@ -34,13 +41,26 @@ class Reference(NamedTuple):
     ddy_d: Vector3  #: [m/s2]
 
 
-def step(vehicle: Vehicle, state: PlannerState, tau_d: Vector3, h: float) -> PlannerState:
-    """One Euler step of (1) and (2).
+def motion(vehicle: Vehicle, state: PlannerState, tau_d: Vector3) -> Motion:
+    """Attitude (1) and accelerations (2) of the reference vehicle.
 
     Args:
         vehicle: parameters of the reference vehicle.
-        state: at the beginning of the step.
+        state: of the reference vehicle.
         tau_d: (tau_ud, tau_qd, tau_rd) [N, N.m].
+
+    """
+    _, theta, psi, nu = state
+    rotation = rotation_from_euler(0.0, theta, psi)
+    return Motion(rotation, accelerations(vehicle, nu, -rotation[0][2], tau_d, _UNDISTURBED))
+
+
+def step(state: PlannerState, moving: Motion, h: float) -> PlannerState:
+    """One Euler step of (1) and (2).
+
+    Args:
+        state: at the beginning of the step.
+        moving: its motion.
         h: step [s].
 
     Raises:
@@ -48,10 +68,9 @@ def step(vehicle: Vehicle, state: PlannerState, tau_d: Vector3, h: float) -> Pla
 
     """
     (x, y, z), theta, psi, (u, v, w, q, r) = state
-    rotation = rotation_from_euler(0.0, theta, psi)
+    rotation, (du, dv, dw, dq, dr) = moving
     dx, dy, dz = rotate(rotation, (u, v, w))
     dtheta, dpsi = euler_rates(theta, q, r)
-    du, dv, dw, dq, dr = accelerations(vehicle, state.nu, -rotation[0][2], tau_d, _UNDISTURBED)
     return PlannerState(
         (x + h * dx, y + h * dy, z + h * dz),
         theta + h * dtheta,
@@ -60,26 +79,22 @@ def step(vehicle: Vehicle, state: PlannerState, tau_d: Vector3, h: float) -> Pla
     )
 
 
-def reference(vehicle: Vehicle, state: PlannerState, tau_d: Vector3, ell: float) -> Reference:
+def reference(state: PlannerState, moving: Motion, ell: float) -> Reference:
     """y_d, dy_d/dt and d2y_d/dt2 in closed form: (9), (10) and the derivative of (10).
 
     With a = (u, v + ell r, w - ell q) equation (10) reads dy = R a, and hence
     d2y = R (da/dt + omega x a). With roll held at zero R turns at omega = (-r tan(theta), q, r).
 
     Args:
-        vehicle: parameters of the reference vehicle.
         state: of the reference vehicle.
-        tau_d: (tau_ud, tau_qd, tau_rd) [N, N.m].
+        moving: its motion.
         ell: distance of the control point [m].
 
     """
-    position, theta, psi, nu = state
-    u, v, w, q, r = nu
-    rotation: Rotation = rotation_from_euler(0.0, theta, psi)
-    sin_theta = -rotation[0][2]
-    du, dv, dw, dq, dr = accelerations(vehicle, nu, sin_theta, tau_d, _UNDISTURBED)
+    position, _, _, (u, v, w, q, r) = state
+    rotation, (du, dv, dw, dq, dr) = moving
     a1, a2, a3 = u, v + ell * r, w - ell * q
-    p = -r * sin_theta / rotation[2][2]
+    p = r * rotation[0][2] / rotation[2][2]
     return Reference(
         control_point(position, rotation, ell),
         control_point_velocity(rotation, (u, v, w, p, q, r), ell),

@@ -13,6 +13,10 @@ from strategies import angles, forces, lengths, speeds, vectors
 VEHICLE = Vehicle()
 
 
+def stepped(state, tau_d, h):
+    return motion_planner.step(state, motion_planner.motion(VEHICLE, state, tau_d), h)
+
+
 @given(theta=st.floats(-1.2, 1.2), psi=angles, nu=vectors(speeds, 5), tau_d=vectors(forces, 3),
        ell=lengths)  # fmt: skip
 def test_closed_form_derivatives_agree_with_differences_of_the_trajectory(
@@ -22,8 +26,8 @@ def test_closed_form_derivatives_agree_with_differences_of_the_trajectory(
     state, h = PlannerState((1.0, 2.0, 3.0), theta, psi, nu), 1e-5
 
     def at(dt):
-        moved = motion_planner.step(VEHICLE, state, tau_d, dt)
-        return motion_planner.reference(VEHICLE, moved, tau_d, ell)
+        moved = stepped(state, tau_d, dt)
+        return motion_planner.reference(moved, motion_planner.motion(VEHICLE, moved, tau_d), ell)
 
     now, after, before = at(0.0), at(h), at(-h)
     difference = np.subtract(after.y_d, before.y_d) / (2 * h)
@@ -36,7 +40,7 @@ def test_steady_turn_is_an_equilibrium_of_equation_2():
     """Under constant yaw moment without pitch, (2) rests where its right side is zero."""
     state = PlannerState((0.0,) * 3, 0.0, 0.0, (0.0,) * 5)
     for _ in range(10_000):
-        state = motion_planner.step(VEHICLE, state, (20.0, 0.0, 4.0), 0.02)
+        state = stepped(state, (20.0, 0.0, 4.0), 0.02)
     u, v, w, q, r = state.nu
     assert (w, q) == (0.0, 0.0)
     assert v == pytest.approx(-VEHICLE.m11 * u * r / VEHICLE.d22, rel=1e-9)
@@ -47,7 +51,8 @@ def test_steady_turn_is_an_equilibrium_of_equation_2():
 def test_reference_at_rest_accelerates_by_the_driving_torques_alone():
     """At rest ddy_d = J M_1^-1 tau_d, which is (14) without velocities."""
     state = PlannerState((0.0, 0.0, -2.0), 0.0, 0.0, (0.0,) * 5)
-    reference = motion_planner.reference(VEHICLE, state, (5.0, 1.0, 2.0), 0.35)
+    moving = motion_planner.motion(VEHICLE, state, (5.0, 1.0, 2.0))
+    reference = motion_planner.reference(state, moving, 0.35)
     assert reference.y_d == (0.35, 0.0, -2.0)
     assert reference.dy_d == (0.0, 0.0, 0.0)
     assert reference.ddy_d == pytest.approx((5.0 / 25.0, 0.35 * 2.0 / 15.0, -0.35 * 1.0 / 22.5))
