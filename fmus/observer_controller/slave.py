@@ -11,6 +11,7 @@ from auv_fmu import output_feedback
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement, Signals
 from auv_fmu.saturation import SATURATIONS
 from fmus.base.component import Component
+from fmus.base.controller_ports import vector
 from fmus.observer_controller.ports import PORTS
 
 
@@ -27,18 +28,13 @@ class ObserverController(Component):
 
     def configure(self, values: dict[str, Any]) -> None:
         self._gains = Gains(
-            K1=(values["K1[1]"], values["K1[2]"], values["K1[3]"]),
-            K2=(values["K2[1]"], values["K2[2]"], values["K2[3]"]),
+            K1=vector(values, "K1", 3),
+            K2=vector(values, "K2", 3),
             lambda_=values["lambda"],
             k_d=values["k_d"],
             gamma=values["gamma"],
             sigma=values["sigma"],
-            theta_0=(
-                values["theta_0[1]"],
-                values["theta_0[2]"],
-                values["theta_0[3]"],
-                values["theta_0[4]"],
-            ),
+            theta_0=vector(values, "theta_0", 4),
             eps_t=values["eps_t"],
             ell=values["ell"],
             s=SATURATIONS[values["saturation"]],

@@ -22,7 +22,7 @@ from fmpy.validation import validate_fmu
 import auv_fmu
 import fmus
 
-NAMES = ["AuvPlant", "DisturbanceGenerator", "MotionPlanner", "ObserverController"]
+NAMES = ["AuvPlant", "DisturbanceGenerator", "MotionPlanner", "ObserverController", "PdController"]
 WITH_INPUTS = [name for name in NAMES if name != "MotionPlanner"]
 each = pytest.mark.parametrize("name", NAMES)
 

@@ -12,10 +12,11 @@ from fmus.base.component import Component
 from fmus.disturbance_generator.slave import DisturbanceGenerator
 from fmus.motion_planner.slave import MotionPlanner
 from fmus.observer_controller.slave import ObserverController
+from fmus.pd_controller.slave import PdController
 
-COMPONENTS = [AuvPlant, DisturbanceGenerator, MotionPlanner, ObserverController]
-WITH_INPUTS = [AuvPlant, DisturbanceGenerator, ObserverController]
-WITH_STEP_LIMIT = [AuvPlant, MotionPlanner, ObserverController]
+COMPONENTS = [AuvPlant, DisturbanceGenerator, MotionPlanner, ObserverController, PdController]
+WITH_INPUTS = [AuvPlant, DisturbanceGenerator, ObserverController, PdController]
+WITH_STEP_LIMIT = [AuvPlant, MotionPlanner, ObserverController, PdController]
 
 
 class Driver:
@@ -142,6 +143,7 @@ def test_infinities_that_cancel_are_found():
         (ObserverController, "saturation", "sigmoid"),
         (ObserverController, "k_d", -50.0),
         (DisturbanceGenerator, "omega_d", nan),
+        (PdController, "sigma", -1.0),
     ],
 )
 def test_wrong_parameter_is_refused_and_no_step_is_made_with_another_value(component, name, value):
