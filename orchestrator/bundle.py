@@ -5,12 +5,15 @@ from __future__ import annotations
 import subprocess
 import sys
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 from uuid import uuid4
 
 from orchestrator.errors import InputError
+from orchestrator.scenario import Scenario
 from orchestrator.ssp import ssp_bytes
-from orchestrator.system import Connection, PortName, System, read_component
+from orchestrator.system import Component, Connection, PortName, System, port_name, read_component
 
 #: Where the bundle is built unless another folder is named.
 DEFAULT_FOLDER = Path("fmus", "dist")
@@ -56,29 +59,63 @@ def build(folder: Path) -> list[Path]:
     return written
 
 
-def closed_loop(folder: Path) -> System:
-    """The wiring of the closed loop over the FMUs in a folder."""
+def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
+    """The wiring of the closed loop over the FMUs in a folder.
+
+    Args:
+        folder: with the built FMUs.
+        scenario: whose components, wires and parameters change it; None: the closed loop as is.
+
+    Raises:
+        InputError: a component or group of ports that the scenario names does not exist.
+
+    """
     wiring = tomllib.loads(_WIRING.read_text(encoding="utf-8"))
+    chosen, wires = wiring["components"], wiring["wires"]
+    parameters: Mapping[PortName, Any] = {}
+    if scenario is not None:
+        chosen, wires = chosen | scenario.components, wires | scenario.wires
+        parameters = scenario.parameters
+        if scenario.only:
+            chosen = {name: fmu for name, fmu in chosen.items() if name in scenario.only}
+            wires = {
+                target: source
+                for target, source in wires.items()
+                if {target.split(".")[0], source.split(".")[0]} <= chosen.keys()
+            }
     components = {
-        name: read_component(name, folder / f"{fmu}.fmu")
-        for name, fmu in wiring["components"].items()
+        name: read_component(name, Path(fmu) if fmu.endswith(".fmu") else folder / f"{fmu}.fmu")
+        for name, fmu in chosen.items()
     }
-    connections = []
-    for target, source in wiring["wires"].items():
-        target_component, group = target.split(".")
-        source_component, source_group = source.split(".")
-        connections += [
-            Connection(
-                PortName(source_component, source_group + variable.name.removeprefix(group)),
-                PortName(target_component, variable.name),
-            )
-            for variable in components[target_component].description.modelVariables
-            if variable.causality == "input" and variable.name.startswith(f"{group}.")
-        ]
     return System(
         name=wiring["name"],
         components=components,
-        connections=tuple(connections),
+        connections=tuple(
+            connection
+            for target, source in wires.items()
+            for connection in _wire(components, target, source)
+        ),
+        parameters=parameters,
         stop_time=wiring["experiment"]["stop_time"],
         step=wiring["experiment"]["step"],
     )
+
+
+def _wire(components: Mapping[str, Component], target: str, source: str) -> list[Connection]:
+    """The connections of one wire: every input of the target group takes its namesake."""
+    to, group = port_name(target).component, port_name(target).port
+    start, source_group = port_name(source).component, port_name(source).port
+    for name in (to, start):
+        if name not in components:
+            raise InputError(f"wire {source} -> {target}: there is no component {name!r}")
+    inputs = [
+        variable.name
+        for variable in components[to].description.modelVariables
+        if variable.causality == "input" and variable.name.startswith(f"{group}.")
+    ]
+    if not inputs:
+        raise InputError(f"wire {source} -> {target}: {to} has no inputs {group}.*")
+    return [
+        Connection(PortName(start, source_group + name.removeprefix(group)), PortName(to, name))
+        for name in inputs
+    ]

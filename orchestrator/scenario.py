@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import InputError
-from orchestrator.system import PortName
+from orchestrator.system import PortName, port_name
 
 FOLDER = Path(__file__).parent / "scenarios"
 
@@ -21,18 +21,44 @@ class Scenario:
     Attributes:
         name: of the file, without its ending.
         title: heading of the figures.
+        label: of its lines where two runs are drawn together.
         figure: which figure to draw, a key of `orchestrator.figures.FIGURES`.
+        compare: name of a scenario that is run and drawn together with this one.
         stop_time, step: experiment [s]; None: the system's own.
+        components: FMUs that take the place of those of the closed loop: names of the bundle's
+            own, or paths of .fmu files.
+        wires: further wires, as in closed_loop.toml.
+        only: the components to keep; empty: all.
         parameters: values that differ from the components' defaults.
 
     """
 
     name: str
     title: str = ""
+    label: str = ""
     figure: str = "tracking"
+    compare: str = ""
     stop_time: float | None = None
     step: float | None = None
+    components: Mapping[str, str] = field(default_factory=dict)
+    wires: Mapping[str, str] = field(default_factory=dict)
+    only: Sequence[str] = ()
     parameters: Mapping[PortName, Any] = field(default_factory=dict)
+
+
+#: Entries of a scenario file and their types.
+_ENTRIES: dict[str, type | tuple[type, ...]] = {
+    "title": str,
+    "label": str,
+    "figure": str,
+    "compare": str,
+    "stop_time": (int, float),
+    "step": (int, float),
+    "components": dict,
+    "wires": dict,
+    "only": list,
+    "parameters": dict,
+}
 
 
 def names() -> list[str]:
@@ -56,21 +82,17 @@ def read_scenario(name: str) -> Scenario:
         ) from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{path}: {error}") from error
-    known: dict[str, type | tuple[type, ...]] = {
-        "title": str,
-        "figure": str,
-        "stop_time": (int, float),
-        "step": (int, float),
-    }
     for key, value in content.items():
-        if key == "parameters" and isinstance(value, dict):
-            continue
-        if key not in known:
-            raise InputError(f"{path}: unknown entry {key!r}; use parameters, {', '.join(known)}")
-        if not isinstance(value, known[key]):
+        if key not in _ENTRIES:
+            raise InputError(f"{path}: unknown entry {key!r}; use {', '.join(_ENTRIES)}")
+        if not isinstance(value, _ENTRIES[key]):
             raise InputError(f"{path}: {key} = {value!r} is of the wrong type")
-    parameters = dict(_flattened(content.pop("parameters", {})))
-    return Scenario(path.stem, parameters=parameters, **content)
+    content["parameters"] = dict(_flattened(content.get("parameters", {})))
+    content["components"] = {
+        component: str(path.parent / fmu) if str(fmu).endswith(".fmu") else str(fmu)
+        for component, fmu in content.get("components", {}).items()
+    }
+    return Scenario(path.stem, **content)
 
 
 def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[PortName, Any]]:
@@ -80,16 +102,3 @@ def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[Por
             yield from _flattened(value, name)
         else:
             yield port_name(name), value
-
-
-def port_name(text: str) -> PortName:
-    """`component.port`, taken apart at the first dot.
-
-    Raises:
-        InputError: there is no dot.
-
-    """
-    component, dot, port = text.partition(".")
-    if not (component and dot and port):
-        raise InputError(f"{text!r}: write component.port")
-    return PortName(component, port)

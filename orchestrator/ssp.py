@@ -12,8 +12,7 @@ from zipfile import BadZipFile, ZipFile, ZipInfo
 from fmpy.ssp import ssd as fmpy_ssd
 
 from orchestrator.errors import InputError
-from orchestrator.scenario import port_name
-from orchestrator.system import Component, Connection, PortName, System, read_component
+from orchestrator.system import Component, Connection, PortName, System, port_name, read_component
 
 STRUCTURE = "SystemStructure.ssd"
 

@@ -26,6 +26,19 @@ class PortName:
         return f"{self.component}.{self.port}"
 
 
+def port_name(text: str) -> PortName:
+    """`component.port`, taken apart at the first dot.
+
+    Raises:
+        InputError: there is no dot.
+
+    """
+    component, dot, port = text.partition(".")
+    if not (component and dot and port):
+        raise InputError(f"{text!r}: write component.port")
+    return PortName(component, port)
+
+
 @dataclass(frozen=True)
 class Connection:
     """One value that goes from an output to an input."""

@@ -37,7 +37,7 @@ ADAPTATION: tuple[Port, ...] = (
     parameter("sigma", _GAINS.sigma, "1/s", "Sigma = sigma I", minimum=0.0, tunable=True),
     *parameters("theta_0", _GAINS.theta_0, _THETA, "Prior of the parameters"),
     parameter(
-        "eps_t", _GAINS.eps_t, "W", "Boundary layer of the robust term", POSITIVE, tunable=True
+        "eps_t", _GAINS.eps_t, "W", "Boundary layer of tanh(nu rho r)", POSITIVE, tunable=True
     ),
 )
 

@@ -12,7 +12,12 @@ from typing import NamedTuple
 from auv_fmu.adaptation import bound, norm, regressor, robust_force, theta_hat_rate
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import ELL, actuator_command
-from auv_fmu.observer import initial_dy_o, observer_acceleration, velocity_estimate
+from auv_fmu.observer import (
+    initial_dy_hat_o,
+    observer_acceleration,
+    observer_velocity,
+    velocity_estimate,
+)
 from auv_fmu.saturation import Saturation, hyperbolic_tangent
 from auv_fmu.types import Vector3, Vector4
 
@@ -48,7 +53,7 @@ class ControllerState(NamedTuple):
     """States of the observer and of the adaptive law."""
 
     y_hat: Vector3  #: estimated control point [m]
-    dy_o: Vector3  #: velocity of (18) [m/s]
+    dy_hat_o: Vector3  #: velocity of (23) and (24) [m/s]
     theta_hat: Vector4  #: estimated parameters [N, kg/s, kg/m, kg]
 
 
@@ -59,7 +64,7 @@ class Signals(NamedTuple):
     dy_hat: Vector3  #: estimated velocity of the control point [m/s]
     e: Vector3  #: tracking error y - y_d [m]
     z: Vector3  #: estimation error y - y_hat [m]
-    ddy_o: Vector3  #: rate of dy_o [m/s2]
+    ddy_hat_o: Vector3  #: rate of dy_hat_o [m/s2]
     dtheta_hat: Vector4  #: rate of theta_hat
 
 
@@ -71,9 +76,9 @@ def initial_state(gains: Gains, y: Vector3) -> ControllerState:
 def _rest(gains: Gains, y: Vector3, y_hat: Vector3) -> Vector3:
     z = (y[0] - y_hat[0], y[1] - y_hat[1], y[2] - y_hat[2])
     return (
-        initial_dy_o(gains.s(z[0])[0], z[0], gains.lambda_, gains.k_d),
-        initial_dy_o(gains.s(z[1])[0], z[1], gains.lambda_, gains.k_d),
-        initial_dy_o(gains.s(z[2])[0], z[2], gains.lambda_, gains.k_d),
+        initial_dy_hat_o(gains.s(z[0])[0], z[0], gains.lambda_, gains.k_d),
+        initial_dy_hat_o(gains.s(z[1])[0], z[1], gains.lambda_, gains.k_d),
+        initial_dy_hat_o(gains.s(z[2])[0], z[2], gains.lambda_, gains.k_d),
     )
 
 
@@ -103,7 +108,7 @@ def gated(gains: Gains, state: ControllerState, y: Vector3) -> ControllerState:
 def axis(
     y: float,
     y_hat: float,
-    dy_o: float,
+    dy_hat_o: float,
     y_d: float,
     dy_d: float,
     ddy_d: float,
@@ -117,13 +122,13 @@ def axis(
 
     Args:
         y, y_hat, y_d: measured, estimated and desired control point [m].
-        dy_o: observer state [m/s].
+        dy_hat_o: observer state [m/s].
         dy_d, ddy_d: derivatives of the reference [m/s, m/s2].
         k1, k2: diagonal entries of K_1 and K_2 [N].
         lambda_, k_d, s: as in :class:`Gains`.
 
     Returns:
-        (dy_hat, dy_r, ddy_r, r_hat, force, ddy_o, z): the estimated velocity (23) [m/s], the
+        (dy_hat, dy_r, ddy_r, r_hat, force, ddy_hat_o, z): the estimated velocity (23) [m/s], the
         virtual reference (16) [m/s] and its derivative (Remark 3) [m/s2], r_1 + r_2 with the
         estimated velocity (below (21)) [m/s], the first three terms of (21) [N], the observer
         acceleration (51) [m/s2] and the estimation error [m].
@@ -132,10 +137,11 @@ def axis(
     z = y - y_hat
     s_z, _ = s(z)
     s_ez, slope_ez = s(y_hat - y_d)
-    dy_hat = velocity_estimate(dy_o, s_z, z, lambda_, k_d)
+    dy_hat = velocity_estimate(dy_hat_o, s_z, z, lambda_, k_d)
     dy_r = dy_d - lambda_ * s_ez
     ddy_r = ddy_d - lambda_ * slope_ez * (dy_hat - dy_d)
     r_hat = dy_hat - dy_d + lambda_ * s_ez + lambda_ * s_z
+    dy_o = observer_velocity(dy_hat, s_z, lambda_)
     force = -k1 * s(dy_o - dy_r)[0] - k2 * s_ez - k2 * s_z
     return dy_hat, dy_r, ddy_r, r_hat, force, observer_acceleration(ddy_r, s_z, lambda_, k_d), z
 
@@ -151,15 +157,15 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement) -> 
     """
     K1, K2, lambda_, k_d, gamma, sigma, theta_0, eps_t, ell, s, printed_jacobian, _ = gains
     y, (phi, theta, psi), y_d, dy_d, ddy_d = measurement
-    y_hat, dy_o, theta_hat = state
-    dy_hat0, dy_r0, ddy_r0, r0, f0, ddy_o0, z0 = axis(
-        y[0], y_hat[0], dy_o[0], y_d[0], dy_d[0], ddy_d[0], K1[0], K2[0], lambda_, k_d, s
+    y_hat, dy_hat_o, theta_hat = state
+    dy_hat0, dy_r0, ddy_r0, r0, f0, ddy_hat_o0, z0 = axis(
+        y[0], y_hat[0], dy_hat_o[0], y_d[0], dy_d[0], ddy_d[0], K1[0], K2[0], lambda_, k_d, s
     )
-    dy_hat1, dy_r1, ddy_r1, r1, f1, ddy_o1, z1 = axis(
-        y[1], y_hat[1], dy_o[1], y_d[1], dy_d[1], ddy_d[1], K1[1], K2[1], lambda_, k_d, s
+    dy_hat1, dy_r1, ddy_r1, r1, f1, ddy_hat_o1, z1 = axis(
+        y[1], y_hat[1], dy_hat_o[1], y_d[1], dy_d[1], ddy_d[1], K1[1], K2[1], lambda_, k_d, s
     )
-    dy_hat2, dy_r2, ddy_r2, r2, f2, ddy_o2, z2 = axis(
-        y[2], y_hat[2], dy_o[2], y_d[2], dy_d[2], ddy_d[2], K1[2], K2[2], lambda_, k_d, s
+    dy_hat2, dy_r2, ddy_r2, r2, f2, ddy_hat_o2, z2 = axis(
+        y[2], y_hat[2], dy_hat_o[2], y_d[2], dy_d[2], ddy_d[2], K1[2], K2[2], lambda_, k_d, s
     )
     G = regressor((dy_r0, dy_r1, dy_r2), (ddy_r0, ddy_r1, ddy_r2))
     rho_hat = bound(G, theta_hat)
@@ -174,7 +180,7 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement) -> 
         (dy_hat0, dy_hat1, dy_hat2),
         (y[0] - y_d[0], y[1] - y_d[1], y[2] - y_d[2]),
         (z0, z1, z2),
-        (ddy_o0, ddy_o1, ddy_o2),
+        (ddy_hat_o0, ddy_hat_o1, ddy_hat_o2),
         theta_hat_rate(G, norm((r0, r1, r2)), theta_hat, theta_0, gamma, sigma),
     )
 
@@ -190,7 +196,7 @@ def step(state: ControllerState, signals: Signals, h: float) -> ControllerState:
     """
     (a0, a1, a2), (b0, b1, b2), (c0, c1, c2, c3) = state
     v0, v1, v2 = signals.dy_hat
-    w0, w1, w2 = signals.ddy_o
+    w0, w1, w2 = signals.ddy_hat_o
     g0, g1, g2, g3 = signals.dtheta_hat
     return ControllerState(
         (a0 + h * v0, a1 + h * v1, a2 + h * v2),

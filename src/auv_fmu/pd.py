@@ -11,7 +11,7 @@ from auv_fmu.types import Vector3, Vector4
 
 
 class PdGains(NamedTuple):
-    """Parameters of (57) and (58), with the values of section 4.1, as section 4.2 takes them over."""
+    """Parameters of (57) and (58), with the values of section 4.1 (so section 4.2)."""
 
     K1: Vector3 = (10.0, 10.0, 10.0)  #: diagonal of K_1 [kg/s]
     lambda_: float = 1.0  #: Lambda = lambda I [1/s]

@@ -11,7 +11,12 @@ from auv_fmu import output_feedback
 from auv_fmu.adaptation import bound, regressor, robust_force, theta_hat_rate
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import jacobian
-from auv_fmu.observer import initial_dy_o, observer_acceleration, velocity_estimate
+from auv_fmu.observer import (
+    initial_dy_hat_o,
+    observer_acceleration,
+    observer_velocity,
+    velocity_estimate,
+)
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement
 from auv_fmu.saturation import SATURATIONS, algebraic, hyperbolic_tangent
 from straight_line import closed_loop
@@ -56,7 +61,7 @@ def test_law_is_48_to_51_in_matrices(
         jacobian(rotation_from_euler(0.0 if printed_jacobian else phi, theta, psi), g.ell)
     )
     tau = J.T @ (
-        -K_1 @ s(dy_o - dy_r)
+        -K_1 @ s(dy_hat - Lambda @ s(z) - dy_r)
         - K_2 @ s(e - z)
         - K_2 @ s(z)
         - rho * np.tanh(0.2785 * rho * r / eps_t)
@@ -67,7 +72,7 @@ def test_law_is_48_to_51_in_matrices(
     np.testing.assert_allclose(signals.dy_hat, dy_hat, **exact)
     np.testing.assert_allclose(signals.e, e, **exact)
     np.testing.assert_allclose(signals.z, z, **exact)
-    np.testing.assert_allclose(signals.ddy_o, ddy_r + k_d * Lambda @ s(z), **exact)
+    np.testing.assert_allclose(signals.ddy_hat_o, ddy_r + k_d * Lambda @ s(z), **exact)
     np.testing.assert_allclose(signals.dtheta_hat, dtheta_hat, **exact)
 
 
@@ -87,8 +92,30 @@ def test_observer_finds_a_constant_velocity():
 @given(s_z=speeds, z=speeds, lambda_=speeds, k_d=st.floats(0, 100))
 def test_first_velocity_estimate_is_zero(s_z, z, lambda_, k_d):
     """The initial condition below (24) makes d y_hat/dt(0) = 0."""
-    dy_o = initial_dy_o(s_z, z, lambda_, k_d)
+    dy_o = initial_dy_hat_o(s_z, z, lambda_, k_d)
     assert velocity_estimate(dy_o, s_z, z, lambda_, k_d) == pytest.approx(0.0, abs=1e-12)
+
+
+@given(y=speeds, y_hat=speeds, dy=speeds, dy_hat_o=speeds, ddy_r=speeds)
+def test_observer_is_the_one_of_the_proof(y, y_hat, dy, dy_hat_o, ddy_r):
+    """(18), (23) and (24) "are equivalent to" d/dt (r_1 - r_2) = k_d r_2, above (28).
+
+    r_1 - r_2 = dy_o - dy_r. Its rate is a central difference along y, y_hat and dy_hat_o as they
+    move; only with dy_o of (18), not with the state dy_hat_o in its place, is it k_d r_2.
+    """
+    lambda_, k_d, h = 0.7, 50.0, 1e-6
+    s = hyperbolic_tangent
+    dy_hat = velocity_estimate(dy_hat_o, s(y - y_hat)[0], y - y_hat, lambda_, k_d)
+    ddy_hat_o = observer_acceleration(ddy_r, s(y - y_hat)[0], lambda_, k_d)
+
+    def dy_o(t):
+        z = y + t * dy - (y_hat + t * dy_hat)
+        moved = velocity_estimate(dy_hat_o + t * ddy_hat_o, s(z)[0], z, lambda_, k_d)
+        return observer_velocity(moved, s(z)[0], lambda_)
+
+    rate = (dy_o(h) - dy_o(-h)) / (2 * h) - ddy_r
+    r_2 = dy - observer_velocity(dy_hat, s(y - y_hat)[0], lambda_)
+    assert rate == pytest.approx(k_d * r_2, rel=1e-6, abs=1e-4)
 
 
 def test_observer_acceleration_is_equation_51():
