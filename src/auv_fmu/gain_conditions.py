@@ -1,0 +1,100 @@
+"""The gain conditions of Theorem 1, (30) to (32), and of Theorem 2, (52) to (54).
+
+The zetas of (26) and (29) bound what the paper leaves unknown. Every condition is therefore
+stated without them: the left side, the known part of the right side, and the room that is left
+for the zetas. A condition with no room is violated whatever they are.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from auv_fmu.types import Vector3
+from auv_fmu.vehicle import Vehicle
+
+
+class Bounds(NamedTuple):
+    """Extreme eigenvalues of M_2 and D_2 over all attitudes (P2.1 and P2.6).
+
+    M_2 = R P^-T M_1 P^-1 R' with J = R P, and P has one entry 1 and two of size ell: the
+    eigenvalues are those of M_1 over 1 and ell^2, at every attitude. D_2 is alike.
+    """
+
+    lambda_m2: float  #: smallest eigenvalue of M_2 [kg]
+    lambda_M2: float  #: largest eigenvalue of M_2 [kg]
+    lambda_d2: float  #: smallest eigenvalue of D_2 [kg/s]
+    lambda_D2: float  #: largest eigenvalue of D_2 [kg/s]
+
+
+class Condition(NamedTuple):
+    """One inequality left > right + (unknown zetas)."""
+
+    number: str  #: of the equation
+    statement: str  #: as the paper writes it
+    left: float
+    right: float  #: without the zetas
+    zetas: str  #: what is left out on the right; empty: nothing
+
+    @property
+    def margin(self) -> float:
+        """What is left for the zetas; the condition is violated for certain if not positive."""
+        return self.left - self.right
+
+    @property
+    def verdict(self) -> str:
+        """What can be said without the zetas."""
+        if self.margin <= 0.0:
+            return "violated"
+        return f"holds if {self.zetas} < {self.margin:.4g}" if self.zetas else "holds"
+
+
+def bounds(vehicle: Vehicle, ell: float) -> Bounds:
+    """Extreme eigenvalues of M_2 and D_2.
+
+    Args:
+        vehicle: parameters.
+        ell: distance of the control point [m].
+
+    """
+    inertia = (vehicle.m11, vehicle.m55 / ell**2, vehicle.m66 / ell**2)
+    damping = (vehicle.d11, vehicle.d55 / ell**2, vehicle.d66 / ell**2)
+    return Bounds(min(inertia), max(inertia), min(damping), max(damping))
+
+
+def conditions(
+    known: Bounds, K1: Vector3, K2: Vector3, lambda_: float, k_d: float, maximum_slope: float
+) -> tuple[Condition, Condition, Condition]:
+    """(52) to (54), which for tanh, with s'_MM = 1, are (30) to (32).
+
+    Args:
+        known: eigenvalues of M_2 and D_2.
+        K1, K2: diagonals of K_1 and K_2 [N].
+        lambda_: diagonal entry of Lambda [m/s].
+        k_d: gain of the observer [1/s].
+        maximum_slope: s'_MM of the saturation function.
+
+    """
+    k_1, k_2 = max(K1), max(K2)
+    return (
+        Condition(
+            "(30), (52)",
+            "lambda_min(K_2 Lambda) > 0.5 k_2max lambda + k_2max",
+            min(K2) * lambda_,
+            0.5 * k_2 * lambda_ + k_2,
+            "",
+        ),
+        Condition(
+            "(31), (53)",
+            "lambda_d2 > s'_MM k_1max + 0.5 k_2max + 0.5 (zeta_1 + zeta_2)",
+            known.lambda_d2,
+            maximum_slope * k_1 + 0.5 * k_2,
+            "0.5 (zeta_1 + zeta_2)",
+        ),
+        Condition(
+            "(32), (54)",
+            "k_d > (2 s'_MM k_1max + k_2max + 0.5 (zeta_3 + zeta_4)) / lambda_m2",
+            k_d,
+            (2.0 * maximum_slope * k_1 + k_2) / known.lambda_m2,
+            "0.5 (zeta_3 + zeta_4) / lambda_m2",
+        ),
+    )
