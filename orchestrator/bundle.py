@@ -18,8 +18,8 @@ from orchestrator.system import Component, Connection, PortName, System, port_na
 #: Where the bundle is built unless another folder is named.
 DEFAULT_FOLDER = Path("fmus", "dist")
 
-#: The archive of the closed loop.
-ARCHIVE = "auv.ssp"
+#: The archive of the closed loop, and what the FMUs beside it were built from.
+ARCHIVE, MANIFEST = "auv.ssp", "build.json"
 
 _WIRING = Path(__file__).parent / "closed_loop.toml"
 

@@ -1,4 +1,4 @@
-"""The command line: `auv-fmu build | list | run | gains`."""
+"""The command line: `auv-fmu build | list | run | gains | report`."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from orchestrator import bundle, gains
 from orchestrator.errors import InputError
 from orchestrator.experiment import Request, make_writable, perform, write
 from orchestrator.master import ORDERS
+from orchestrator.report import write_report
 from orchestrator.scenario import names, read_scenario
 from orchestrator.system import PortName, port_name
 
@@ -65,6 +66,10 @@ def _parser() -> argparse.ArgumentParser:
     check = commands.add_parser("gains", help="check the conditions of Theorems 1 and 2")
     _add_set(check)
     check.set_defaults(action=_gains)
+
+    report = commands.add_parser("report", help="run all scenarios and compare with the paper")
+    report.add_argument("--out", type=Path, default=Path("results", "report"), metavar="DIR")
+    report.set_defaults(action=_report)
     return parser
 
 
@@ -140,6 +145,13 @@ def _print_summary(values: Mapping[str, Any]) -> None:
 
 def _gains(options: argparse.Namespace) -> int:
     print(gains.check(_assignments(options)))
+    return OK
+
+
+def _report(options: argparse.Namespace) -> int:
+    make_writable(options.out)
+    for path in write_report(options.out):
+        print(path)
     return OK
 
 

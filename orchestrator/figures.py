@@ -101,16 +101,15 @@ def _tracking(title: str, runs: Sequence[Drawn]) -> dict[str, Figure]:
         figure.add_subplot(2, 2, 4),
     )
     draw_path(path, [Drawn("control point $y$", result)])
-    path.set_title("(a) control point and reference")
     draw_lines(errors, result.time, tracking_error(result), [f"$e_{k}$" for k in AXES])
-    errors.set(title="(b) tracking errors", ylabel="error [m]")
+    errors.set(title="tracking errors", ylabel="error [m]")
     _draw_controls(controls, result)
-    controls.set_title("(c) commanded control signals")
+    controls.set_title("commanded control signals")
     theta_hat = result.group(*(f"controller.theta_hat[{i}]" for i in range(1, 5)))
     units = ("N", "kg/s", "kg/m", "kg")
     labels = [rf"$\hat{{\theta}}_{i}$ [{unit}]" for i, unit in enumerate(units, start=1)]
     draw_lines(estimates, result.time, theta_hat, labels)
-    estimates.set(title="(d) estimated parameters", ylabel="estimate, units in the legend")
+    estimates.set(title="estimated parameters", ylabel="estimate, units in the legend")
     figures = {"": figure}
     if "controller.dy_hat.x" in result:
         figures["-velocity"] = _velocity(title, result)
@@ -123,7 +122,7 @@ def draw_path(axes: Any, runs: Sequence[Drawn]) -> None:
     if "planner.y_d.x" in reference:
         y_d = reference.group(*(f"planner.y_d.{k}" for k in AXES))
         axes.plot(*y_d.T, color=_REFERENCE, linestyle="--", label="reference $y_d$")
-        axes.scatter(*y_d[0], color=_REFERENCE, marker="s", label="start of the reference")
+        axes.scatter(*y_d[0], color=_REFERENCE, marker="s", label="its start")
     for run, colour, style in zip(runs, COLOURS, ("-", "-."), strict=False):
         y = true_control_point(run.result)
         axes.plot(*y.T, color=colour, linestyle=style, label=run.label)
@@ -131,7 +130,9 @@ def draw_path(axes: Any, runs: Sequence[Drawn]) -> None:
     axes.set(xlabel="x north [m]", ylabel="y east [m]", zlabel="z down [m]")
     axes.invert_zaxis()
     axes.invert_yaxis()
-    axes.legend(loc="upper left", bbox_to_anchor=(-0.45, 1.0), fontsize="small")
+    for name in "xyz":
+        axes.locator_params(axis=name, nbins=5)
+    axes.legend(loc="lower left", bbox_to_anchor=(-0.15, 0.95), ncols=2, fontsize="small")
 
 
 def draw_lines(
@@ -278,7 +279,7 @@ def _comparison(title: str, runs: Sequence[Drawn]) -> dict[str, Figure]:
     """The panels of Fig. 5: paths, errors in both scales, control signals."""
     figure = Figure(figsize=(17, 8))
     figure.suptitle(title)
-    grid = figure.add_gridspec(3, 4, width_ratios=(1.4, 1, 1, 1))
+    grid = figure.add_gridspec(3, 4, width_ratios=(1.3, 1, 1, 1))
     path = figure.add_subplot(grid[:, 0], projection="3d")
     draw_path(path, runs)
     linear, logarithmic, controls = (

@@ -9,8 +9,7 @@ from auv_fmu.gain_conditions import Bounds, Condition, bounds, conditions
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from orchestrator import bundle
 from orchestrator.errors import InputError
-from orchestrator.instance import typed
-from orchestrator.system import PortName, System
+from orchestrator.system import PortName, System, typed
 from orchestrator.vehicle_parameters import vehicle
 
 #: What the paper says of these conditions, in Remark 4, and what they leave open.

@@ -29,7 +29,7 @@ from fmpy.logging import addLoggerProxy
 from fmpy.model_description import ModelVariable
 
 from orchestrator.errors import InputError
-from orchestrator.system import Component
+from orchestrator.system import Component, typed
 
 #: Kinds of values that can be connected and recorded.
 KINDS = ("Real", "Integer", "Boolean")
@@ -174,24 +174,6 @@ class Block:
 
 def _fmi_type(variable: ModelVariable) -> str:
     return "Integer" if variable.type == "Enumeration" else str(variable.type)
-
-
-def typed(name: str, variable: ModelVariable, value: Any) -> Any:
-    """A value, or its text from a command line or file, in the variable's type.
-
-    Raises:
-        InputError: it is not of that type.
-
-    """
-    text = str(value).strip()
-    try:
-        if variable.type == "Real":
-            return float(text)
-        if variable.type == "Boolean":
-            return {"true": True, "1": True, "false": False, "0": False}[text.lower()]
-        return text if variable.type == "String" else int(text)
-    except (KeyError, ValueError):
-        raise InputError(f"{name} = {text}: not a {variable.type}") from None
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.system import PortName
+from orchestrator.system import PortName, System, port_name, typed
 
 
 @dataclass
@@ -79,3 +80,29 @@ class Result:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(("time", *self.columns))
             writer.writerows(self.rows[: self.computed].tolist())
+
+
+def read_result(folder: Path, system: System) -> Result:
+    """The result that a run of a system has left in a folder.
+
+    Raises:
+        OSError: a file is missing.
+
+    """
+    values = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    with (folder / "result.csv").open(encoding="utf-8") as file:
+        _, *columns = file.readline().strip().split(",")
+        table = np.loadtxt(file, delimiter=",", ndmin=2)
+    parameters = {
+        PortName(component.name, name): typed(name, variable, variable.start)
+        for component in system.components.values()
+        for name, variable in component.variables.items()
+        if variable.causality == "parameter"
+    }
+    parameters |= {port_name(name): value for name, value in values["parameters"].items()}
+    result = Result(
+        tuple(columns), table[:, 0], values["order"], values["step"], parameters,
+        failure=values.get("failure"), computed=len(table),
+    )  # fmt: skip
+    result.rows[:] = table
+    return result

@@ -175,3 +175,21 @@ def read_component(name: str, fmu: Path) -> Component:
     if description.fmiVersion != "2.0" or description.coSimulation is None:
         raise InputError(f"{fmu}: not an FMI 2.0 co-simulation FMU")
     return Component(name, fmu, description)
+
+
+def typed(name: str, variable: ModelVariable, value: Any) -> Any:
+    """A value, or its text from a command line or file, in the variable's type.
+
+    Raises:
+        InputError: it is not of that type.
+
+    """
+    text = str(value).strip()
+    try:
+        if variable.type == "Real":
+            return float(text)
+        if variable.type == "Boolean":
+            return {"true": True, "1": True, "false": False, "0": False}[text.lower()]
+        return text if variable.type == "String" else int(text)
+    except (KeyError, ValueError):
+        raise InputError(f"{name} = {text}: not a {variable.type}") from None

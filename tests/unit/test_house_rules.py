@@ -33,7 +33,10 @@ def imports(package) -> Iterator[tuple[Path, str]]:
     [
         (auv_fmu, {"auv_fmu"}),
         (fmus, {"auv_fmu", "fmus", "pythonfmu"}),
-        (orchestrator, {"auv_fmu", "orchestrator", "fmpy", "matplotlib", "numpy", "tqdm"}),
+        (
+            orchestrator,
+            {"auv_fmu", "orchestrator", "fmpy", "markdown_it", "matplotlib", "numpy", "tqdm"},
+        ),
     ],
 )
 def test_imports_run_one_way(package, allowed):
