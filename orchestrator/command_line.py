@@ -1,4 +1,4 @@
-"""The command line: `auv-fmu build | list | run | gains | report`."""
+"""The command line: `auv-fmu build | list | run | gains | report | animate`."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator import bundle, gains
+from orchestrator.animation import animate
 from orchestrator.errors import InputError
 from orchestrator.experiment import Request, make_writable, perform, write
+from orchestrator.figures import is_drawable
 from orchestrator.master import ORDERS
 from orchestrator.report import write_report
 from orchestrator.scenario import names, read_scenario
@@ -70,6 +72,15 @@ def _parser() -> argparse.ArgumentParser:
     report = commands.add_parser("report", help="run all scenarios and compare with the paper")
     report.add_argument("--out", type=Path, default=Path("results", "report"), metavar="DIR")
     report.set_defaults(action=_report)
+
+    film = commands.add_parser("animate", help="write a film of a scenario")
+    film.add_argument("scenario", metavar="SCENARIO|FILE.toml|FILE.ssp")
+    film.add_argument("--stop-time", type=float, metavar="S", help="end of the run [s]")
+    _add_set(film)
+    film.add_argument(
+        "--out", type=Path, metavar="FILE", help="a .gif or .mp4; default: results/SCENARIO.gif"
+    )
+    film.set_defaults(action=_animate)
     return parser
 
 
@@ -152,6 +163,19 @@ def _report(options: argparse.Namespace) -> int:
     make_writable(options.out)
     for path in write_report(options.out):
         print(path)
+    return OK
+
+
+def _animate(options: argparse.Namespace) -> int:
+    path = options.out or Path("results", f"{Path(options.scenario).stem}.gif")
+    make_writable(path.parent)
+    request = Request(options.stop_time, parameters=_assignments(options), progress=True)
+    [run] = perform(options.scenario, request, companions=False)
+    if not is_drawable("open-loop", run.result):
+        raise InputError(f"{options.scenario}: has no vehicle to show")
+    label = f", {run.scenario.label}" if run.scenario.label else ""
+    animate(f"{run.scenario.name}{label}", run.result, path)
+    print(path)
     return OK
 
 

@@ -53,12 +53,13 @@ class Run:
     result: Result
 
 
-def perform(name: str, request: Request) -> list[Run]:
+def perform(name: str, request: Request, companions: bool = True) -> list[Run]:
     """Run a scenario, and the one it is compared with, or an SSP.
 
     Args:
         name: of a scenario of the bundle, or path of a .toml or .ssp file.
         request: the user's changes.
+        companions: whether to run what it is compared with.
 
     Raises:
         InputError: something about the request cannot be done; nothing has run.
@@ -74,7 +75,7 @@ def perform(name: str, request: Request) -> list[Run]:
         raise InputError(f"{name}: no figure {scenario.figure!r}; use one of {', '.join(FIGURES)}")
     bundle.build(bundle.DEFAULT_FOLDER)
     runs = [_run(scenario, bundle.closed_loop(bundle.DEFAULT_FOLDER, scenario), request)]
-    if scenario.compare and runs[0].result.failure is None:
+    if companions and scenario.compare and runs[0].result.failure is None:
         other = read_scenario(scenario.compare)
         system = bundle.closed_loop(bundle.DEFAULT_FOLDER, other)
         # What the user changed goes for both, as far as both have it.

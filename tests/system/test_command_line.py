@@ -54,7 +54,7 @@ def test_run_writes_table_metrics_and_figures(workplace, capsys):
     assert main(["run", "fig4", "--stop-time", "2", "--set", "plant.noise.std=0"]) == 0
     folder = workplace / "results" / "fig4"
     figures = {f"{stem}.{end}" for stem in ("fig4", "fig4-velocity") for end in ("png", "svg")}
-    assert files(folder) == {"result.csv", "metrics.json"} | figures
+    assert files(folder) == {"result.csv", "metrics.json", "certificates.csv"} | figures
     table = read_csv(folder / "result.csv")
     assert table.dtype.names[0] == "time"
     assert len(table) == 101
@@ -87,6 +87,54 @@ def test_own_scenario_file_and_ssp_run_the_same_way(workplace):
     assert (workplace / "from_ssp" / "result.csv").is_file()
 
 
+def test_comparison_runs_both_and_changes_both_where_both_have_it(workplace):
+    arguments = ["run", "fig5", "--stop-time", "1", "--set", "plant.m11=26", "--set",
+                 "controller.k_d=40"]  # fmt: skip
+    assert main(arguments) == 0
+    folder = workplace / "results" / "fig5"
+    assert {"fig5.png", "fig5.svg", "certificates.csv", "fig5-pd"} <= files(folder)
+    proposed = json.loads((folder / "metrics.json").read_text())
+    pd = json.loads((folder / "fig5-pd" / "metrics.json").read_text())
+    assert proposed["parameters"]["controller.k_d"] == 40.0
+    assert proposed["parameters"]["plant.m11"] == pd["parameters"]["plant.m11"] == 26.0
+    assert proposed["velocities_reaching_controller"] == []
+    assert pd["velocities_reaching_controller"] == ["plant.dy.x", "plant.dy.y", "plant.dy.z"]
+
+
+def test_own_component_takes_the_place_of_another(workplace):
+    shutil.copy("fmus/dist/PdController.fmu", "mine.fmu")
+    (workplace / "mine.toml").write_text(
+        'stop_time = 0.2\n[components]\ncontroller = "mine.fmu"\n'
+        '[wires]\n"controller.dy" = "plant.dy"\n'
+    )
+    assert main(["run", "mine.toml"]) == 0
+    header = (workplace / "results/mine/result.csv").read_text().splitlines()[0]
+    assert "controller.dy.x" in header
+    assert "controller.y_hat.x" not in header
+
+
+@pytest.mark.parametrize("name", ["fig3a", "fig3b", "fig6"])
+def test_figures_of_other_kinds_are_drawn(workplace, name):
+    assert main(["run", name, "--stop-time", "1"]) == 0
+    assert {f"{name}.png", f"{name}.svg"} <= files(workplace / "results" / name)
+
+
+def test_gains_prints_both_sides_and_the_verdicts(workplace, capsys):
+    assert main(["gains"]) == 0
+    shown = capsys.readouterr().out
+    assert "10 > 15: violated" in shown
+    assert "the paper's own gains, and they miss (30)" in shown
+    assert main(["gains", "--set", "controller.lambda=3"]) == 0
+    shown = capsys.readouterr().out
+    assert "30 > 25: holds" in shown
+    assert "paper's own gains" not in shown
+
+
+def test_animation_is_written(workplace):
+    assert main(["animate", "fig4", "--stop-time", "1", "--out", "films/fig4.gif"]) == 0
+    assert (workplace / "films/fig4.gif").read_bytes().startswith(b"GIF89a")
+
+
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
@@ -105,6 +153,11 @@ def test_own_scenario_file_and_ssp_run_the_same_way(workplace):
         (["run", "broken.ssp"], "cannot be opened"),
         (["run", "fig4", "--out", "file/below"], "--out"),
         (["build", "--out", "file/below"], "cannot build"),
+        (["run", "wire.toml"], "controller has no inputs dy.*"),
+        (["run", "missing.toml"], "no such FMU"),
+        (["gains", "--set", "controller.lambda=much"], "not a Real"),
+        (["gains", "--set", "controller.saturation=sigmoid"], "use one of tanh, algebraic"),
+        (["animate", "fig4", "--stop-time", "0.1", "--out", "film.avi"], "write a .gif"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(workplace, capsys, arguments, reason):
@@ -114,6 +167,8 @@ def test_bad_input_is_one_line_and_status_2(workplace, capsys, arguments, reason
     (workplace / "figure.toml").write_text("figure = 'none'")
     (workplace / "broken.ssp").write_bytes(b"no archive")
     (workplace / "file").write_text("in the way")
+    (workplace / "wire.toml").write_text('[wires]\n"controller.dy" = "plant.dy"')
+    (workplace / "missing.toml").write_text('[components]\ncontroller = "missing.fmu"')
     assert main(arguments) == 2
     error = capsys.readouterr().err
     assert reason in error

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_fmu.adaptation import NU
+from auv_fmu.saturation import INTEGRALS as OURS
 from auv_fmu.saturation import MAXIMUM_SLOPE, SATURATIONS
 from strategies import vectors
 
@@ -52,6 +53,17 @@ def test_lemma_1_i_and_ii(name, xi, k):
     assert integral <= k * slope * xi**2 / 2 + slack
     assert integral > 0.0 or abs(k * xi) < 1e-7
     assert integral >= abs(xi) - 1.0 / k - slack
+
+
+@both
+@given(xi=st.floats(-20.0, 20.0))
+def test_integral_is_the_area_under_the_function(name, xi):
+    """Simpson's rule on 2000 intervals."""
+    nodes = np.linspace(0.0, xi, 2001)
+    weights = np.ones(2001)
+    weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
+    area = weights @ [SATURATIONS[name](node)[0] for node in nodes] * xi / 2000 / 3
+    assert OURS[name](xi) == pytest.approx(area, abs=1e-8)
 
 
 @given(xi=st.floats(-20.0, 20.0))

@@ -1,0 +1,236 @@
+"""Every figure of the paper as a scenario, with the bounds its claims put on our numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator import bundle
+from orchestrator.certificates import COLUMNS, certificates, velocities_reaching
+from orchestrator.master import simulate
+from orchestrator.metrics import effort, final_error, tracking_error
+from orchestrator.published import (
+    EFFORT_PD,
+    EFFORT_PROPOSED,
+    TURNING_RADIUS,
+    total_variation_until,
+    turning_radius,
+)
+from orchestrator.result import Result
+from orchestrator.scenario import names, read_scenario
+from orchestrator.system import PortName, System
+
+Runner = Callable[..., Result]
+
+
+@pytest.fixture(scope="module")
+def run(dist: Path) -> Runner:
+    """Run a scenario once, with changes given as `component__parameter=value`."""
+
+    @cache
+    def runner(name: str, order: str = "gauss-seidel", **changes: float) -> Result:
+        scenario = read_scenario(name)
+        system = bundle.closed_loop(dist, scenario).with_parameters(
+            {
+                PortName(component, name.replace("__", ".")): value
+                for component, name, value in (
+                    (*key.split("__", 1), value) for key, value in changes.items()
+                )
+            }
+        )
+        assert scenario.stop_time is not None
+        result = simulate(system, scenario.stop_time, 0.02, order)
+        assert result.failure is None
+        return result
+
+    return runner
+
+
+def system_of(name: str, dist: Path) -> System:
+    return bundle.closed_loop(dist, read_scenario(name))
+
+
+def variation(result: Result) -> float:
+    return sum(effort(result)["total_variation"])
+
+
+def test_all_figures_are_there():
+    assert names() == sorted(
+        ["fig3a", "fig3b", "fig4", "fig5", "fig5-pd", "fig6", "fig6-pd", "fig7a", "fig7b", "fig7c"]
+    )
+
+
+def test_fig3a_follows_the_analytic_solution(run: Runner):
+    """u(t) = 1/3 (1 - exp(-t d11 / m11)) to the accuracy of Euler's scheme."""
+    result = run("fig3a")
+    expected = (1 - np.exp(-result.time * 30 / 25)) / 3
+    np.testing.assert_allclose(result["plant.nu.u"], expected, atol=2e-3)
+    assert not result.group(*(f"plant.nu.{k}" for k in "vwpqr")).any()
+
+
+def test_fig3b_settles_on_a_helix(run: Runner):
+    """Constant velocities and pitch, and a constant radius of the path from above."""
+    result = run("fig3b")
+    end = result.group(*(f"plant.nu.{k}" for k in "uvwpqr"))[-500:]
+    assert np.ptp(end, axis=0).max() < 1e-4
+    assert np.ptp(result["plant.eta.theta"][-500:]) < 1e-4
+    x, y = result["plant.eta.x"][-2000:], result["plant.eta.y"][-2000:]
+    A = np.column_stack([2 * x, 2 * y, np.ones_like(x)])
+    (a, b, _), *_ = np.linalg.lstsq(A, x**2 + y**2)
+    radius = np.hypot(x - a, y - b)
+    assert np.ptp(radius) < 0.01 * radius.mean()
+
+
+def test_smallest_turning_radius_is_that_of_the_printed_equations(dist: Path):
+    """(2) at rest under 80 N and 80 N.m, solved by Newton's method: not the quoted 0.6 m."""
+    m11, m22, d11, d22, d66 = 25.0, 17.5, 30.0, 30.0, 20.0
+    u, v, r = 1.0, -0.5, 3.0
+    for _ in range(50):
+        f = np.array(
+            [m22 * v * r - d11 * u + 80, -m11 * u * r - d22 * v,
+             (m11 - m22) * u * v - d66 * r + 80]
+        )  # fmt: skip
+        jacobian = np.array(
+            [[-d11, m22 * r, m22 * v], [-m11 * r, -d22, -m11 * u],
+             [(m11 - m22) * v, (m11 - m22) * u, -d66]]
+        )  # fmt: skip
+        u, v, r = np.array([u, v, r]) - np.linalg.solve(jacobian, f)
+    torques = {"u": 80.0, "q": 0.0, "r": 80.0}
+    system = system_of("fig3b", dist).with_parameters(
+        {PortName("plant", f"tau.{k}"): value for k, value in torques.items()}
+    )
+    radius = turning_radius(simulate(system, 60.0, 0.02))
+    assert radius == pytest.approx(np.hypot(u, v) / r, rel=1e-6)
+    assert radius < 0.5 * TURNING_RADIUS
+
+
+def test_fig4_does_not_saturate(run: Runner):
+    assert not any(effort(run("fig4"))["saturated_fraction"])
+    assert not any(effort(run("fig4", plant__noise__std=0.0))["saturated_fraction"])
+
+
+@pytest.mark.parametrize("eps_t", [10.0, 1.0])
+def test_fig5_proposed_does_not_saturate(run: Runner, eps_t: float):
+    assert not any(effort(run("fig5", controller__eps_t=eps_t))["saturated_fraction"])
+
+
+def test_fig5_pd_saturates_chatters_and_ends_more_accurate(run: Runner):
+    proposed, pd = run("fig5"), run("fig5-pd")
+    assert all(effort(pd)["saturated_fraction"])
+    assert variation(pd) >= 3.0 * variation(proposed)
+    assert (final_error(proposed) >= 5.0 * final_error(pd)).all()
+
+
+@pytest.mark.parametrize(("name", "published"), [("fig5", EFFORT_PROPOSED), ("fig5-pd", EFFORT_PD)])
+def test_published_efforts_are_met_within_a_factor_of_2(run: Runner, name, published):
+    ratio = np.divide(effort(run(name))["l2_effort"], published)
+    assert (ratio > 0.5).all()
+    assert (ratio < 2.0).all()
+
+
+def test_fig6_pd_chatters_severely(run: Runner):
+    pd, proposed = (total_variation_until(run(name), 60.0) for name in ("fig6-pd", "fig6"))
+    assert pd >= 300.0 * proposed
+
+
+def test_fig5_passes_the_vertical_without_a_jump(run: Runner):
+    """Pitch beyond 89 degrees; every output but the Euler angles moves no faster than it can.
+
+    At less than 1 m/s a position moves less than 2 cm in a step; at most 43 N on 17.5 kg change a
+    velocity by less than 5 cm/s in a step.
+    """
+    result = run("fig5")
+    assert np.abs(result["plant.eta.theta"]).max() > np.deg2rad(89)
+    assert np.abs(np.diff(result["plant.eta.phi"])).max() > 3.0, "the Euler angles do jump"
+    for group, bound in (("eta", 0.02), ("y", 0.02), ("dy", 0.05)):
+        for k in "xyz":
+            assert np.abs(np.diff(result[f"plant.{group}.{k}"])).max() < bound
+    for k in "uvwpqr":
+        assert np.abs(np.diff(result[f"plant.nu.{k}"])).max() < 0.05
+
+
+def test_fig7_needs_more_effort_under_more_disturbance(run: Runner):
+    efforts = [np.array(effort(run(f"fig7{letter}"))["l2_effort"]) for letter in "abc"]
+    assert (efforts[0] < efforts[1]).all()
+    assert (efforts[1] < efforts[2]).all()
+
+
+@pytest.mark.parametrize(("letter", "bound"), [("a", 0.2), ("b", 0.4)])
+def test_fig7_errors_stay_small(run: Runner, letter: str, bound: float):
+    """e_f below 0.2 m. When the waves turn, at 72 s, (b) is off by 0.35 m for a moment."""
+    result = run(f"fig7{letter}")
+    assert (final_error(result) < 0.2).all()
+    assert np.abs(tracking_error(result)[result.time > 40.0]).max() < bound
+
+
+def test_jacobi_order_makes_pd_chatter_and_leaves_the_proposed_controller_alone(run: Runner):
+    assert variation(run("fig5", order="jacobi")) < 1.2 * variation(run("fig5"))
+    assert variation(run("fig5-pd", order="jacobi")) > 10.0 * variation(run("fig5-pd"))
+
+
+def test_jacobian_as_printed_saturates_where_the_full_attitude_does_not(run: Runner):
+    printed = effort(run("fig5", controller__printed_jacobian=True))
+    assert any(printed["saturated_fraction"])
+    assert sum(printed["total_variation"]) > 3.0 * variation(run("fig5"))
+
+
+def test_noise_of_1_cm_saturates_and_1_mm_does_not(run: Runner):
+    assert min(effort(run("fig4", plant__noise__std=0.01))["peak_command"]) > 160.0
+    assert max(effort(run("fig4"))["peak_command"]) < 80.0
+
+
+@pytest.mark.parametrize("name", ["fig4", "fig5", "fig6", "fig7a", "fig7b", "fig7c"])
+def test_no_velocity_reaches_the_output_feedback_controller(dist: Path, name: str):
+    assert velocities_reaching(system_of(name, dist)) == []
+
+
+@pytest.mark.parametrize("name", ["fig5-pd", "fig6-pd"])
+def test_velocities_reach_the_pd_controller(dist: Path, name: str):
+    assert velocities_reaching(system_of(name, dist)) == [f"plant.dy.{k}" for k in "xyz"]
+
+
+def test_certificates_agree_with_the_matrix_form_of_34(run: Runner):
+    """V from logarithms of cosh and M_2 = J^-T M_1 J^-1, at some instants of Fig. 4."""
+    result = run("fig4", plant__noise__std=0.0)
+    table = certificates(result)
+    column = dict(zip(COLUMNS, table.T, strict=True))
+    M_1, ell = np.diag([25.0, 22.5, 15.0]), 0.35
+    for k in range(1, 5000, 700):
+        phi, theta, psi = (result[f"plant.eta.{a}"][k - 1] for a in ("phi", "theta", "psi"))
+        c, s = np.cos, np.sin
+        R = (
+            np.array([[c(psi), -s(psi), 0], [s(psi), c(psi), 0], [0, 0, 1]])
+            @ np.array([[c(theta), 0, s(theta)], [0, 1, 0], [-s(theta), 0, c(theta)]])
+            @ np.array([[1, 0, 0], [0, c(phi), -s(phi)], [0, s(phi), c(phi)]])
+        )
+        J_inverse = np.linalg.inv(np.column_stack([R[:, 0], -ell * R[:, 2], ell * R[:, 1]]))
+        M_2 = J_inverse.T @ M_1 @ J_inverse
+        e, z, dy_hat, y_d, dy_d = (
+            result.group(*(f"controller.{group}.{a}" for a in "xyz"))[k]
+            for group in ("e", "z", "dy_hat", "y_d", "dy_d")
+        )
+        dy = result.group(*(f"plant.dy.{a}" for a in "xyz"))[k - 1]
+        r_1 = dy - dy_d + np.tanh(e - z)
+        r_2 = dy - dy_hat + np.tanh(z)
+        V = 10 * np.log(np.cosh(e - z)).sum() + 10 * np.log(np.cosh(z)).sum()
+        V += 0.5 * r_1 @ M_2 @ r_1 + 0.5 * r_2 @ M_2 @ r_2
+        row = k - 1
+        assert column["time"][row] == result.time[k - 1]
+        assert column["V_without_theta"][row] == pytest.approx(V, rel=1e-9)
+        np.testing.assert_allclose([column[f"r_1.{a}"][row] for a in "xyz"], r_1, atol=1e-12)
+        np.testing.assert_allclose([column[f"r_2.{a}"][row] for a in "xyz"], r_2, atol=1e-12)
+        tau = result["plant.tau.u"][k]
+        assert column["saturation_margin.u"][row] == pytest.approx(80 - abs(tau))
+
+
+def test_composite_errors_end_in_a_small_ball(run: Runner):
+    """The theorem's claim, in numbers of ours: |r_1| < 0.2 m/s and |r_2| < 0.02 m/s after 40 s."""
+    column = dict(zip(COLUMNS, certificates(run("fig4", plant__noise__std=0.0)).T, strict=True))
+    settled = column["time"] > 40.0
+    for name, bound in (("r_1", 0.2), ("r_2", 0.02)):
+        norm = np.linalg.norm([column[f"{name}.{a}"] for a in "xyz"], axis=0)
+        assert norm[settled].max() < bound

@@ -1,0 +1,73 @@
+"""docs/equations.md: complete, and true to the code."""
+
+from __future__ import annotations
+
+import ast
+import re
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from fmus.build import components
+
+TESTS = Path(__file__).parents[1]
+PAGE = (TESTS.parent / "docs" / "equations.md").read_text(encoding="utf-8")
+
+
+def table(heading: str) -> list[list[str]]:
+    section = PAGE.split(f"## {heading}\n", 1)[1].split("\n## ", 1)[0]
+    lines = [line for line in section.splitlines() if line.startswith("|")]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
+
+
+def quoted(cell: str) -> list[str]:
+    return re.findall(r"`([^`]+)`", cell)
+
+
+@cache
+def names_in(module: str) -> set[str]:
+    [path] = TESTS.rglob(f"{module}.py")
+    return {node.name for node in ast.parse(path.read_text()).body
+            if isinstance(node, ast.FunctionDef)}  # fmt: skip
+
+
+def test_every_equation_from_1_to_59_is_listed_once():
+    assert [row[0] for row in table("Equations")] == [f"({number})" for number in range(1, 60)]
+
+
+@pytest.mark.parametrize("row", table("Equations"), ids=lambda row: row[0])
+def test_equation_is_where_the_table_says(row):
+    number, _, places, tests = row
+    if places == "proof only":
+        assert not tests
+        return
+    assert quoted(places)
+    for place in quoted(places):
+        module, name = place.rsplit(".", 1)
+        stated = getattr(import_module(module), name)
+        text = f"{import_module(module).__doc__} {stated.__doc__}"
+        assert mentions(text, int(number.strip("()"))), f"{place} does not mention {number}"
+    for test in quoted(tests):
+        module, name = test.split(".")
+        assert name in names_in(module), test
+
+
+def mentions(text: str, number: int) -> bool:
+    """Whether a text names an equation, alone or within a range such as "(4) to (8)"."""
+    if f"({number})" in text:
+        return True
+    ranges = re.findall(r"\((\d+)\) to \((\d+)\)", text)
+    return any(int(first) <= number <= int(last) for first, last in ranges)
+
+
+@pytest.mark.parametrize("row", table("Symbols"), ids=lambda row: row[0])
+def test_symbol_is_the_port_and_unit_that_the_table_says(row):
+    _, code, port, unit = row
+    assert quoted(code)
+    for name in quoted(port):
+        component, variable = name.split(".", 1)
+        module = import_module(components()[component].replace(".slave", ".ports"))
+        [declared] = [p for p in module.PORTS if p.name == variable]
+        assert (declared.unit or "") == unit

@@ -1,0 +1,44 @@
+"""(30) to (32), (52) to (54), and the bounds of P2.1 and P2.6 they stand on."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from auv_fmu.control_point_model import D_2, M_2
+from auv_fmu.gain_conditions import bounds, conditions
+from auv_fmu.vehicle import Vehicle
+from strategies import angles, lengths, pitch_angles
+
+PAPER = ((10.0, 10.0, 10.0), (10.0, 10.0, 10.0), 1.0, 50.0, 1.0)
+
+
+@given(theta=pitch_angles, psi=angles, ell=lengths)
+def test_bounds_are_the_extreme_eigenvalues_at_every_attitude(theta, psi, ell):
+    known = bounds(Vehicle(), ell)
+    inertia = np.linalg.eigvalsh(M_2(Vehicle(), theta, psi, ell))
+    damping = np.linalg.eigvalsh(D_2(Vehicle(), theta, psi, ell))
+    found = [inertia[0], inertia[-1], damping[0], damping[-1]]
+    np.testing.assert_allclose(found, known, rtol=1e-7)
+
+
+def test_the_papers_gains_miss_condition_30_and_may_meet_the_others():
+    first, second, third = conditions(bounds(Vehicle(), 0.35), *PAPER)
+    assert (first.left, first.right, first.verdict) == (10.0, 15.0, "violated")
+    assert (second.left, second.right) == (30.0, 15.0)
+    assert second.verdict == "holds if 0.5 (zeta_1 + zeta_2) < 15"
+    assert (third.left, third.right) == (50.0, pytest.approx(30.0 / 25.0))
+
+
+def test_condition_30_can_be_met_by_a_larger_lambda():
+    """K2 lambda > 0.5 K2 lambda + K2 for equal gains means lambda > 2."""
+    known = bounds(Vehicle(), 0.35)
+    K1, K2, _, k_d, slope = PAPER
+    assert conditions(known, K1, K2, 2.0, k_d, slope)[0].verdict == "violated"
+    assert conditions(known, K1, K2, 2.01, k_d, slope)[0].verdict == "holds"
+
+
+def test_theorem_2_weighs_k1_with_the_largest_slope():
+    known = bounds(Vehicle(), 0.35)
+    _, second, third = conditions(known, *PAPER[:-1], 2.0)
+    assert second.right == 2.0 * 10.0 + 0.5 * 10.0
+    assert third.right == pytest.approx((2.0 * 2.0 * 10.0 + 10.0) / 25.0)

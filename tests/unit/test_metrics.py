@@ -1,0 +1,64 @@
+"""(59) and e_f on signals whose integrals are known."""
+
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+
+from orchestrator.metrics import effort, final_error
+from orchestrator.result import Result
+from orchestrator.system import PortName
+
+
+def result_of(**columns: np.ndarray) -> Result:
+    names = tuple(name.replace("__", ".") for name in columns)
+    n = len(next(iter(columns.values())))
+    parameters = {
+        PortName("plant", f"{limit}.{k}"): value
+        for limit, value in (("tau_min", -2.0), ("tau_max", 2.0))
+        for k in "uqr"
+    }
+    parameters[PortName("plant", "ell")] = 0.35
+    result = Result(names, np.arange(n) * 0.001, "gauss-seidel", 0.001, parameters)
+    for row in np.column_stack(list(columns.values())):
+        result.append(row)
+    return result
+
+
+def test_effort_of_a_known_signal():
+    """3 sin(2 pi t) over 4 s, cut off at +-2: its norm, RMS, variation and share beyond."""
+    t = np.arange(4001) * 0.001
+    command = 3.0 * np.sin(2 * pi * t)
+    applied = np.clip(command, -2.0, 2.0)
+    zeros = np.zeros_like(t)
+    found = effort(
+        result_of(
+            plant__tau__u=command, plant__tau__q=zeros, plant__tau__r=command / 3,
+            plant__tau_applied__u=applied, plant__tau_applied__q=zeros,
+            plant__tau_applied__r=command / 3,
+        )
+    )  # fmt: skip
+    a = np.arcsin(2 / 3)
+    # Mean square of a clipped sine: 2/pi (9 (a/2 - sin(2a)/4) + 4 (pi/2 - a)).
+    mean_square = 2 / pi * (9 * (a / 2 - np.sin(2 * a) / 4) + 4 * (pi / 2 - a))
+    assert found["rms_effort"] == pytest.approx([sqrt(mean_square), 0.0, sqrt(0.5)], rel=1e-3)
+    assert found["l2_effort"] == pytest.approx([2 * sqrt(mean_square), 0.0, sqrt(2)], rel=1e-3)
+    assert found["total_variation"] == pytest.approx([4 * 4 * 2, 0.0, 4 * 4 * 1], rel=1e-2)
+    assert found["peak_command"] == pytest.approx([3.0, 0.0, 1.0], rel=1e-4)
+    share = 1 - 2 * a / pi
+    assert found["saturated_fraction"] == pytest.approx([share, 0.0, 0.0], abs=2e-3)
+
+
+def test_final_error_is_the_largest_of_the_last_5_seconds():
+    """The control point lies ell ahead; an error of 9 m before the window does not count."""
+    t = np.arange(8001) * 0.001
+    zeros, ones = np.zeros_like(t), np.ones_like(t)
+    far = np.where(t < 2.9, 9.0, 0.0)
+    found = final_error(
+        result_of(
+            plant__eta__x=far, plant__eta__y=ones, plant__eta__z=-2 * t, plant__eta__phi=zeros,
+            plant__eta__theta=zeros, plant__eta__psi=zeros, planner__y_d__x=0.35 * ones,
+            planner__y_d__y=zeros, planner__y_d__z=zeros,
+        )
+    )  # fmt: skip
+    assert found == pytest.approx([0.0, 1.0, 16.0])
