@@ -1,4 +1,4 @@
-"""The command line: `auv-fmu build | list | run | gains | report | animate`."""
+"""The command line: `auv-fmu build | list | run | gains | report | animate | export`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,15 @@ from typing import Any
 from orchestrator import bundle, gains
 from orchestrator.animation import animate
 from orchestrator.errors import InputError
-from orchestrator.experiment import Request, make_writable, perform, write
+from orchestrator.experiment import (
+    DEFAULT_STEP,
+    Request,
+    loaded,
+    make_writable,
+    perform,
+    write,
+)
+from orchestrator.export import FORMATS
 from orchestrator.figures import is_drawable
 from orchestrator.master import ORDERS
 from orchestrator.report import write_report
@@ -72,6 +81,14 @@ def _parser() -> argparse.ArgumentParser:
     report = commands.add_parser("report", help="run all scenarios and compare with the paper")
     report.add_argument("--out", type=Path, default=Path("results", "report"), metavar="DIR")
     report.set_defaults(action=_report)
+
+    export = commands.add_parser("export", help="write a scenario for other tools")
+    export.add_argument("scenario", metavar="SCENARIO|FILE.toml|FILE.ssp")
+    export.add_argument("--format", choices=FORMATS, default="ssp")
+    export.add_argument("--step", type=float, metavar="S", help="communication step [s]")
+    _add_set(export)
+    export.add_argument("--out", type=Path, metavar="DIR", help="default: exports/SCENARIO/")
+    export.set_defaults(action=_export)
 
     film = commands.add_parser("animate", help="write a film of a scenario")
     film.add_argument("scenario", metavar="SCENARIO|FILE.toml|FILE.ssp")
@@ -176,6 +193,22 @@ def _animate(options: argparse.Namespace) -> int:
     label = f", {run.scenario.label}" if run.scenario.label else ""
     animate(f"{run.scenario.name}{label}", run.result, path)
     print(path)
+    return OK
+
+
+def _export(options: argparse.Namespace) -> int:
+    folder = options.out or Path("exports", Path(options.scenario).stem)
+    make_writable(folder)
+    with loaded(options.scenario) as (scenario, system):
+        system = replace(
+            system.with_parameters(_assignments(options)),
+            name=scenario.name,
+            stop_time=scenario.stop_time or system.stop_time,
+            step=options.step or scenario.step or system.step or DEFAULT_STEP,
+        )
+        system.check()
+        for path in FORMATS[options.format](system, float(system.step or DEFAULT_STEP), folder):
+            print(path)
     return OK
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -65,27 +66,41 @@ def perform(name: str, request: Request, companions: bool = True) -> list[Run]:
         InputError: something about the request cannot be done; nothing has run.
 
     """
+    with loaded(name) as (scenario, system):
+        runs = [_run(scenario, system, request)]
+    if companions and scenario.compare and runs[0].result.failure is None:
+        with loaded(scenario.compare) as (other, system):
+            # What the user changed goes for both, as far as both have it.
+            shared = {
+                target: value
+                for target, value in request.parameters.items()
+                if target.port in system.component(target.component).variables
+            }
+            runs.append(_run(other, system, replace(request, parameters=shared)))
+    return runs
+
+
+@contextmanager
+def loaded(name: str) -> Iterator[tuple[Scenario, System]]:
+    """A scenario and its system; the FMUs are there as long as the context lasts.
+
+    Args:
+        name: of a scenario of the bundle, or path of a .toml or .ssp file.
+
+    Raises:
+        InputError: there is no such scenario, or its system cannot be put together.
+
+    """
     if name.endswith(".ssp"):
         with TemporaryDirectory(prefix="auvfmu") as folder:
             system = read_ssp(Path(name), Path(folder))
-            scenario = Scenario(Path(name).stem, title=Path(name).name)
-            return [_run(scenario, system, request)]
+            yield Scenario(Path(name).stem, title=Path(name).name), system
+        return
     scenario = read_scenario(name)
     if scenario.figure not in FIGURES:
         raise InputError(f"{name}: no figure {scenario.figure!r}; use one of {', '.join(FIGURES)}")
     bundle.build(bundle.DEFAULT_FOLDER)
-    runs = [_run(scenario, bundle.closed_loop(bundle.DEFAULT_FOLDER, scenario), request)]
-    if companions and scenario.compare and runs[0].result.failure is None:
-        other = read_scenario(scenario.compare)
-        system = bundle.closed_loop(bundle.DEFAULT_FOLDER, other)
-        # What the user changed goes for both, as far as both have it.
-        shared = {
-            target: value
-            for target, value in request.parameters.items()
-            if target.port in system.component(target.component).variables
-        }
-        runs.append(_run(other, system, replace(request, parameters=shared)))
-    return runs
+    yield scenario, bundle.closed_loop(bundle.DEFAULT_FOLDER, scenario)
 
 
 def _run(scenario: Scenario, system: System, request: Request) -> Run:

@@ -18,7 +18,14 @@ STRUCTURE = "SystemStructure.ssd"
 
 _SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 _SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
+_SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 _OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
+
+#: Name of every parameter set: ecos applies the sets of the one name that it is given.
+PARAMETER_SET = "scenario"
+
+#: Where tools draw the components: size of a box, and the distance to the next.
+_BOX, _GAP = (40.0, 60.0), 30.0
 
 #: The oldest time a zip archive can hold: the same system gives the same bytes.
 _EPOCH = (1980, 1, 1, 0, 0, 0)
@@ -110,6 +117,10 @@ def ssp_bytes(system: System) -> bytes:
     archive = BytesIO()
     with ZipFile(archive, "w") as content:
         content.writestr(ZipInfo(STRUCTURE, _EPOCH), structure_xml(system))
+        for component in system.components.values():
+            if system.parameters_of(component.name):
+                values = parameter_set_xml(system, component)
+                content.writestr(ZipInfo(_parameter_source(component), _EPOCH), values)
         for fmu in sorted({component.fmu for component in system.components.values()}):
             content.writestr(ZipInfo(_source(fmu), _EPOCH), fmu.read_bytes())
     return archive.getvalue()
@@ -119,19 +130,46 @@ def _source(fmu: Path) -> str:
     return f"resources/{fmu.name}"
 
 
+def _parameter_source(component: Component) -> str:
+    return f"parameters/{component.name}.ssv"
+
+
+def parameter_set_xml(system: System, component: Component) -> bytes:
+    """The values that a system sets in one component, as an SSV."""
+    _register_prefixes()
+    root = ElementTree.Element(f"{{{_SSV}}}ParameterSet", name=PARAMETER_SET, version="1.0")
+    parameters = ElementTree.SubElement(root, f"{{{_SSV}}}Parameters")
+    for name, value in system.parameters_of(component.name).items():
+        variable = component.variable(name)
+        element = ElementTree.SubElement(parameters, f"{{{_SSV}}}Parameter", name=name)
+        literal = str(value).lower() if variable.type == "Boolean" else str(value)
+        ElementTree.SubElement(element, f"{{{_SSV}}}{variable.type}", value=literal)
+    return _serialised(root)
+
+
+def _register_prefixes() -> None:
+    """Libcosim accepts no other prefixes than these."""
+    for prefix, namespace in (("ssd", _SSD), ("ssc", _SSC), ("ssv", _SSV), ("osp", _OSP)):
+        ElementTree.register_namespace(prefix, namespace)
+
+
+def _serialised(root: ElementTree.Element) -> bytes:
+    ElementTree.indent(root)
+    content: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return content
+
+
 def structure_xml(system: System) -> bytes:
     """SystemStructure.ssd; connectors and units come from the FMUs' own descriptions.
 
-    libcosim accepts no other prefixes than `ssd`, `ssc` and `osp`, and needs its step size as
-    an annotation.
+    libcosim needs its step size as an annotation.
     """
-    for prefix, namespace in (("ssd", _SSD), ("ssc", _SSC), ("osp", _OSP)):
-        ElementTree.register_namespace(prefix, namespace)
+    _register_prefixes()
     root = ElementTree.Element(_ssd("SystemStructureDescription"), name=system.name, version="1.0")
     structure = ElementTree.SubElement(root, _ssd("System"), name=system.name)
     elements = ElementTree.SubElement(structure, _ssd("Elements"))
-    for component in system.components.values():
-        _add_component(elements, component)
+    for position, component in enumerate(system.components.values()):
+        _add_component(elements, component, position, bool(system.parameters_of(component.name)))
     connections = ElementTree.SubElement(structure, _ssd("Connections"))
     for connection in system.connections:
         ElementTree.SubElement(
@@ -144,9 +182,7 @@ def structure_xml(system: System) -> bytes:
         )
     _add_units(root, system)
     _add_experiment(root, system)
-    ElementTree.indent(root)
-    content: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
-    return content
+    return _serialised(root)
 
 
 def _ssd(tag: str) -> str:
@@ -157,7 +193,9 @@ def _ssc(tag: str) -> str:
     return f"{{{_SSC}}}{tag}"
 
 
-def _add_component(elements: ElementTree.Element, component: Component) -> None:
+def _add_component(
+    elements: ElementTree.Element, component: Component, position: int, has_parameters: bool
+) -> None:
     element = ElementTree.SubElement(
         elements,
         _ssd("Component"),
@@ -173,6 +211,21 @@ def _add_component(elements: ElementTree.Element, component: Component) -> None:
             )
             unit = {"unit": variable.unit} if variable.unit else {}
             ElementTree.SubElement(connector, _ssc(variable.type), unit)
+    width, height = _BOX
+    left = position * (width + _GAP)
+    ElementTree.SubElement(
+        element,
+        _ssd("ElementGeometry"),
+        {"x1": str(left), "y1": "0.0", "x2": str(left + width), "y2": str(height)},
+    )
+    if has_parameters:
+        bindings = ElementTree.SubElement(element, _ssd("ParameterBindings"))
+        ElementTree.SubElement(
+            bindings,
+            _ssd("ParameterBinding"),
+            source=_parameter_source(component),
+            type="application/x-ssp-parameter-set",
+        )
 
 
 def _add_units(root: ElementTree.Element, system: System) -> None:

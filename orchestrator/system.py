@@ -101,6 +101,20 @@ class System:
         """The same system with further values, which win over its own."""
         return replace(self, parameters={**self.parameters, **values})
 
+    def parameters_of(self, component: str) -> dict[str, Any]:
+        """Values that this system sets in one component, in the types of its variables.
+
+        Raises:
+            InputError: a parameter does not exist or is of the wrong type.
+
+        """
+        described = self.component(component)
+        return {
+            target.port: typed(str(target), described.variable(target.port), value)
+            for target, value in self.parameters.items()
+            if target.component == component
+        }
+
     def component(self, name: str) -> Component:
         """One component of the system.
 
