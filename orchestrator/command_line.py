@@ -1,4 +1,4 @@
-"""The command line: `auv-fmu build | list | run | gains | report | animate | export`."""
+"""The command line: `auv-fmu build | list | run | gains | report | animate | export | hosts`."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from orchestrator.experiment import (
 )
 from orchestrator.export import FORMATS
 from orchestrator.figures import is_drawable
+from orchestrator.hosts import HOSTS, compare
 from orchestrator.master import ORDERS
 from orchestrator.report import write_report
 from orchestrator.scenario import names, read_scenario
@@ -89,6 +90,12 @@ def _parser() -> argparse.ArgumentParser:
     _add_set(export)
     export.add_argument("--out", type=Path, metavar="DIR", help="default: exports/SCENARIO/")
     export.set_defaults(action=_export)
+
+    others = commands.add_parser("hosts", help="run a scenario in other co-simulation tools")
+    others.add_argument("host", nargs="*", metavar="HOST", help=f"of {', '.join(HOSTS)}")
+    others.add_argument("--scenario", default="fig4", metavar="SCENARIO|FILE.toml|FILE.ssp")
+    others.add_argument("--steps", type=int, default=5000, metavar="N")
+    others.set_defaults(action=_hosts)
 
     film = commands.add_parser("animate", help="write a film of a scenario")
     film.add_argument("scenario", metavar="SCENARIO|FILE.toml|FILE.ssp")
@@ -210,6 +217,28 @@ def _export(options: argparse.Namespace) -> int:
         for path in FORMATS[options.format](system, float(system.step or DEFAULT_STEP), folder):
             print(path)
     return OK
+
+
+def _hosts(options: argparse.Namespace) -> int:
+    unknown = set(options.host) - HOSTS.keys()
+    if unknown:
+        raise InputError(f"no host {', '.join(sorted(unknown))}; there are {', '.join(HOSTS)}")
+    with loaded(options.scenario) as (_, system):
+        step = system.step or DEFAULT_STEP
+        verdicts = compare(system, options.host or list(HOSTS), options.steps, step)
+    print(f"{'host':13} {'package':34} {'max deviation':>14} {'steps/s':>8}  worst port")
+    for verdict in verdicts:
+        if verdict.failure is not None:
+            print(f"{verdict.host:13} {verdict.package:34} {verdict.failure}")
+            continue
+        host = HOSTS[verdict.host]
+        note = f" ({host.why})" if host.why else ""
+        note += "" if verdict.agrees else f", above {host.bound:g}"
+        print(
+            f"{verdict.host:13} {verdict.package:34} {verdict.deviation:14.2e} "
+            f"{verdict.steps_per_second:8.0f}  {verdict.port}{note}"
+        )
+    return OK if all(verdict.agrees for verdict in verdicts) else FAILED
 
 
 if __name__ == "__main__":

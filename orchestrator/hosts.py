@@ -1,0 +1,250 @@
+"""Other co-simulation tools as hosts of the bundle, held against our own Jacobi master.
+
+Every host runs in a process of its own, `python -m orchestrator.hosts HOST FOLDER STEPS STEP`: some
+leave threads behind or end the process when something is wrong.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+import fmpy
+import numpy as np
+from fmpy.ssp.simulation import simulate_ssp
+
+from orchestrator.errors import InputError
+from orchestrator.export import export_container, export_osp, export_ssp
+from orchestrator.master import simulate
+from orchestrator.ssp import read_ssp
+from orchestrator.system import System
+
+#: How long a host may take for a run before it is given up [s].
+_TIMEOUT = 300
+
+
+@dataclass(frozen=True)
+class Host:
+    """A tool that can run the bundle.
+
+    Attributes:
+        package: that it comes from.
+        run: (system, folder of the export, steps, step) -> (rows of all Real outputs, seconds).
+        bound: largest deviation from our Jacobi master that is expected.
+        compared: how the names of the ports begin that are compared; empty: all.
+        why: what makes it deviate, if more than rounding does.
+
+    """
+
+    package: str
+    run: Callable[[System, Path, int, float], tuple[np.ndarray, float]]
+    bound: float = 1e-9
+    compared: str = ""
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What came of a host: `failure` is None if it ran."""
+
+    host: str
+    package: str
+    deviation: float = float("nan")
+    port: str = ""
+    steps_per_second: float = float("nan")
+    failure: str | None = None
+    agrees: bool = False
+
+
+def real_outputs(system: System) -> list[tuple[str, str, int]]:
+    """Component, port and value reference of every Real output."""
+    return [
+        (component.name, variable.name, variable.valueReference)
+        for component in system.components.values()
+        for variable in component.description.modelVariables
+        if variable.causality == "output" and variable.type == "Real"
+    ]
+
+
+def _libcosim(system: System, path: Path, steps: int, execution: Any) -> tuple[np.ndarray, float]:
+    from libcosimpy.CosimObserver import CosimObserver  # noqa: PLC0415
+
+    observer = CosimObserver.create_last_value()
+    execution.add_observer(observer=observer)
+    references: dict[str, list[int]] = {}
+    for component, _, reference in real_outputs(system):
+        references.setdefault(component, []).append(reference)
+    index = {name: execution.slave_index_from_instance_name(name) for name in references}
+    rows = []
+    start = perf_counter()
+    for _ in range(steps):
+        if not execution.step():
+            raise InputError("libcosim ended the run")
+        rows.append(
+            [
+                value
+                for name, wanted in references.items()
+                for value in observer.last_real_values(index[name], wanted)
+            ]
+        )
+    return np.array(rows), perf_counter() - start
+
+
+def _quiet_libcosim() -> Any:
+    from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level  # noqa: PLC0415
+
+    log_output_level(CosimLogLevel.ERROR)
+    return CosimExecution
+
+
+def _libcosim_ssp(
+    system: System, folder: Path, steps: int, step: float
+) -> tuple[np.ndarray, float]:
+    [path] = export_ssp(system, step, folder)
+    return _libcosim(system, folder, steps, _quiet_libcosim().from_ssp_file(ssp_path=str(path)))
+
+
+def _libcosim_osp(
+    system: System, folder: Path, steps: int, step: float
+) -> tuple[np.ndarray, float]:
+    export_osp(system, step, folder)
+    return _libcosim(
+        system, folder, steps, _quiet_libcosim().from_osp_config_file(osp_path=str(folder))
+    )
+
+
+def _ecos(system: System, folder: Path, steps: int, step: float) -> tuple[np.ndarray, float]:
+    # ecospy needs libtbb, which the wheel tbb puts where the loader does not look.
+    for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
+        ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
+    ecospy = importlib.import_module("ecospy")
+    [path] = export_ssp(system, step, folder)
+    names = [f"{component}::{port}" for component, port, _ in real_outputs(system)]
+    with ecospy.EcosSimulation(step_size=step, ssp_path=str(path)) as simulation:
+        if any(system.parameters_of(name) for name in system.components):
+            simulation.init(parameter_set="scenario")
+        else:
+            simulation.init()
+        rows = []
+        start = perf_counter()
+        for _ in range(steps):
+            simulation.step()
+            rows.append([simulation.get_real(name) for name in names])
+        return np.array(rows), perf_counter() - start
+
+
+def _fmpy_ssp(system: System, folder: Path, steps: int, step: float) -> tuple[np.ndarray, float]:
+    # fmpy.ssp ignores parameter bindings and Boolean connectors without a start value.
+    [path] = export_ssp(replace(system, parameters={}), step, folder)
+    start = perf_counter()
+    table = simulate_ssp(str(path), stop_time=steps * step, step_size=step)
+    seconds = perf_counter() - start
+    names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
+    return np.column_stack([table[name] for name in names])[1 : steps + 1], seconds
+
+
+def _container(system: System, folder: Path, steps: int, step: float) -> tuple[np.ndarray, float]:
+    [path] = export_container(system, step, folder)
+    start = perf_counter()
+    table = fmpy.simulate_fmu(
+        str(path), stop_time=steps * step, step_size=step, output_interval=step
+    )
+    seconds = perf_counter() - start
+    names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
+    return np.column_stack([table[name] for name in names])[1:], seconds
+
+
+HOSTS: dict[str, Host] = {
+    "libcosim-ssp": Host("libcosimpy", _libcosim_ssp),
+    "libcosim-osp": Host("libcosimpy", _libcosim_osp),
+    "ecos": Host("ecospy", _ecos),
+    "container": Host("fmu_manipulation_toolbox", _container),
+    "fmpy-ssp": Host(
+        "fmpy",
+        _fmpy_ssp,
+        bound=0.02,
+        compared="plant.eta.",
+        why="exchanges no initial values and accumulates its time",
+    ),
+}
+
+
+def compare(system: System, hosts: Sequence[str], steps: int, step: float) -> list[Verdict]:
+    """Run a system in other hosts and in our own master in Jacobi order.
+
+    Args:
+        system: to run.
+        hosts: keys of :data:`HOSTS`.
+        steps: how many.
+        step: communication step [s].
+
+    """
+    expected = simulate(system, steps * step, step, "jacobi")
+    names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
+    table = expected.group(*names)[1:]
+    return [_verdict(system, host, steps, step, names, table) for host in hosts]
+
+
+def _verdict(
+    system: System, host: str, steps: int, step: float, names: list[str], table: np.ndarray
+) -> Verdict:
+    package = HOSTS[host].package
+    try:
+        labelled = f"{package} {version(package)}"
+    except PackageNotFoundError:
+        return Verdict(host, package, failure="not installed: pip install 'auv-fmu[hosts]'")
+    with TemporaryDirectory(prefix="auvfmu") as folder:
+        export_ssp(replace(system, name="given"), step, Path(folder))
+        command = [sys.executable, "-P", "-m", "orchestrator.hosts", host, folder, str(steps)]
+        try:
+            process = subprocess.run(
+                [*command, str(step)],
+                capture_output=True,
+                text=True,
+                check=False,
+                timeout=_TIMEOUT,
+            )
+        except subprocess.TimeoutExpired:
+            return Verdict(host, labelled, failure=f"no end after {_TIMEOUT} s")
+        if process.returncode != 0:
+            lines = process.stderr.strip().splitlines() or [f"exit status {process.returncode}"]
+            return Verdict(host, labelled, failure=lines[-1])
+        with np.load(Path(folder, "rows.npz")) as content:
+            rows, seconds = content["rows"], float(content["seconds"])
+    if rows.shape != table.shape:
+        return Verdict(host, labelled, failure=f"{len(rows)} rows instead of {len(table)}")
+    deviation = np.abs(rows - table).max(axis=0)
+    compared = [i for i, name in enumerate(names) if name.startswith(HOSTS[host].compared)]
+    worst_port = max(compared, key=lambda i: float(deviation[i]))
+    worst = float(deviation[worst_port])
+    return Verdict(
+        host,
+        labelled,
+        worst,
+        names[worst_port],
+        steps / seconds,
+        agrees=worst <= HOSTS[host].bound,
+    )
+
+
+def _child(host: str, folder: Path, steps: int, step: float) -> None:
+    unpacked = folder / "unpacked"
+    system = read_ssp(folder / "given.ssp", unpacked)
+    export = folder / "export"
+    export.mkdir()
+    rows, seconds = HOSTS[host].run(replace(system, name="auv"), export, steps, step)
+    np.savez(folder / "rows.npz", rows=rows, seconds=seconds)
+
+
+if __name__ == "__main__":
+    _child(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4]))
