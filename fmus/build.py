@@ -12,22 +12,18 @@ import json
 import shutil
 import sys
 import tempfile
-from importlib import import_module
 from modulefinder import ModuleFinder
 from pathlib import Path
 
 import pythonfmu
 
+from fmus import documentation
+from fmus.discovery import components, package_folder
 from fmus.sealing import seal
 
-
-def _folder(package: str) -> Path:
-    [folder] = import_module(package).__path__
-    return Path(folder)
-
-
-_FOLDERS = {package: _folder(package) for package in ("auv_fmu", "fmus")}
-_PYTHONFMU = _folder("pythonfmu")
+_FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
+_PYTHONFMU = package_folder("pythonfmu")
+_ICON = _FOLDERS["fmus"] / "base" / "icon.png"
 
 _SCRIPT = """\
 from fmus.base.loading import settle
@@ -40,22 +36,12 @@ settle(globals())
 MANIFEST = "build.json"
 
 
-def components() -> dict[str, str]:
-    """Class name of every component and the module of its slave: one a folder."""
-    return {
-        "".join(word.capitalize() for word in slave.parent.name.split("_")): (
-            f"fmus.{slave.parent.name}.slave"
-        )
-        for slave in sorted(_FOLDERS["fmus"].glob("*/slave.py"))
-    }
-
-
 def fingerprint() -> str:
     """Hash of everything that a built FMU depends on."""
     digest = hashlib.sha256()
     for root in (*_FOLDERS.values(), _PYTHONFMU):
         for path in sorted(root.rglob("*")):
-            if path.suffix in (".py", ".md", ".so", ".dll"):
+            if path.suffix in (".py", ".md", ".html", ".png", ".so", ".dll"):
                 digest.update(f"{path.relative_to(root)}\0".encode())
                 digest.update(path.read_bytes())
     return digest.hexdigest()
@@ -86,7 +72,12 @@ def _build(component: str, module: str, destination: Path) -> None:
         raw = pythonfmu.FmuBuilder.build_FMU(
             script, dest=built, project_files=[stage / name for name in _FOLDERS]
         )
-        seal(Path(raw), destination / f"{component}.fmu")
+        further = {
+            "model.png": _ICON.read_bytes(),
+            "documentation/index.html": documentation.html(component).encode(),
+            "documentation/licenses/license.txt": documentation.licences().encode(),
+        }
+        seal(Path(raw), further, destination / f"{component}.fmu")
 
 
 def build(destination: Path) -> list[Path]:

@@ -39,16 +39,17 @@ def write_archive(path: Path, entries: dict[str, bytes], compression: int) -> No
         partial.unlink(missing_ok=True)
 
 
-def seal(fmu: Path, destination: Path) -> None:
+def seal(fmu: Path, further: dict[str, bytes], destination: Path) -> None:
     """Write the sealed twin of an FMU.
 
     Args:
         fmu: as PythonFMU has built it.
+        further: entries to add, by their names.
         destination: file to write.
 
     """
     with zipfile.ZipFile(fmu) as archive:
-        entries = {name: archive.read(name) for name in archive.namelist()}
+        entries = {name: archive.read(name) for name in archive.namelist()} | further
     entries[_DESCRIPTION] = _GUID.sub(b'guid=""', entries[_DESCRIPTION], count=1)
     digest = hashlib.sha256()
     for name in sorted(entries):

@@ -34,18 +34,7 @@ def build(folder: Path) -> list[Path]:
         InputError: the folder cannot be written, or the FMUs cannot be built.
 
     """
-    # In a process of its own: what PythonFMU imports to build must not stay in this one. Without
-    # -P it would import from a folder fmus in the current one.
-    process = subprocess.run(
-        [sys.executable, "-P", "-m", "fmus.build", "--out", str(folder)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if process.returncode != 0:
-        lines = process.stderr.strip().splitlines() or ["no reason given"]
-        raise InputError(lines[-1])
-    written = [Path(line) for line in process.stdout.splitlines()]
+    written = run_fmus("build", folder)
     archive = folder / ARCHIVE
     content = ssp_bytes(closed_loop(folder))
     try:
@@ -57,6 +46,31 @@ def build(folder: Path) -> list[Path]:
     except OSError as error:
         raise InputError(f"cannot write {archive}: {error}") from error
     return written
+
+
+def run_fmus(module: str, folder: Path) -> list[Path]:
+    """Run a module of the package fmus that writes into a folder.
+
+    In a process of its own: what PythonFMU imports to build must not stay in this one. Without -P
+    it would import from a folder fmus in the current one.
+
+    Returns:
+        The files written.
+
+    Raises:
+        InputError: it failed.
+
+    """
+    process = subprocess.run(
+        [sys.executable, "-P", "-m", f"fmus.{module}", "--out", str(folder)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if process.returncode != 0:
+        lines = process.stderr.strip().splitlines() or ["no reason given"]
+        raise InputError(lines[-1])
+    return [Path(line) for line in process.stdout.splitlines()]
 
 
 def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:

@@ -1,4 +1,4 @@
-"""The command line: `auv-fmu build | list | run | gains | report | animate | export | hosts`."""
+"""The command line `auv-fmu`: one function for each of its commands."""
 
 from __future__ import annotations
 
@@ -96,6 +96,10 @@ def _parser() -> argparse.ArgumentParser:
     others.add_argument("--scenario", default="fig4", metavar="SCENARIO|FILE.toml|FILE.ssp")
     others.add_argument("--steps", type=int, default=5000, metavar="N")
     others.set_defaults(action=_hosts)
+
+    docs = commands.add_parser("docs", help="write the pages of the components")
+    docs.add_argument("--out", type=Path, default=Path("docs", "components"), metavar="DIR")
+    docs.set_defaults(action=_docs)
 
     film = commands.add_parser("animate", help="write a film of a scenario")
     film.add_argument("scenario", metavar="SCENARIO|FILE.toml|FILE.ssp")
@@ -216,6 +220,13 @@ def _export(options: argparse.Namespace) -> int:
         system.check()
         for path in FORMATS[options.format](system, float(system.step or DEFAULT_STEP), folder):
             print(path)
+    return OK
+
+
+def _docs(options: argparse.Namespace) -> int:
+    make_writable(options.out)
+    for path in bundle.run_fmus("documentation", options.out):
+        print(path)
     return OK
 
 

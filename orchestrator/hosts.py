@@ -147,7 +147,8 @@ def _fmpy_ssp(system: System, folder: Path, steps: int, step: float) -> tuple[np
     # fmpy.ssp ignores parameter bindings and Boolean connectors without a start value.
     [path] = export_ssp(replace(system, parameters={}), step, folder)
     start = perf_counter()
-    table = simulate_ssp(str(path), stop_time=steps * step, step_size=step)
+    # It accumulates its time, so the last step may be there or not: ask for half a step more.
+    table = simulate_ssp(str(path), stop_time=(steps + 0.5) * step, step_size=step)
     seconds = perf_counter() - start
     names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
     return np.column_stack([table[name] for name in names])[1 : steps + 1], seconds

@@ -21,6 +21,7 @@ from fmpy.validation import validate_fmu
 
 import auv_fmu
 import fmus
+from fmus.documentation import page
 
 NAMES = ["AuvPlant", "DisturbanceGenerator", "MotionPlanner", "ObserverController", "PdController"]
 WITH_INPUTS = [name for name in NAMES if name != "MotionPlanner"]
@@ -317,6 +318,28 @@ def test_same_sources_give_the_same_bytes(dist: Path, tmp_path: Path, sources: P
         assert (tmp_path / "again" / f"{name}.fmu").read_bytes() == (
             dist / f"{name}.fmu"
         ).read_bytes()
+
+
+@each
+def test_page_icon_and_licences_are_inside(dist: Path, name: str):
+    with zipfile.ZipFile(dist / f"{name}.fmu") as archive:
+        shown = archive.read("documentation/index.html").decode()
+        licences = archive.read("documentation/licenses/license.txt").decode()
+        assert archive.read("model.png").startswith(b"\x89PNG")
+    description = fmpy.read_model_description(dist / f"{name}.fmu")
+    for variable in description.modelVariables:
+        assert f"<code>{variable.name}</code>" in shown
+    assert licences.count("Permission is hereby granted") == 2
+
+
+@each
+def test_page_in_the_repository_is_the_one_in_the_fmu(name: str):
+    committed = Path(__file__).parents[2] / "docs" / "components" / f"{name}.md"
+    assert committed.read_text(encoding="utf-8") == page(name), "run: auv-fmu docs"
+
+
+def test_fmus_are_small(dist: Path):
+    assert max((dist / f"{name}.fmu").stat().st_size for name in NAMES) < 300_000
 
 
 @each

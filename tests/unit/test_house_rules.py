@@ -32,10 +32,19 @@ def imports(package) -> Iterator[tuple[Path, str]]:
     ("package", "allowed"),
     [
         (auv_fmu, {"auv_fmu"}),
-        (fmus, {"auv_fmu", "fmus", "pythonfmu"}),
+        (fmus, {"auv_fmu", "fmus", "markdown_it", "pythonfmu"}),
         (
             orchestrator,
-            {"auv_fmu", "orchestrator", "fmpy", "markdown_it", "matplotlib", "numpy", "tqdm"},
+            {
+                "auv_fmu",
+                "orchestrator",
+                "fmpy",
+                "libcosimpy",
+                "markdown_it",
+                "matplotlib",
+                "numpy",
+                "tqdm",
+            },
         ),
     ],
 )

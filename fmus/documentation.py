@@ -1,0 +1,118 @@
+"""Pages of the components, from their `page.md` and their declared ports.
+
+`python -m fmus.documentation --out DIR` writes them as Markdown for the repository; the build puts
+the same text as HTML into each FMU.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from importlib import import_module
+from importlib.metadata import distribution
+from pathlib import Path
+from string import Template
+
+from markdown_it import MarkdownIt
+
+from fmus.base.port import FAULT, Port
+from fmus.discovery import components, folder_of
+
+_HTML = Path(__file__).with_name("page.html")
+
+_EXAMPLE = """\
+## Example
+
+Alone, with the inputs at zero, for 10 s:
+
+    fmpy simulate {name}.fmu --stop-time 10 --output-interval 0.02 --output-file result.csv
+
+In Python:
+
+    import fmpy
+    result = fmpy.simulate_fmu("{name}.fmu", stop_time=10.0, output_interval=0.02)
+
+A step longer than `h_max`, where there is such a parameter, is split evenly with held inputs.
+`fault` tells that an input, a parameter or a step was refused, and the log says why."""
+
+
+def page(name: str) -> str:
+    """The page of a component in Markdown: what it is, its ports, its parameters, an example."""
+    module = components()[name]
+    text = (folder_of(module) / "page.md").read_text(encoding="utf-8").strip()
+    ports: Sequence[Port] = (*import_module(module.replace(".slave", ".ports")).PORTS, FAULT)
+    return "\n\n".join((text, *_tables(ports), _EXAMPLE.format(name=name))) + "\n"
+
+
+def _tables(ports: Sequence[Port]) -> Iterator[str]:
+    for causality, heading in (
+        ("input", "Inputs"),
+        ("output", "Outputs"),
+        ("parameter", "Parameters"),
+    ):
+        found = [port for port in ports if port.causality == causality]
+        if not found:
+            continue
+        columns = ["name", "type", "unit", "description"]
+        if causality == "parameter":
+            columns[3:3] = ["start", "range", "variability"]
+        elif causality == "output":
+            columns.append("direct feedthrough from")
+        lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
+        lines += ["| " + " | ".join(_row(port)) + " |" for port in found]
+        yield f"## {heading}\n\n" + "\n".join(lines)
+
+
+def _row(port: Port) -> list[str]:
+    cells = [f"`{port.name}`", port.kind, port.unit or "", port.description]
+    if port.causality == "parameter":
+        cells[3:3] = [_literal(port.start), _range(port), port.variability]
+    elif port.causality == "output":
+        groups = dict.fromkeys(name.split(".")[0] for name in port.feedthrough)
+        cells.append(", ".join(f"`{group}`" for group in groups))
+    return cells
+
+
+def _literal(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value).lower()
+
+
+def _range(port: Port) -> str:
+    if port.choices:
+        return ", ".join(port.choices)
+    lower = "" if port.minimum is None else f"≥ {port.minimum:g}"
+    upper = "" if port.maximum is None else f"≤ {port.maximum:g}"
+    return " ".join(filter(None, (lower, upper)))
+
+
+def html(name: str) -> str:
+    """The page of a component as one HTML file."""
+    body = MarkdownIt("commonmark").enable("table").render(page(name))
+    body = body.replace("<table>", '<div class="table"><table>')
+    body = body.replace("</table>", "</table></div>")
+    return Template(_HTML.read_text(encoding="utf-8")).substitute(title=name, body=body)
+
+
+def licences() -> str:
+    """Licence of the bundle, and of PythonFMU, parts of which every FMU contains."""
+    texts = [
+        distribution(package).read_text("licenses/LICENSE") or ""
+        for package in ("auv-fmu", "pythonfmu")
+    ]
+    return f"auv-fmu\n\n{texts[0]}\n\nPythonFMU, contained in resources and binaries\n\n{texts[1]}"
+
+
+def main() -> None:
+    """Write the pages for the repository."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("docs", "components"))
+    folder = parser.parse_args().out
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in components():
+        path = folder / f"{name}.md"
+        path.write_text(page(name), encoding="utf-8")
+        print(path)
+
+
+if __name__ == "__main__":
+    main()
