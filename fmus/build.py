@@ -12,6 +12,7 @@ import json
 import shutil
 import sys
 import tempfile
+import zipfile
 from modulefinder import ModuleFinder
 from pathlib import Path
 
@@ -19,6 +20,7 @@ import pythonfmu
 
 from fmus import documentation
 from fmus.discovery import components, package_folder
+from fmus.loader import compiler, with_loader
 from fmus.sealing import seal
 
 _FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
@@ -41,7 +43,7 @@ def fingerprint() -> str:
     digest = hashlib.sha256()
     for root in (*_FOLDERS.values(), _PYTHONFMU):
         for path in sorted(root.rglob("*")):
-            if path.suffix in (".py", ".md", ".html", ".png", ".so", ".dll"):
+            if path.suffix in (".py", ".md", ".html", ".png", ".c", ".so", ".dll"):
                 digest.update(f"{path.relative_to(root)}\0".encode())
                 digest.update(path.read_bytes())
     return digest.hexdigest()
@@ -64,7 +66,7 @@ def _stage(component: str, module: str, stage: Path) -> Path:
     return script
 
 
-def _build(component: str, module: str, destination: Path) -> None:
+def _build(component: str, module: str, loader: str, destination: Path) -> None:
     with tempfile.TemporaryDirectory(prefix="auv_fmu_build_") as temporary:
         stage, built = Path(temporary, "stage"), Path(temporary, "built")
         stage.mkdir()
@@ -72,51 +74,64 @@ def _build(component: str, module: str, destination: Path) -> None:
         raw = pythonfmu.FmuBuilder.build_FMU(
             script, dest=built, project_files=[stage / name for name in _FOLDERS]
         )
-        further = {
-            "model.png": _ICON.read_bytes(),
-            "documentation/index.html": documentation.html(component).encode(),
-            "documentation/licenses/license.txt": documentation.licences().encode(),
-        }
-        seal(Path(raw), further, destination / f"{component}.fmu")
+        with zipfile.ZipFile(raw) as archive:
+            entries = {name: archive.read(name) for name in archive.namelist()}
+    entries["model.png"] = _ICON.read_bytes()
+    entries["documentation/index.html"] = documentation.html(component).encode()
+    entries["documentation/licenses/license.txt"] = documentation.licences().encode()
+    if loader == "native":
+        entries = with_loader(entries)
+    seal(entries, destination / f"{component}.fmu")
 
 
-def build(destination: Path) -> list[Path]:
+def build(destination: Path, loader: str | None = None) -> list[Path]:
     """Bring a folder of FMUs up to date.
 
     Args:
         destination: folder, made if it does not exist.
+        loader: `native` or `plain`; None: what is there, and for new files native where it can be
+            compiled.
 
     Returns:
         The files that had to be written.
 
     Raises:
-        OSError: the folder cannot be written.
+        OSError: the folder cannot be written, or the loader cannot be compiled.
 
     """
     destination.mkdir(parents=True, exist_ok=True)
     manifest = destination / MANIFEST
-    built_from = fingerprint()
     try:
-        current = json.loads(manifest.read_text(encoding="utf-8"))["fingerprint"] == built_from
-    except (OSError, ValueError, KeyError):
-        current = False
+        before = json.loads(manifest.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        before = {}
+    sources = fingerprint()
+    current = before.get("fingerprint") == sources and loader in (None, before.get("loader"))
+    chosen = loader or (before["loader"] if current else _best_loader())
     written = []
     for component, module in components().items():
         path = destination / f"{component}.fmu"
         if not current or not path.is_file():
-            _build(component, module, destination)
+            _build(component, module, chosen, destination)
             written.append(path)
     if written:
-        manifest.write_text(json.dumps({"fingerprint": built_from}) + "\n", encoding="utf-8")
+        content = {"fingerprint": sources, "loader": chosen}
+        manifest.write_text(json.dumps(content) + "\n", encoding="utf-8")
     return written
+
+
+def _best_loader() -> str:
+    return "plain" if compiler() is None else "native"
 
 
 def main() -> int:
     """Command line of the module."""
     parser = argparse.ArgumentParser(prog="python -m fmus.build", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("fmus", "dist"), help="folder to write")
+    parser.add_argument("--loader", choices=("native", "plain"), help="default: native if it can")
+    options = parser.parse_args()
     try:
-        for path in build(parser.parse_args().out):
+        for path in build(options.out, options.loader):
             print(path)
     except OSError as error:
         print(f"cannot build the FMUs: {error}", file=sys.stderr)

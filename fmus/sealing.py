@@ -39,17 +39,15 @@ def write_archive(path: Path, entries: dict[str, bytes], compression: int) -> No
         partial.unlink(missing_ok=True)
 
 
-def seal(fmu: Path, further: dict[str, bytes], destination: Path) -> None:
-    """Write the sealed twin of an FMU.
+def seal(entries: dict[str, bytes], destination: Path) -> None:
+    """Write an FMU sealed.
 
     Args:
-        fmu: as PythonFMU has built it.
-        further: entries to add, by their names.
+        entries: of the FMU, by their names.
         destination: file to write.
 
     """
-    with zipfile.ZipFile(fmu) as archive:
-        entries = {name: archive.read(name) for name in archive.namelist()} | further
+    entries = dict(entries)
     entries[_DESCRIPTION] = _GUID.sub(b'guid=""', entries[_DESCRIPTION], count=1)
     digest = hashlib.sha256()
     for name in sorted(entries):

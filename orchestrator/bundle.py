@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import tomllib
@@ -24,8 +25,13 @@ ARCHIVE, MANIFEST = "auv.ssp", "build.json"
 _WIRING = Path(__file__).parent / "closed_loop.toml"
 
 
-def build(folder: Path) -> list[Path]:
+def build(folder: Path, loader: str | None = None) -> list[Path]:
     """Bring a folder with FMUs and SSP up to date.
+
+    Args:
+        folder: made if it does not exist.
+        loader: `native` or `plain`; None: what is there, and for new files native where it can be
+            compiled.
 
     Returns:
         The files that had to be written.
@@ -34,7 +40,7 @@ def build(folder: Path) -> list[Path]:
         InputError: the folder cannot be written, or the FMUs cannot be built.
 
     """
-    written = run_fmus("build", folder)
+    written = run_fmus("build", folder, *(("--loader", loader) if loader else ()))
     archive = folder / ARCHIVE
     content = ssp_bytes(closed_loop(folder))
     try:
@@ -48,7 +54,13 @@ def build(folder: Path) -> list[Path]:
     return written
 
 
-def run_fmus(module: str, folder: Path) -> list[Path]:
+def loader_of(folder: Path) -> str:
+    """Which loader the FMUs in a folder were built with."""
+    content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+    return str(content["loader"])
+
+
+def run_fmus(module: str, folder: Path, *options: str) -> list[Path]:
     """Run a module of the package fmus that writes into a folder.
 
     In a process of its own: what PythonFMU imports to build must not stay in this one. Without -P
@@ -62,7 +74,7 @@ def run_fmus(module: str, folder: Path) -> list[Path]:
 
     """
     process = subprocess.run(
-        [sys.executable, "-P", "-m", f"fmus.{module}", "--out", str(folder)],
+        [sys.executable, "-P", "-m", f"fmus.{module}", "--out", str(folder), *options],
         capture_output=True,
         text=True,
         check=False,

@@ -61,6 +61,12 @@ def _parser() -> argparse.ArgumentParser:
 
     build = commands.add_parser("build", help="build every FMU and the bundle auv.ssp")
     build.add_argument("--out", type=Path, default=bundle.DEFAULT_FOLDER, metavar="DIR")
+    build.add_argument(
+        "--loader",
+        choices=("native", "plain"),
+        help="native: the FMUs also run in hosts that are no Python programs; needs a C compiler "
+        "and is the default where there is one",
+    )
     build.set_defaults(action=_build)
 
     listing = commands.add_parser("list", help="list the scenarios")
@@ -134,11 +140,11 @@ def _assignment(text: str) -> tuple[PortName, str]:
 
 
 def _build(options: argparse.Namespace) -> int:
-    written = bundle.build(options.out)
+    written = bundle.build(options.out, options.loader)
     for path in written:
         print(path)
-    if not written:
-        print(f"{options.out} is up to date")
+    state = "built" if written else "up to date"
+    print(f"{options.out} is {state}, with the {bundle.loader_of(options.out)} loader")
     return OK
 
 

@@ -1,0 +1,56 @@
+"""The native loader: what lets an FMU run in a host that is no Python program."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+_SOURCE = Path(__file__).with_name("loader.c")
+
+#: Where PythonFMU's own library goes when the loader takes its name.
+_LINUX = "binaries/linux64/"
+
+
+def compiler() -> str | None:
+    """The C compiler, if this is a platform that the loader is for and there is one."""
+    if not sys.platform.startswith("linux"):
+        return None
+    return shutil.which("cc") or shutil.which("gcc")
+
+
+@cache
+def compiled() -> bytes:
+    """The loader as a shared library.
+
+    Raises:
+        OSError: there is no compiler, or it fails.
+
+    """
+    command = compiler()
+    if command is None:
+        raise OSError("the native loader needs Linux and a C compiler; build with --loader plain")
+    with TemporaryDirectory(prefix="auv_fmu_loader_") as folder:
+        library = Path(folder, "loader.so")
+        process = subprocess.run(
+            [command, "-shared", "-fPIC", "-O2", "-s", "-fvisibility=hidden", "-Wall", "-Wextra",
+             # It has registered work for the end of the process, so it must stay until then.
+             "-Wl,-z,nodelete", "-Wl,--build-id=none", "-o", str(library), str(_SOURCE), "-ldl"],
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        if process.returncode != 0:
+            raise OSError(f"the native loader does not compile: {process.stderr.strip()}")
+        return library.read_bytes()
+
+
+def with_loader(entries: dict[str, bytes]) -> dict[str, bytes]:
+    """The entries of an FMU with the loader in the place of PythonFMU's library."""
+    changed = dict(entries)
+    for name, content in entries.items():
+        if name.startswith(_LINUX) and name.endswith(".so"):
+            changed[name.replace(".so", "_pythonfmu.so")] = content
+            changed[name] = compiled()
+    return changed
