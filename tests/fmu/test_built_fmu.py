@@ -276,7 +276,7 @@ def build(folder: Path, packages: Path) -> None:
     """Build all FMUs from the sources in a folder, in a process of its own."""
     subprocess.run(
         [sys.executable, "-m", "fmus.build", "--out", str(folder)],
-        env={"PYTHONPATH": str(packages), "PYTHONHASHSEED": "random", "PATH": ""},
+        env={"PYTHONPATH": str(packages), "PYTHONHASHSEED": "random", "PATH": os.environ["PATH"]},
         check=True,
         capture_output=True,
         cwd=packages,

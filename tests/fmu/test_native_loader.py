@@ -88,7 +88,7 @@ NO_LIBPYTHON = """
 #include <string.h>
 void *dlopen(const char *name, int flags) {
     void *(*real)(const char *, int) = (void *(*)(const char *, int))dlsym(RTLD_NEXT, "dlopen");
-    return name != NULL && strstr(name, "libpython") != NULL ? NULL : real(name, flags);
+    return name != NULL && strncmp(name, "libpython", 9) == 0 ? NULL : real(name, flags);
 }
 """
 
