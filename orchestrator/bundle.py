@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
+from orchestrator.bill_of_materials import BILL, CHECKSUMS, bill, checksums
 from orchestrator.errors import InputError
 from orchestrator.scenario import Scenario
 from orchestrator.ssp import ssp_bytes
@@ -42,16 +43,24 @@ def build(folder: Path, loader: str | None = None) -> list[Path]:
     """
     written = run_fmus("build", folder, *(("--loader", loader) if loader else ()))
     archive = folder / ARCHIVE
-    content = ssp_bytes(closed_loop(folder))
     try:
-        if not archive.is_file() or archive.read_bytes() != content:
-            partial = archive.with_name(f".{ARCHIVE}.{uuid4().hex}")
-            partial.write_bytes(content)
-            partial.replace(archive)
-            written.append(archive)
+        written += _write_if_changed(archive, ssp_bytes(closed_loop(folder)))
+        files = [*sorted(folder.glob("*.fmu")), archive]
+        written += _write_if_changed(folder / CHECKSUMS, checksums(files))
+        written += _write_if_changed(folder / BILL, bill(files))
     except OSError as error:
-        raise InputError(f"cannot write {archive}: {error}") from error
+        raise InputError(f"cannot write the bundle into {folder}: {error}") from error
     return written
+
+
+def _write_if_changed(path: Path, content: bytes) -> list[Path]:
+    """Write a file at once, so that another run never sees half of it."""
+    if path.is_file() and path.read_bytes() == content:
+        return []
+    partial = path.with_name(f".{path.name}.{uuid4().hex}")
+    partial.write_bytes(content)
+    partial.replace(path)
+    return [path]
 
 
 def loader_of(folder: Path) -> str:

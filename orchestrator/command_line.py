@@ -26,6 +26,7 @@ from orchestrator.export import FORMATS
 from orchestrator.figures import is_drawable
 from orchestrator.hosts import HOSTS, compare
 from orchestrator.master import ORDERS
+from orchestrator.reference import verify, write_reference
 from orchestrator.report import write_report
 from orchestrator.scenario import names, read_scenario
 from orchestrator.system import PortName, port_name
@@ -89,6 +90,21 @@ def _parser() -> argparse.ArgumentParser:
     report.add_argument("--out", type=Path, default=Path("results", "report"), metavar="DIR")
     report.set_defaults(action=_report)
 
+    film = commands.add_parser("animate", help="write a film of a scenario")
+    film.add_argument("scenario", metavar="SCENARIO|FILE.toml|FILE.ssp")
+    film.add_argument("--stop-time", type=float, metavar="S", help="end of the run [s]")
+    _add_set(film)
+    film.add_argument(
+        "--out", type=Path, metavar="FILE", help="a .gif or .mp4; default: results/SCENARIO.gif"
+    )
+    film.set_defaults(action=_animate)
+
+    _add_exchange(commands)
+    return parser
+
+
+def _add_exchange(commands: Any) -> None:
+    """Commands for the exchange with other tools."""
     export = commands.add_parser("export", help="write a scenario for other tools")
     export.add_argument("scenario", metavar="SCENARIO|FILE.toml|FILE.ssp")
     export.add_argument("--format", choices=FORMATS, default="ssp")
@@ -103,19 +119,20 @@ def _parser() -> argparse.ArgumentParser:
     others.add_argument("--steps", type=int, default=5000, metavar="N")
     others.set_defaults(action=_hosts)
 
+    check = commands.add_parser("verify", help="compare a table from another tool with ours")
+    check.add_argument("table", type=Path, metavar="RESULT.csv")
+    check.add_argument("--scenario", default="fig4", metavar="SCENARIO|FILE.toml|FILE.ssp")
+    check.add_argument("--tolerance", type=float, default=1e-6)
+    _add_set(check)
+    check.set_defaults(action=_verify)
+
+    reference = commands.add_parser("reference", help="write reference results of every FMU")
+    reference.add_argument("--out", type=Path, default=Path("reference"), metavar="DIR")
+    reference.set_defaults(action=_reference)
+
     docs = commands.add_parser("docs", help="write the pages of the components")
     docs.add_argument("--out", type=Path, default=Path("docs", "components"), metavar="DIR")
     docs.set_defaults(action=_docs)
-
-    film = commands.add_parser("animate", help="write a film of a scenario")
-    film.add_argument("scenario", metavar="SCENARIO|FILE.toml|FILE.ssp")
-    film.add_argument("--stop-time", type=float, metavar="S", help="end of the run [s]")
-    _add_set(film)
-    film.add_argument(
-        "--out", type=Path, metavar="FILE", help="a .gif or .mp4; default: results/SCENARIO.gif"
-    )
-    film.set_defaults(action=_animate)
-    return parser
 
 
 def _add_set(parser: argparse.ArgumentParser) -> None:
@@ -226,6 +243,21 @@ def _export(options: argparse.Namespace) -> int:
         system.check()
         for path in FORMATS[options.format](system, float(system.step or DEFAULT_STEP), folder):
             print(path)
+    return OK
+
+
+def _verify(options: argparse.Namespace) -> int:
+    with loaded(options.scenario) as (_, system):
+        system = system.with_parameters(_assignments(options))
+        print(verify(options.table, system, options.tolerance))
+    return OK
+
+
+def _reference(options: argparse.Namespace) -> int:
+    make_writable(options.out)
+    bundle.build(bundle.DEFAULT_FOLDER)
+    for path in write_reference(bundle.DEFAULT_FOLDER, options.out):
+        print(path)
     return OK
 
 

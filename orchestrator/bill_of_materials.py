@@ -1,0 +1,60 @@
+"""What the built bundle consists of: checksums, and a CycloneDX bill of materials."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+CHECKSUMS, BILL = "SHA256SUMS", "bom.cdx.json"
+
+
+def checksums(files: Sequence[Path]) -> bytes:
+    """Checksums as `sha256sum --check` reads them."""
+    return "".join(f"{_digest(path)}  {path.name}\n" for path in files).encode()
+
+
+def bill(files: Sequence[Path]) -> bytes:
+    """CycloneDX 1.5: the files of the bundle and the packages whose code they contain.
+
+    Without time and serial number: the same bundle has the same bill.
+    """
+    packages = [_package(name) for name in ("auv-fmu", "pythonfmu")]
+    content = {
+        "bomFormat": "CycloneDX",
+        "specVersion": "1.5",
+        "version": 1,
+        "metadata": {"component": packages[0]},
+        "components": [
+            packages[1],
+            *(
+                {
+                    "type": "file",
+                    "name": path.name,
+                    "hashes": [{"alg": "SHA-256", "content": _digest(path)}],
+                }
+                for path in files
+            ),
+        ],
+        "dependencies": [{"ref": packages[0]["bom-ref"], "dependsOn": [packages[1]["bom-ref"]]}],
+    }
+    return (json.dumps(content, indent=2) + "\n").encode()
+
+
+def _package(name: str) -> dict[str, Any]:
+    reference = f"pkg:pypi/{name}@{version(name)}"
+    return {
+        "type": "library",
+        "bom-ref": reference,
+        "name": name,
+        "version": version(name),
+        "licenses": [{"license": {"id": "MIT"}}],
+        "purl": reference,
+    }
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -1,0 +1,167 @@
+"""Reference results, with which a user checks an import into another tool.
+
+For each FMU, in the manner of the FMI cross-check: `NAME_in.csv` with inputs over time,
+`NAME_ref.csv` with the outputs, `NAME_ref.opt` with the experiment. For the system: `auv_ref.csv`
+and `auv_ref.opt`, from a Jacobi run, which is what most tools do.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import fmpy
+import numpy as np
+from fmpy.util import write_csv
+
+from orchestrator import bundle
+from orchestrator.errors import InputError
+from orchestrator.master import ORDERS, simulate
+from orchestrator.result import Result
+from orchestrator.system import Component, System, read_component
+
+#: Length of the reference runs [s] and their step [s].
+STOP_TIME, STEP = 4.0, 0.02
+
+#: Columns that name the time, in lower case.
+_TIME = ("time", "t")
+
+
+def reference_inputs(component: Component) -> np.ndarray:
+    """Inputs without special values: a sine of its own for each, small enough for the gate."""
+    names = [v.name for v in component.description.modelVariables if v.causality == "input"]
+    time = np.arange(round(STOP_TIME / STEP) + 1) * STEP
+    table = np.zeros(len(time), dtype=[(name, np.float64) for name in ("time", *names)])
+    table["time"] = time
+    for i, name in enumerate(names, start=1):
+        table[name] = 0.1 * np.sin((0.5 + 0.1 * i) * time)
+    return table
+
+
+def reference_outputs(component: Component, inputs: np.ndarray) -> np.ndarray:
+    """Outputs of an FMU that runs alone with these inputs, by fmpy."""
+    names = [
+        v.name
+        for v in component.description.modelVariables
+        if v.causality == "output" and v.type == "Real"
+    ]
+    table: np.ndarray = fmpy.simulate_fmu(
+        str(component.fmu),
+        stop_time=STOP_TIME,
+        step_size=STEP,
+        output_interval=STEP,
+        input=inputs,
+        output=names,
+    )
+    return table
+
+
+def write_reference(dist: Path, folder: Path) -> list[Path]:
+    """Write the reference results of the closed loop and of each FMU of the bundle.
+
+    Args:
+        dist: folder with the built bundle.
+        folder: to write into.
+
+    Returns:
+        The files written.
+
+    """
+    written = []
+    for fmu in sorted(dist.glob("*.fmu")):
+        component = read_component(fmu.stem, fmu)
+        stem = folder / component.fmu.stem
+        inputs = reference_inputs(component)
+        tables = {"_in": inputs, "_ref": reference_outputs(component, inputs)}
+        for suffix, table in tables.items():
+            if len(table.dtype.names or ()) > 1:
+                written.append(stem.with_name(f"{stem.name}{suffix}.csv"))
+                write_csv(written[-1], table)
+        written.append(_write_options(stem))
+    result = simulate(bundle.closed_loop(dist), STOP_TIME, STEP, "jacobi")
+    written.append(folder / "auv_ref.csv")
+    result.write_csv(written[-1])
+    written.append(_write_options(folder / "auv"))
+    return written
+
+
+def _write_options(stem: Path) -> Path:
+    path = stem.with_name(f"{stem.name}_ref.opt")
+    path.write_text(
+        f"StartTime,0.0\nStopTime,{STOP_TIME}\nStepSize,{STEP}\nRelTol,0.0\n"
+        f"OutputIntervalLength,{STEP}\n",
+        encoding="utf-8",
+    )
+    return path
+
+
+def verify(path: Path, system: System, tolerance: float) -> str:
+    """Compare a table from any tool with our own runs of the same system.
+
+    Args:
+        path: CSV with a time column and columns named after our ports.
+        system: that the tool has run.
+        tolerance: largest difference that is accepted, relative to the larger of one and the
+            largest magnitude of the port.
+
+    Returns:
+        What agrees, and with which order of evaluation.
+
+    Raises:
+        InputError: the file cannot be read, has no column of ours, or differs in both orders; the
+            text names the port that differs first.
+
+    """
+    time, columns = _read(path)
+    stop_time = float(time[-1])
+    if not stop_time > 0.0:
+        raise InputError(f"{path}: the time does not advance")
+    complaints = []
+    for order in ORDERS:
+        ours = simulate(system, stop_time, system.step or STEP, order)
+        shared = {name: column for name, column in columns.items() if name in ours}
+        if not shared:
+            raise InputError(
+                f"{path}: no column is named after a port; they are named as {ours.columns[0]}"
+            )
+        complaint = _first_difference(time, shared, ours, tolerance)
+        if complaint is None:
+            return f"{len(shared)} ports agree over {stop_time:g} s, in {order} order"
+        complaints.append(f"in {order} order {complaint}")
+    raise InputError(f"{path}: {'; '.join(complaints)}")
+
+
+def _read(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    try:
+        with path.open(encoding="utf-8") as file:
+            header = [name.strip().strip('"') for name in file.readline().split(",")]
+            lines = [line.replace("True", "1").replace("False", "0") for line in file]
+            table = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.empty((0, 0))
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        raise InputError(f"{path}: not a readable table: {error}") from error
+    if len(table) < 2 or table.shape[1] != len(header):
+        raise InputError(f"{path}: {len(table)} rows with {len(header)} names are no table")
+    index = next((i for i, name in enumerate(header) if name.lower() in _TIME), None)
+    if index is None:
+        raise InputError(f"{path}: no column is named time")
+    # Some tools write component::port, or put the name of the system before it.
+    names = [name.replace("::", ".").removeprefix("auv.") for name in header]
+    columns = {name: table[:, i] for i, name in enumerate(names) if i != index}
+    return table[:, index], columns
+
+
+def _first_difference(
+    time: np.ndarray, columns: dict[str, np.ndarray], ours: Result, tolerance: float
+) -> str | None:
+    first: tuple[float, str, float, float] | None = None
+    for name, column in columns.items():
+        expected = np.interp(time, ours.time, ours[name])
+        accepted = tolerance * max(1.0, float(np.abs(expected).max()))
+        # A value that is no number differs.
+        wrong = np.flatnonzero(~(np.abs(column - expected) <= accepted))
+        if len(wrong) and (first is None or time[wrong[0]] < first[0]):
+            k = wrong[0]
+            first = float(time[k]), name, float(column[k]), float(expected[k])
+    if first is None:
+        return None
+    t, name, theirs, mine = first
+    return f"{name} differs first, at t = {t:g} s: {theirs:.9g} instead of {mine:.9g}"

@@ -1,0 +1,54 @@
+"""The wheel, and the papers of the built bundle."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_wheel_builds_the_bundle_and_runs_fig4_in_an_empty_folder(tmp_path: Path):
+    wheels, packages, empty = tmp_path / "wheels", tmp_path / "packages", tmp_path / "empty"
+    empty.mkdir()
+    pip = [sys.executable, "-m", "pip", "--quiet"]
+    subprocess.run(
+        [*pip, "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", wheels, ROOT],
+        check=True,
+        cwd=tmp_path,
+    )
+    [wheel] = wheels.iterdir()
+    subprocess.run([*pip, "install", "--no-deps", "--target", packages, wheel], check=True)
+    # The packages of the wheel come before those of this environment.
+    environment = {**os.environ, "PYTHONPATH": str(packages)}
+    where = subprocess.run(
+        [sys.executable, "-P", "-c", "import fmus, orchestrator; print(orchestrator.__file__)"],
+        env=environment, cwd=empty, check=True, capture_output=True, text=True,
+    )  # fmt: skip
+    assert where.stdout.startswith(str(packages))
+    command = [sys.executable, "-P", "-m", "orchestrator.command_line", "run", "fig4"]
+    subprocess.run(
+        [*command, "--stop-time", "1"],
+        env=environment, cwd=empty, check=True, capture_output=True,
+    )  # fmt: skip
+    assert (empty / "fmus/dist/auv.ssp").is_file()
+    assert (empty / "results/fig4/fig4.png").is_file()
+
+
+def test_checksums_are_those_of_the_files(dist: Path):
+    lines = (dist / "SHA256SUMS").read_text().splitlines()
+    assert len(lines) == 6
+    for line in lines:
+        digest, name = line.split("  ")
+        assert hashlib.sha256((dist / name).read_bytes()).hexdigest() == digest
+
+
+def test_bill_of_materials_names_every_file_and_package(dist: Path):
+    content = json.loads((dist / "bom.cdx.json").read_text())
+    assert (content["bomFormat"], content["specVersion"]) == ("CycloneDX", "1.5")
+    names = {component["name"] for component in content["components"]}
+    assert names == {"pythonfmu", "auv.ssp", *(path.name for path in dist.glob("*.fmu"))}
