@@ -26,6 +26,19 @@ _DURATION = 10.0
 _VEHICLE_SIZE = 0.12
 
 
+def check_format(path: Path) -> None:
+    """Check before a run that its film can be written.
+
+    Raises:
+        InputError: the format is unknown or not available.
+
+    """
+    if path.suffix not in (".gif", ".mp4"):
+        raise InputError(f"{path}: write a .gif or an .mp4")
+    if path.suffix == ".mp4" and not FFMpegWriter.isAvailable():
+        raise InputError(f"{path}: an .mp4 needs ffmpeg, which is not installed; write a .gif")
+
+
 def animate(title: str, result: Result, path: Path) -> None:
     """Write a film of a run.
 
@@ -35,13 +48,10 @@ def animate(title: str, result: Result, path: Path) -> None:
         path: of a .gif, or of an .mp4 where ffmpeg is installed.
 
     Raises:
-        InputError: the file cannot be written, or its format is not available.
+        InputError: the file cannot be written.
 
     """
-    if path.suffix not in (".gif", ".mp4"):
-        raise InputError(f"{path}: write a .gif or an .mp4")
-    if path.suffix == ".mp4" and not FFMpegWriter.isAvailable():
-        raise InputError(f"{path}: an .mp4 needs ffmpeg, which is not installed; write a .gif")
+    check_format(path)
     writer: Any = FFMpegWriter if path.suffix == ".mp4" else PillowWriter
     with mpl.rc_context({**SETTINGS, "figure.constrained_layout.use": False}):
         try:

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -66,9 +67,13 @@ def run_all(jobs: Sequence[Job], folder: Path) -> dict[str, dict[str, Any]]:
         tqdm(total=len(jobs), initial=len(jobs) - len(missing), unit="run", disable=None) as bar,
     ):
         futures = [pool.submit(_run, job, folder / job.name, sources) for job in missing]
-        for future in as_completed(futures):
-            future.result()
-            bar.update()
+        try:
+            for future in as_completed(futures):
+                future.result()
+                bar.update()
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
     return {
         path.parent.relative_to(folder).as_posix(): json.loads(path.read_text(encoding="utf-8"))
         for job in jobs
@@ -79,6 +84,9 @@ def run_all(jobs: Sequence[Job], folder: Path) -> dict[str, dict[str, Any]]:
 def _sources() -> str:
     """Hash of all that a result depends on besides its command."""
     digest = hashlib.sha256((bundle.DEFAULT_FOLDER / bundle.MANIFEST).read_bytes())
+    digest.update(sys.version.encode())
+    for name in ("fmpy", "matplotlib", "numpy", "pythonfmu"):
+        digest.update(version(name).encode())
     package = Path(__file__).parent
     for path in sorted([*package.glob("*.py"), *package.glob("*.toml"), *SCENARIOS.iterdir()]):
         digest.update(path.name.encode())
@@ -91,6 +99,8 @@ def _stamp(job: Job, sources: str) -> Mapping[str, str]:
 
 
 def _is_finished(job: Job, folder: Path, sources: str) -> bool:
+    if not all((folder / name).is_file() for name in ("metrics.json", "result.csv")):
+        return False
     try:
         stamp = json.loads((folder / _STAMP).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -99,6 +109,7 @@ def _is_finished(job: Job, folder: Path, sources: str) -> bool:
 
 
 def _run(job: Job, folder: Path, sources: str) -> None:
+    (folder / _STAMP).unlink(missing_ok=True)
     command = [sys.executable, "-P", "-m", "orchestrator.command_line", "run", *job.arguments]
     process = subprocess.run(
         [*command, "--out", str(folder)], capture_output=True, text=True, check=False

@@ -111,6 +111,12 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
     if scenario is not None:
         chosen, wires = chosen | scenario.components, wires | scenario.wires
         parameters = scenario.parameters
+        missing = set(scenario.only) - chosen.keys()
+        if missing:
+            raise InputError(
+                f"{scenario.name}: only = {', '.join(sorted(missing))}: no such component; "
+                f"there are {', '.join(chosen)}"
+            )
         if scenario.only:
             chosen = {name: fmu for name, fmu in chosen.items() if name in scenario.only}
             wires = {

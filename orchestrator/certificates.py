@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from auv_fmu.attitude import rotation_from_euler
-from auv_fmu.lyapunov import lyapunov
+from auv_fmu.lyapunov import composite_errors, lyapunov
 from auv_fmu.saturation import INTEGRALS, SATURATIONS
-from orchestrator.metrics import ACTUATORS, AXES, true_control_point
+from orchestrator.metrics import ACTUATORS, AXES, POSTURE, true_control_point
 from orchestrator.result import Result
-from orchestrator.system import PortName, System
-from orchestrator.vehicle_parameters import vehicle
+from orchestrator.system import PortName, System, unit_of
+from orchestrator.vehicle_parameters import VEHICLE_PARAMETERS, vehicle
 
 #: Units of a velocity at a port.
 _VELOCITY_UNITS = {"m/s", "rad/s"}
@@ -32,10 +32,16 @@ COLUMNS = (
 
 
 def velocities_reaching(system: System, component: str = "controller") -> list[str]:
-    """Velocities of the plant that reach a component, directly or through others.
+    """Velocities of the vehicle that reach a component, directly or through others.
 
-    Follows the connections upstream. Empty for a controller without velocity sensors.
+    The vehicle is what the component feeds. Follows the connections upstream and stops there.
+    Empty for a controller without velocity sensors.
     """
+    vehicles = {
+        connection.target.component
+        for connection in system.connections
+        if connection.source.component == component
+    }
     found, seen, waiting = [], {component}, [component]
     while waiting:
         name = waiting.pop()
@@ -43,21 +49,28 @@ def velocities_reaching(system: System, component: str = "controller") -> list[s
             source = connection.source
             if connection.target.component != name:
                 continue
-            if source.component == "plant":
-                variable = system.components["plant"].variable(source.port)
-                if variable.unit in _VELOCITY_UNITS:
+            if source.component in vehicles:
+                variable = system.components[source.component].variable(source.port)
+                if unit_of(variable) in _VELOCITY_UNITS:
                     found.append(str(source))
             elif source.component not in seen:
                 seen.add(source.component)
                 waiting.append(source.component)
-    return sorted(found)
+    return sorted(set(found))
 
 
 def has_certificates(result: Result) -> bool:
-    """Whether the run has the ports of the proposed controller."""
-    return all(
-        column in result for column in ("controller.dy_hat.x", "plant.dy.x", "planner.y_d.x")
-    )
+    """Whether the run has the ports and parameters of the proposed controller and the plant."""
+    columns = [*POSTURE, *(f"plant.dy.{k}" for k in AXES)]
+    columns += [
+        f"controller.{group}.{k}" for group in ("y_d", "dy_d", "y_hat", "dy_hat", "z") for k in AXES
+    ]
+    columns += [f"controller.tau.{k}" for k in ACTUATORS]
+    gains = ["controller.lambda", "controller.saturation"]
+    gains += [f"controller.K2[{i}]" for i in (1, 2, 3)]
+    limits = [f"plant.{limit}.{k}" for limit in ("tau_min", "tau_max") for k in ACTUATORS]
+    vehicle_parameters = [f"plant.{name}" for name in (*VEHICLE_PARAMETERS, "ell")]
+    return result.has(columns, [*gains, *limits, *vehicle_parameters])
 
 
 def certificates(result: Result) -> np.ndarray:
@@ -100,28 +113,37 @@ def _rows(result: Result) -> Iterator[list[float]]:
             ("controller.y_hat", AXES),
             ("controller.dy_hat", AXES),
             ("controller.z", AXES),
-            ("plant.tau", ACTUATORS),
+            ("controller.tau", ACTUATORS),
         )
     )
 
-    def saturated(values: np.ndarray) -> np.ndarray:
-        return np.array([[s(value)[0] for value in row] for row in values.tolist()])
+    def errors(i: int, k: int) -> tuple[float, float]:
+        return composite_errors(
+            dy[i, k],
+            dy_d[i, k],
+            y_hat[i, k] - y_d[i, k],
+            dy_hat[i, k],
+            z_measured[i, k],
+            lambda_,
+            s,
+        )
 
     e, z = y - y_d, y - y_hat
-    dy_r = dy_d - lambda_ * saturated(y_hat - y_d)
-    dy_o = dy_hat - lambda_ * saturated(z_measured)
-    r_1, r_2 = dy - dy_r, dy - dy_o
     margin = np.minimum(upper - tau, tau - lower)
     for i, t in enumerate(result.time[:-1].tolist()):
+        r_1, r_2 = zip(*(errors(i, k) for k in range(3)), strict=True)
         V = lyapunov(
             plant,
             rotation_from_euler(*euler[i].tolist()),
             ell,
             K2,
             integral,
-            *(tuple(x[i].tolist()) for x in (e, z, r_1, r_2)),
+            tuple(e[i].tolist()),
+            tuple(z[i].tolist()),
+            r_1,
+            r_2,
         )
-        yield [t, V, *r_1[i], *r_2[i], *margin[i]]
+        yield [t, V, *r_1, *r_2, *margin[i]]
 
 
 def write_certificates(result: Result, path: Path) -> None:

@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator import bundle, gains
-from orchestrator.animation import animate
+from orchestrator.animation import animate, check_format
 from orchestrator.errors import InputError
 from orchestrator.experiment import (
     DEFAULT_STEP,
     Request,
+    Run,
     loaded,
     make_writable,
     perform,
@@ -175,12 +176,19 @@ def _run(options: argparse.Namespace) -> int:
     request = Request(
         options.stop_time, options.step, options.order, _assignments(options), progress=True
     )
+    if not options.scenario.endswith(".ssp"):
+        read_scenario(options.scenario)
     folder = options.out or Path("results", Path(options.scenario).stem)
     make_writable(folder)
     runs = perform(options.scenario, request)
     for values in write(runs, folder):
         _print_summary(values)
     print(f"written to {folder}{os.sep}")
+    return _status(runs)
+
+
+def _status(runs: Sequence[Run]) -> int:
+    """Exit status of some runs, after saying what went wrong in them."""
     status = OK
     for run in runs:
         for message in run.result.messages:
@@ -219,6 +227,7 @@ def _report(options: argparse.Namespace) -> int:
 
 def _animate(options: argparse.Namespace) -> int:
     path = options.out or Path("results", f"{Path(options.scenario).stem}.gif")
+    check_format(path)
     make_writable(path.parent)
     request = Request(options.stop_time, parameters=_assignments(options), progress=True)
     [run] = perform(options.scenario, request, companions=False)
@@ -227,7 +236,7 @@ def _animate(options: argparse.Namespace) -> int:
     label = f", {run.scenario.label}" if run.scenario.label else ""
     animate(f"{run.scenario.name}{label}", run.result, path)
     print(path)
-    return OK
+    return _status([run])
 
 
 def _export(options: argparse.Namespace) -> int:

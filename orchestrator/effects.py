@@ -15,6 +15,7 @@ from orchestrator.figures import COLOURS, SETTINGS, STYLES, Drawn, draw_commands
 from orchestrator.metrics import ACTUATORS
 from orchestrator.published import NOISE_LEVELS
 from orchestrator.result import Result
+from orchestrator.system import PortName
 
 
 def draw_effects(
@@ -29,6 +30,7 @@ def draw_effects(
         folder: to write into.
 
     """
+    limit = float(results["fig4-quiet"].parameters[PortName("plant", "tau_max.u")])
     with mpl.rc_context(SETTINGS):
         for name, figure in (
             ("effect-jacobian", _pair(
@@ -37,7 +39,7 @@ def draw_effects(
                  Drawn("(11) as printed", results["fig5-printed"])],
             )),
             ("effect-order", _orders(results)),
-            ("effect-noise", _noise(metrics)),
+            ("effect-noise", _noise(metrics, limit)),
             ("effect-saturation", _pair(
                 "tanh and algebraic saturation, Fig. 4 without noise",
                 [Drawn("tanh", results["fig4-quiet"]),
@@ -76,7 +78,7 @@ def _orders(results: Mapping[str, Result]) -> Figure:
     return figure
 
 
-def _noise(metrics: Mapping[str, Any]) -> Figure:
+def _noise(metrics: Mapping[str, Any], limit: float) -> Figure:
     figure = Figure(figsize=(11, 4.5))
     figure.suptitle("Measurement noise against effort, Fig. 4 (reading 7)")
     effort, peak = figure.subplots(1, 2)
@@ -92,7 +94,7 @@ def _noise(metrics: Mapping[str, Any]) -> Figure:
         axes.set_xscale("symlog", linthresh=0.1)
         axes.set_yscale("log")
     effort.set_ylabel("L2 norm of the applied signal [N·s$^{1/2}$, N·m·s$^{1/2}$]")
-    peak.axhline(80.0, color="black", linewidth=1, label="limit of (3)")
+    peak.axhline(limit, color="black", linewidth=1, label="limit of (3)")
     peak.legend(fontsize="small")
     return figure
 

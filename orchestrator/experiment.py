@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -66,18 +66,23 @@ def perform(name: str, request: Request, companions: bool = True) -> list[Run]:
         InputError: something about the request cannot be done; nothing has run.
 
     """
-    with loaded(name) as (scenario, system):
-        runs = [_run(scenario, system, request)]
-    if companions and scenario.compare and runs[0].result.failure is None:
-        with loaded(scenario.compare) as (other, system):
-            # What the user changed goes for both, as far as both have it.
+    with ExitStack() as stack:
+        scenario, system = stack.enter_context(loaded(name))
+        prepared = [(scenario, system.with_parameters(request.parameters))]
+        if companions and scenario.compare:
+            other, system = stack.enter_context(loaded(scenario.compare))
+            # What the scenario and the user set goes for both, as far as both have it.
             shared = {
                 target: value
-                for target, value in request.parameters.items()
-                if target.port in system.component(target.component).variables
+                for target, value in {**scenario.parameters, **request.parameters}.items()
+                if target.component in system.components
+                and target.port in system.components[target.component].variables
             }
-            runs.append(_run(other, system, replace(request, parameters=shared)))
-    return runs
+            same = replace(other, stop_time=scenario.stop_time, step=scenario.step)
+            prepared.append((same, system.with_parameters(shared)))
+        for _, each in prepared:
+            each.check()
+        return [_run(chosen, each, request) for chosen, each in prepared]
 
 
 @contextmanager
@@ -104,7 +109,6 @@ def loaded(name: str) -> Iterator[tuple[Scenario, System]]:
 
 
 def _run(scenario: Scenario, system: System, request: Request) -> Run:
-    system = system.with_parameters(request.parameters)
     stop_time = _first_given(request.stop_time, scenario.stop_time, system.stop_time)
     if stop_time is None:
         raise InputError(f"{scenario.name}: names no stop time; give one with --stop-time")
@@ -140,6 +144,13 @@ def write(runs: list[Run], folder: Path) -> list[dict[str, Any]]:
         The metrics of each run.
 
     """
+    try:
+        return _write(runs, folder)
+    except OSError as error:
+        raise InputError(f"cannot write into {folder}: {error}; choose --out DIR") from error
+
+
+def _write(runs: list[Run], folder: Path) -> list[dict[str, Any]]:
     written = []
     for i, run in enumerate(runs):
         target = folder / run.scenario.name if i else folder

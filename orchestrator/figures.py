@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestrator.metrics import ACTUATORS, AXES, tracking_error, true_control_point
+from orchestrator.metrics import ACTUATORS, AXES, POSTURE, tracking_error, true_control_point
 from orchestrator.result import Result
 from orchestrator.system import PortName
 
@@ -67,6 +67,8 @@ def draw(kind: str, title: str, runs: Sequence[Drawn], folder: Path, stem: str) 
 
     """
     written = []
+    # A title is text, and no formula.
+    title = title.replace("$", r"\$")
     with mpl.rc_context(SETTINGS):
         for suffix, figure in FIGURES[kind](title, runs).items():
             for ending in ("png", "svg"):
@@ -83,10 +85,16 @@ def save(figure: Figure, path: Path) -> None:
 
 def is_drawable(kind: str, result: Result) -> bool:
     """Whether a run has the ports of a figure: a user's own system may have others."""
-    needed = {"plant.tau.u", "plant.eta.x", "plant.nu.u"}
+    needed = [
+        *POSTURE,
+        *(f"plant.nu.{k}" for k in "uvwpqr"),
+        *(f"plant.tau.{k}" for k in ACTUATORS),
+    ]
     if not kind.startswith("open-loop"):
-        needed |= {"planner.y_d.x", "controller.theta_hat[1]"}
-    return result.computed > 1 and all(column in result for column in needed)
+        needed += [f"planner.y_d.{k}" for k in AXES]
+        needed += [f"controller.theta_hat[{i}]" for i in range(1, 5)]
+    limits = [f"plant.{limit}.{k}" for limit in ("tau_min", "tau_max") for k in ACTUATORS]
+    return result.computed > 1 and result.has(needed, ["plant.ell", *limits])
 
 
 def _tracking(title: str, runs: Sequence[Drawn]) -> dict[str, Figure]:

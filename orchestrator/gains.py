@@ -43,7 +43,7 @@ def evaluate(system: System) -> tuple[Bounds, tuple[Condition, ...]]:
             f"controller.saturation = {saturation}: use one of {', '.join(MAXIMUM_SLOPE)}"
         )
     plant = vehicle(lambda name: float(value("plant", name)))
-    known = bounds(plant, value("controller", "ell"))
+    known = bounds(plant, value("plant", "ell"))
     K1, K2 = (
         (
             value("controller", f"{K}[1]"),

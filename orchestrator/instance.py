@@ -12,7 +12,6 @@ from typing import Any
 
 import fmpy
 import numpy as np
-from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
     FMU2Slave,
     fmi2Boolean,
@@ -220,8 +219,5 @@ def initialise(instances: Mapping[str, Instance], stop_time: float) -> None:
 
     """
     for instance in instances.values():
-        try:
-            instance.fmu.setupExperiment(startTime=0.0, stopTime=stop_time)
-            instance.fmu.enterInitializationMode()
-        except FMICallException as error:
-            raise InputError(f"{instance.name}: {error}") from error
+        instance.fmu.setupExperiment(startTime=0.0, stopTime=stop_time)
+        instance.fmu.enterInitializationMode()

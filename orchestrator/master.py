@@ -33,6 +33,9 @@ ORDERS = ("gauss-seidel", "jacobi")
 #: A rest of the stop time shorter than this share of a step is a rounding error.
 ROUNDING = 1e-9
 
+#: More steps than this are taken for a mistake: their table would not fit into any memory.
+MOST_STEPS = 10_000_000
+
 #: Seconds before a progress bar appears, and steps between its updates.
 _PATIENCE, _CHUNK = 2.0, 100
 
@@ -61,8 +64,8 @@ def simulate(
         raise InputError(f"stop time {stop_time:g} s and step {step:g} s must be positive")
     system.check()
     plan = stages(system, order)
-    with ExitStack() as stack:
-        log = Log()
+    log = Log()
+    with _held_interrupts() as interrupts, _explained(log), ExitStack() as stack:
         instances = {
             name: stack.enter_context(running(component, log))
             for name, component in system.components.items()
@@ -86,7 +89,7 @@ def simulate(
             },
             messages=log.messages,
         )
-        _advance(system, plan, instances, columns, values, result, progress)
+        _advance(system, plan, instances, columns, values, result, progress, interrupts)
         return result
 
 
@@ -127,6 +130,10 @@ def _has_feedthrough(system: System, connection: Connection) -> bool:
 
 def _times(stop_time: float, step: float) -> np.ndarray:
     """t_k = k h, never accumulated; the stop time is the last."""
+    if stop_time / step > MOST_STEPS:
+        raise InputError(
+            f"{stop_time:g} s in steps of {step:g} s are more than {MOST_STEPS:,} steps"
+        )
     full_steps = floor(stop_time / step * (1.0 + ROUNDING))
     times = np.arange(full_steps + 1) * step
     if stop_time - times[-1] > ROUNDING * step:
@@ -218,6 +225,7 @@ def _advance(
     values: np.ndarray,
     result: Result,
     progress: bool,
+    interrupts: list[int],
 ) -> None:
     """Step to the end and fill the rows of the result; stop at the first failure."""
     stage_of = {name: i for i, names in enumerate(plan) for name in names}
@@ -231,16 +239,13 @@ def _advance(
     ]
     times = result.times.tolist()
     result.append(values)
-    with (
-        _held_interrupts() as interrupts,
-        tqdm(
-            total=times[-1],
-            unit="s",
-            delay=_PATIENCE,
-            disable=None if progress else True,
-            bar_format="{l_bar}{bar}| {n:.0f}/{total:.0f} s [{elapsed}<{remaining}]",
-        ) as bar,
-    ):
+    with tqdm(
+        total=times[-1],
+        unit="s",
+        delay=_PATIENCE,
+        disable=None if progress else True,
+        bar_format="{l_bar}{bar}| {n:.0f}/{total:.0f} s [{elapsed}<{remaining}]",
+    ) as bar:
         try:
             for k in range(len(times) - 1):
                 t = times[k]
@@ -268,7 +273,7 @@ def _advance(
 
 @contextmanager
 def _held_interrupts() -> Iterator[list[int]]:
-    """The interrupts (Ctrl-C) that have come, collected instead of raised.
+    """The signals to stop that have come (Ctrl-C among them), collected instead of raised.
 
     Python raises KeyboardInterrupt wherever it is, which may be inside an FMU: PythonFMU would
     then release its objects twice and crash the process.
@@ -277,11 +282,27 @@ def _held_interrupts() -> Iterator[list[int]]:
     if threading.current_thread() is not threading.main_thread():
         yield interrupts
         return
-    before = signal.signal(signal.SIGINT, lambda number, _: interrupts.append(number))
+    stops = [
+        getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+    ]
+    before = {
+        number: signal.signal(number, lambda number, _: interrupts.append(number))
+        for number in stops
+    }
     try:
         yield interrupts
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _explained(log: Log) -> Iterator[None]:
+    """An FMI call that fails before the first step, in the words of the FMU."""
+    try:
+        yield
+    except FMICallException as error:
+        raise InputError("; ".join(log.messages[-1:]) or str(error)) from error
 
 
 _Calls = tuple[list[Callable[[], Any]], Callable[[float, float, int], Any], list[Callable[[], Any]]]

@@ -9,10 +9,13 @@ import numpy as np
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import control_point
 from orchestrator.result import Result
-from orchestrator.system import PortName, System
+from orchestrator.system import PortName, System, typed
 
 ACTUATORS = ("u", "q", "r")
 AXES = ("x", "y", "z")
+
+#: What the control point follows from.
+POSTURE = tuple(f"plant.eta.{k}" for k in (*AXES, "phi", "theta", "psi"))
 
 #: T_L of section 4.2 [s].
 LAST_SECONDS = 5.0
@@ -38,21 +41,27 @@ def metrics(system: System, result: Result, scenario: str) -> dict[str, Any]:
     }
     if result.failure is not None:
         values["failure"] = result.failure
-    if result.computed > 1 and all(f"plant.tau_applied.{k}" in result for k in ACTUATORS):
+    limits = [f"plant.{limit}.{k}" for limit in ("tau_min", "tau_max") for k in ACTUATORS]
+    applied = [f"plant.{signal}.{k}" for signal in ("tau", "tau_applied") for k in ACTUATORS]
+    if result.computed > 1 and result.has(applied, limits):
         values.update(effort(result))
-    if all(f"planner.y_d.{k}" in result and f"plant.eta.{k}" in result for k in AXES):
+    if result.has([*(f"planner.y_d.{k}" for k in AXES), *POSTURE], ["plant.ell"]):
         values["final_error"] = final_error(result).tolist()
     return values
 
 
 def changed_parameters(system: System, result: Result) -> dict[str, Any]:
-    """Parameters whose value in the run differs from the FMU's default."""
+    """Parameters that differ from the FMU's defaults, and inputs that were set."""
     changed = {}
     for name, value in result.parameters.items():
         start = system.components[name.component].variables[name.port].start
         default = type(value)({"true": 1, "false": 0}.get(start, start))
         if value != default:
             changed[str(name)] = value
+    for name, value in system.parameters.items():
+        variable = system.components[name.component].variables[name.port]
+        if variable.causality == "input":
+            changed[str(name)] = typed(str(name), variable, value)
     return changed
 
 
@@ -84,7 +93,7 @@ def effort(result: Result) -> dict[str, list[float]]:
 def true_control_point(result: Result) -> np.ndarray:
     """Y without measurement noise: (9) on the plant's posture, (rows, 3) [m]."""
     ell = result.parameters[PortName("plant", "ell")]
-    posture = result.group(*(f"plant.eta.{k}" for k in (*AXES, "phi", "theta", "psi")))
+    posture = result.group(*POSTURE)
     return np.array(
         [
             control_point((x, y, z), rotation_from_euler(*euler), ell)

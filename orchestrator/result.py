@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from orchestrator.errors import InputError
 from orchestrator.system import PortName, System, port_name, typed
 
 
@@ -45,12 +46,21 @@ class Result:
     def __post_init__(self) -> None:
         """Make room for all rows."""
         # Memory is taken when a row is written, so a long run costs what it has computed.
-        self.rows = np.empty((len(self.times), 1 + len(self.columns)))
+        try:
+            self.rows = np.empty((len(self.times), 1 + len(self.columns)))
+        except MemoryError as error:
+            raise InputError(f"a table of {len(self.times)} rows does not fit: {error}") from error
         self._index = {name: i for i, name in enumerate(self.columns, start=1)}
 
     def __contains__(self, column: str) -> bool:
         """Whether there is a column `component.port`."""
         return column in self._index
+
+    def has(self, columns: Iterable[str], parameters: Iterable[str] = ()) -> bool:
+        """Whether all these columns and parameters, `component.name`, are there."""
+        return all(column in self for column in columns) and all(
+            port_name(parameter) in self.parameters for parameter in parameters
+        )
 
     def __getitem__(self, column: str) -> np.ndarray:
         """The computed values of one column."""

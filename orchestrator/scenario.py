@@ -85,13 +85,19 @@ def read_scenario(name: str) -> Scenario:
     for key, value in content.items():
         if key not in _ENTRIES:
             raise InputError(f"{path}: unknown entry {key!r}; use {', '.join(_ENTRIES)}")
-        if not isinstance(value, _ENTRIES[key]):
+        if not isinstance(value, _ENTRIES[key]) or isinstance(value, bool):
             raise InputError(f"{path}: {key} = {value!r} is of the wrong type")
+        if key in ("components", "wires", "only") and isinstance(value, (dict, list)):
+            texts = list(value.values()) if isinstance(value, dict) else value
+            if not all(isinstance(text, str) for text in texts):
+                raise InputError(f"{path}: {key} = {value!r} holds something else than names")
     content["parameters"] = dict(_flattened(content.get("parameters", {})))
     content["components"] = {
         component: str(path.parent / fmu) if str(fmu).endswith(".fmu") else str(fmu)
         for component, fmu in content.get("components", {}).items()
     }
+    if content.get("compare", "").endswith(".toml"):
+        content["compare"] = str(path.parent / content["compare"])
     return Scenario(path.stem, **content)
 
 

@@ -109,7 +109,13 @@ def _default_experiment(structure: Path) -> tuple[float | None, float | None]:
     algorithm = root.find(f".//{{{_OSP}}}FixedStepAlgorithm")
     stop_time = None if experiment is None else experiment.get("stopTime")
     step = None if algorithm is None else algorithm.get("baseStepSize")
-    return stop_time and float(stop_time), step and float(step)  # type: ignore[return-value]
+    try:
+        return (
+            None if stop_time is None else float(stop_time),
+            None if step is None else float(step),
+        )
+    except ValueError as error:
+        raise InputError(f"{STRUCTURE}: stop time {stop_time}, step {step}: {error}") from error
 
 
 def ssp_bytes(system: System) -> bytes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -161,12 +162,13 @@ class System:
             raise InputError(f"{source} -> {target}: {target} is a {b.causality}, not an input")
         if a.type != b.type or a.type == "String":
             raise InputError(f"{source} -> {target}: cannot feed {a.type} into {b.type}")
-        unit_a, unit_b = _unit(a), _unit(b)
+        unit_a, unit_b = unit_of(a), unit_of(b)
         if unit_a and unit_b and unit_a != unit_b:
             raise InputError(f"{source} -> {target}: units differ, {unit_a} and {unit_b}")
 
 
-def _unit(variable: ModelVariable) -> str | None:
+def unit_of(variable: ModelVariable) -> str | None:
+    """The unit of a variable, its own or that of its type."""
     declared = variable.declaredType
     unit: str | None = variable.unit or (declared.unit if declared is not None else None)
     return unit
@@ -191,19 +193,33 @@ def read_component(name: str, fmu: Path) -> Component:
     return Component(name, fmu, description)
 
 
+#: What FMI's Integers can hold.
+_INTEGERS = -(2**31), 2**31 - 1
+
+
 def typed(name: str, variable: ModelVariable, value: Any) -> Any:
     """A value, or its text from a command line or file, in the variable's type.
 
     Raises:
-        InputError: it is not of that type.
+        InputError: it is not of that type, not finite, or outside the range of the variable.
 
     """
     text = str(value).strip()
     try:
-        if variable.type == "Real":
-            return float(text)
         if variable.type == "Boolean":
             return {"true": True, "1": True, "false": False, "0": False}[text.lower()]
-        return text if variable.type == "String" else int(text)
+        if variable.type == "String":
+            return text
+        number = float(text) if variable.type == "Real" else int(text)
     except (KeyError, ValueError):
         raise InputError(f"{name} = {text}: not a {variable.type}") from None
+    if not isfinite(number):
+        raise InputError(f"{name} = {text}: must be finite")
+    lower, upper = variable.min, variable.max
+    if variable.type != "Real":
+        lower, upper = (_INTEGERS[0] if lower is None else lower), (upper or _INTEGERS[1])
+    if lower is not None and number < float(lower):
+        raise InputError(f"{name} = {text}: must be at least {lower}")
+    if upper is not None and number > float(upper):
+        raise InputError(f"{name} = {text}: must be at most {upper}")
+    return number

@@ -73,5 +73,6 @@ class AuvPlant(Component):
 
     def restore_hidden_state(self, hidden: Any) -> None:
         if hidden is not None:
-            self._random = Random()
-            self._random.setstate(hidden)
+            restored = Random()
+            restored.setstate(hidden)
+            self._random = restored

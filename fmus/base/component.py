@@ -4,8 +4,8 @@ PythonFMU turns a Python class into an FMU. What it leaves to the class is done 
 
 - Values live in one indexed store. A host that passes all inputs or all outputs of a component
   in one call, in their order, costs one comparison instead of one accessor a value.
-- No exception leaves a callback, not even an interrupt: PythonFMU would report fmi2Fatal and
-  release its objects twice. A refusal is logged, raises `fault`, and ends the next step with
+- No exception of the component leaves a callback: PythonFMU would report fmi2Fatal and release
+  its objects twice. A refusal is logged, raises `fault`, and ends the next step with
   fmi2Discard.
 - A step is a transaction: state and outputs change together, after everything was computed and
   found finite.
@@ -104,7 +104,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
         self._longest_step = 0.0
         self._fault = False
         self._refused: dict[str, str] = {}
-        self._last_message = ""
+        self._said: set[str] = set()
 
     def _references(self, causality: str, kind: str) -> list[int]:
         return [
@@ -115,17 +115,20 @@ class Component(Fmi2Slave):  # type: ignore[misc]
 
     # Faults and messages
 
-    def _report(self, message: str) -> None:
-        """Raise `fault` and log; a message that repeats itself is logged once."""
+    def _report(self, message: str, key: str | None = None) -> None:
+        """Raise `fault` and log."""
         self._fault = True
-        if message != self._last_message:
-            self._last_message = message
-            self.say(message, Fmi2Status.discard)
+        self.say(message, Fmi2Status.discard, key)
 
-    def say(self, message: str, status: Fmi2Status) -> None:
-        """Log a message; the host adds the name of the instance."""
-        # FMI defines a log message as a format: a host would take a % for a directive.
-        self.log(message.replace("%", "%%"), status)
+    def say(self, message: str, status: Fmi2Status, key: str | None = None) -> None:
+        """Log a message, the first time only that its key, or else its text, comes up.
+
+        The host adds the name of the instance.
+        """
+        if (key or message) not in self._said:
+            self._said.add(key or message)
+            # FMI defines a log message as a format: a host would take a % for a directive.
+            self.log(message.replace("%", "%%"), status)
 
     def _guarded(self, action: str, function: Callable[[], None]) -> bool:
         """Run a callback's body; whatever it raises is reported instead."""
@@ -186,14 +189,14 @@ class Component(Fmi2Slave):  # type: ignore[misc]
         is refused. After a refusal everything is as it was before the step.
         """
         try:
+            if self._refused or self._mode != _STEPPING:
+                raise Refusal("; ".join(self._refused.values()) or "not initialised")
             if 0.0 < step_size <= self._longest_step and isfinite(current_time):
                 n = 1
             else:
                 n = self._internal_steps(current_time, step_size)
                 if n == 0:
                     return True
-            if self._refused or self._mode != _STEPPING:
-                raise Refusal("; ".join(self._refused.values()) or "not initialised")
             state, outputs = self.advance(self._state, self._inputs, current_time, step_size / n, n)
             if not isfinite(sum(outputs)):
                 raise Refusal("an output is no longer finite")
@@ -201,7 +204,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
             self.sample(outputs)
         except BaseException as error:
             what = str(error) if isinstance(error, Refusal) else f"{type(error).__name__}: {error}"
-            self._report(f"step refused at t = {current_time:g} s: {what}")
+            self._report(f"step refused at t = {current_time:g} s: {what}", key=what)
             return False
         return True
 
@@ -349,20 +352,28 @@ class Component(Fmi2Slave):  # type: ignore[misc]
     def _restore(self, saved: dict[str, Any]) -> None:
         if saved.get("identity") != self._identity():
             raise Refusal(f"not a state of {self._identity()}")
-        parameters = dict(saved["parameters"])
-        state = saved["state"]
+        parameters, state = dict(saved["parameters"]), saved["state"]
+        inputs, outputs = ([float(x) for x in saved[key]] for key in ("inputs", "outputs"))
+        mode, start_time = str(saved["mode"]), float(saved["start_time"])
+        fault, refused = bool(saved["fault"]), dict(saved["refused"])
+        if (len(inputs), len(outputs), parameters.keys()) != (
+            len(self._inputs),
+            len(self._outputs),
+            self._parameters.keys(),
+        ):
+            raise Refusal("a state with other ports")
         if state is not None:
             state = self.state_type._make(_frozen(state))
-            self._configure(parameters)
-        self.restore_hidden_state(_frozen(saved["hidden"]))
-        self._parameters = parameters
-        self._state = state
-        self._inputs = list(saved["inputs"])
-        self._outputs = list(saved["outputs"])
-        self._mode = saved["mode"]
-        self._start_time = saved["start_time"]
-        self._fault = saved["fault"]
-        self._refused = dict(saved["refused"])
+            try:
+                self._configure(parameters)
+                self.restore_hidden_state(_frozen(saved["hidden"]))
+            except Exception:
+                self._configure(self._parameters)
+                raise
+        self._parameters, self._state = parameters, state
+        self._inputs, self._outputs = inputs, outputs
+        self._mode, self._start_time = mode, start_time
+        self._fault, self._refused = fault, refused
         self._stale = False
 
     @staticmethod

@@ -57,6 +57,7 @@ class ObserverController(Component):
                 f"observer restarted at t = {t:g} s: the measured position moved further than "
                 "innovation_gate",
                 Fmi2Status.warning,
+                key="observer restarted",
             )
         signals = output_feedback.evaluate(self._gains, credible, measurement)
         outputs = _seen(credible, signals)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from auv_fmu.control_point import actuated_velocity
-from auv_fmu.saturation import Integral
+from auv_fmu.observer import observer_velocity
+from auv_fmu.output_feedback import virtual_reference
+from auv_fmu.saturation import Integral, Saturation
 from auv_fmu.types import Rotation, Vector3
 from auv_fmu.vehicle import Vehicle
 
@@ -20,6 +22,24 @@ def kinetic(vehicle: Vehicle, rotation: Rotation, ell: float, r: Vector3) -> flo
     """
     u, q, s = actuated_velocity(rotation, ell, r, (0.0, 0.0))
     return 0.5 * (vehicle.m11 * u * u + vehicle.m55 * q * q + vehicle.m66 * s * s)
+
+
+def composite_errors(
+    dy: float, dy_d: float, e_z: float, dy_hat: float, z: float, lambda_: float, s: Saturation
+) -> tuple[float, float]:
+    """r_1 = dy/dt - dy_r/dt and r_2 = dy/dt - dy_o/dt, one axis: equations (17) and (19).
+
+    Args:
+        dy, dy_d, dy_hat: true, desired and estimated velocity of the control point [m/s].
+        e_z: e - z = y_hat - y_d [m].
+        z: estimation error that the observer has seen [m].
+        lambda_: diagonal entry of Lambda [m/s].
+        s: saturation function.
+
+    """
+    dy_r = virtual_reference(dy_d, s(e_z)[0], lambda_)
+    dy_o = observer_velocity(dy_hat, s(z)[0], lambda_)
+    return dy - dy_r, dy - dy_o
 
 
 def lyapunov(

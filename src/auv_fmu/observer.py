@@ -3,7 +3,7 @@
 All gain matrices of the paper are diagonal and its saturation functions act component by
 component, so the observer is written for one axis of the control point.
 
-The paper has two signals of almost the same name (reading 13): the state dy_hat_o of (23) and
+The paper has two signals of almost the same name (reading 15): the state dy_hat_o of (23) and
 (24), and dy_o of (18), which the control law and the proof use. They differ by k_d z.
 """
 

@@ -105,6 +105,18 @@ def gated(gains: Gains, state: ControllerState, y: Vector3) -> ControllerState:
     return ControllerState(y, _rest(gains, y, y), state.theta_hat)
 
 
+def virtual_reference(dy_d: float, s_ez: float, lambda_: float) -> float:
+    """dy_r/dt = dy_d/dt - Lambda s(e - z): equation (16), one axis.
+
+    Args:
+        dy_d: velocity of the reference [m/s].
+        s_ez: s(e - z) = s(y_hat - y_d).
+        lambda_: diagonal entry of Lambda [m/s].
+
+    """
+    return dy_d - lambda_ * s_ez
+
+
 def axis(
     y: float,
     y_hat: float,
@@ -138,7 +150,7 @@ def axis(
     s_z, _ = s(z)
     s_ez, slope_ez = s(y_hat - y_d)
     dy_hat = velocity_estimate(dy_hat_o, s_z, z, lambda_, k_d)
-    dy_r = dy_d - lambda_ * s_ez
+    dy_r = virtual_reference(dy_d, s_ez, lambda_)
     ddy_r = ddy_d - lambda_ * slope_ez * (dy_hat - dy_d)
     r_hat = dy_hat - dy_d + lambda_ * s_ez + lambda_ * s_z
     dy_o = observer_velocity(dy_hat, s_z, lambda_)

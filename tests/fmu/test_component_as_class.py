@@ -224,6 +224,27 @@ def test_step_before_the_initialisation_is_refused():
     assert slave.get_boolean([len(MotionPlanner.ports)]) == [True]
 
 
+def test_refusal_before_the_initialisation_says_why():
+    slave = AuvPlant(instance_name="under_test")
+    assert not slave.do_step(0.0, 0.02)
+    assert "not initialised" in slave.log_queue[0].msg
+
+
+@pytest.mark.parametrize("key", ["hidden", "inputs", "outputs", "parameters"])
+def test_state_that_is_refused_is_not_applied_in_part(key: str):
+    whole, other = Driver(AuvPlant), Driver(AuvPlant, m11=50.0)
+    whole.step(), other.step()
+    spoiled = {**other.slave._get_fmu_state(), key: {"m11": 50.0} if key == "parameters" else [1]}
+    whole.slave._set_fmu_state(spoiled)
+    assert whole.get("fault") is True
+    untouched = Driver(AuvPlant)
+    untouched.step()
+    for driver in (whole, untouched):
+        driver.excite(3)
+        assert driver.step()
+    assert whole.outputs() == untouched.outputs()
+
+
 def test_zero_step_changes_nothing(driver):
     driver.excite(1)
     driver.step()

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 from fmpy.util import read_csv
 
 from orchestrator.command_line import main
+from orchestrator.scenario import FOLDER as SCENARIOS
 
 
 @pytest.fixture
@@ -130,6 +133,51 @@ def test_gains_prints_both_sides_and_the_verdicts(workplace, capsys):
     assert "paper's own gains" not in shown
 
 
+def test_edited_copy_of_a_comparison_compares_like_with_like(workplace):
+    """Reference and stop time of the copy go for the companion as well."""
+    text = (SCENARIOS / "fig5.toml").read_text()
+    copy = text.replace("-30.0", "-60.0").replace("stop_time = 100.0", "stop_time = 0.5")
+    (workplace / "mine.toml").write_text(copy)
+    assert main(["run", "mine.toml"]) == 0
+    companion = json.loads((workplace / "results/mine/fig5-pd/metrics.json").read_text())
+    assert companion["parameters"]["planner.eta0.z"] == -60.0
+    assert companion["stop_time"] == 0.5
+
+
+def test_title_is_text_and_no_formula(workplace):
+    (workplace / "odd.toml").write_text("title = 'costs $x^{$'\nstop_time = 0.1")
+    assert main(["run", "odd.toml"]) == 0
+
+
+def test_inputs_that_were_set_are_on_record(workplace):
+    assert main(["run", "fig3a", "--stop-time", "0.1"]) == 0
+    values = json.loads((workplace / "results/fig3a/metrics.json").read_text())
+    assert values["parameters"]["plant.tau.u"] == 10.0
+
+
+def test_animation_of_a_failed_run_says_so(workplace, capsys):
+    arguments = ["animate", "fig4", "--set", "plant.d11=1e4", "--out", "failed.gif"]
+    assert main(arguments) == 1
+    assert "stopped at t =" in capsys.readouterr().err
+
+
+def test_termination_keeps_the_rows_and_leaves_nothing_behind(workplace):
+    """What a batch system sends to a job that has run too long."""
+    temporary = workplace / "temporary"
+    temporary.mkdir()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "orchestrator.command_line", "run", "fig4", "--step", "0.0005"],
+        env={**os.environ, "TMPDIR": str(temporary)}, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    time.sleep(3.0)
+    process.terminate()
+    _, error = process.communicate(timeout=120)
+    assert process.returncode == 1
+    assert "interrupted at t =" in error
+    assert len((workplace / "results/fig4/result.csv").read_text().splitlines()) > 10
+    assert list(temporary.iterdir()) == []
+
+
 def test_animation_is_written(workplace):
     assert main(["animate", "fig4", "--stop-time", "1", "--out", "films/fig4.gif"]) == 0
     assert (workplace / "films/fig4.gif").read_bytes().startswith(b"GIF89a")
@@ -154,6 +202,16 @@ def test_animation_is_written(workplace):
         (["run", "fig4", "--out", "file/below"], "--out"),
         (["build", "--out", "file/below"], "cannot build"),
         (["run", "wire.toml"], "controller has no inputs dy.*"),
+        (["run", "wires.toml"], "something else than names"),
+        (["run", "only.toml"], "no such component"),
+        (["run", "bool.toml"], "wrong type"),
+        (["run", "compare.toml"], "no scenario 'nosuch'"),
+        (["run", "fig4", "--stop-time", "1e300"], "steps"),
+        (["run", "fig4", "--step", "1e-300"], "steps"),
+        (["run", "fig4", "--set", "plant.noise.seed=4294967297"], "must be at most"),
+        (["run", "fig4", "--stop-time", "0.1", "--out", "taken"], "cannot write into"),
+        (["gains", "--set", "plant.ell=0"], "must be at least"),
+        (["gains", "--set", "controller.K1[1]=nan"], "must be finite"),
         (["run", "missing.toml"], "no such FMU"),
         (["gains", "--set", "controller.lambda=much"], "not a Real"),
         (["gains", "--set", "controller.saturation=sigmoid"], "use one of tanh, algebraic"),
@@ -168,6 +226,11 @@ def test_bad_input_is_one_line_and_status_2(workplace, capsys, arguments, reason
     (workplace / "broken.ssp").write_bytes(b"no archive")
     (workplace / "file").write_text("in the way")
     (workplace / "wire.toml").write_text('[wires]\n"controller.dy" = "plant.dy"')
+    (workplace / "wires.toml").write_text('[wires]\n"plant.tau" = 5')
+    (workplace / "only.toml").write_text('only = ["pilot"]')
+    (workplace / "bool.toml").write_text("stop_time = true")
+    (workplace / "compare.toml").write_text('stop_time = 0.1\ncompare = "nosuch"')
+    (workplace / "taken" / "result.csv").mkdir(parents=True)
     (workplace / "missing.toml").write_text('[components]\ncontroller = "missing.fmu"')
     assert main(arguments) == 2
     error = capsys.readouterr().err
