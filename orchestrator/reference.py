@@ -7,6 +7,8 @@ and `auv_ref.opt`, from a Jacobi run, which is what most tools do.
 
 from __future__ import annotations
 
+import csv
+import re
 from pathlib import Path
 
 import fmpy
@@ -17,10 +19,13 @@ from orchestrator import bundle
 from orchestrator.errors import InputError
 from orchestrator.master import ORDERS, simulate
 from orchestrator.result import Result
-from orchestrator.system import Component, System, read_component
+from orchestrator.system import Component, PortName, System, read_component
 
 #: Length of the reference runs [s] and their step [s].
 STOP_TIME, STEP = 4.0, 0.02
+
+#: What ecos puts behind a name.
+_KIND = re.compile(r"\[[A-Z]+\]$")
 
 #: Columns that name the time, in lower case.
 _TIME = ("time", "t")
@@ -115,13 +120,20 @@ def verify(path: Path, system: System, tolerance: float) -> str:
     stop_time = float(time[-1])
     if not stop_time > 0.0:
         raise InputError(f"{path}: the time does not advance")
+    outputs = {
+        str(PortName(component.name, variable.name))
+        for component in system.components.values()
+        for variable in component.description.modelVariables
+        if variable.causality == "output"
+    }
     complaints = []
     for order in ORDERS:
         ours = simulate(system, stop_time, system.step or STEP, order)
-        shared = {name: column for name, column in columns.items() if name in ours}
+        # Inputs are left out: tools write them before or after the exchange.
+        shared = {name: column for name, column in columns.items() if name in outputs}
         if not shared:
             raise InputError(
-                f"{path}: no column is named after a port; they are named as {ours.columns[0]}"
+                f"{path}: no column is named after an output; they are named as {min(outputs)}"
             )
         complaint = _first_difference(time, shared, ours, tolerance)
         if complaint is None:
@@ -131,22 +143,32 @@ def verify(path: Path, system: System, tolerance: float) -> str:
 
 
 def _read(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Time and all columns of numbers of a table, by the names of our ports."""
     try:
-        with path.open(encoding="utf-8") as file:
-            header = [name.strip().strip('"') for name in file.readline().split(",")]
-            lines = [line.replace("True", "1").replace("False", "0") for line in file]
-            table = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.empty((0, 0))
-    except (OSError, UnicodeDecodeError, ValueError) as error:
+        with path.open(encoding="utf-8", newline="") as file:
+            header, *rows = csv.reader(file, skipinitialspace=True)
+    except (OSError, UnicodeDecodeError, ValueError, csv.Error) as error:
         raise InputError(f"{path}: not a readable table: {error}") from error
-    if len(table) < 2 or table.shape[1] != len(header):
-        raise InputError(f"{path}: {len(table)} rows with {len(header)} names are no table")
-    index = next((i for i, name in enumerate(header) if name.lower() in _TIME), None)
-    if index is None:
-        raise InputError(f"{path}: no column is named time")
-    # Some tools write component::port, or put the name of the system before it.
-    names = [name.replace("::", ".").removeprefix("auv.") for name in header]
-    columns = {name: table[:, i] for i, name in enumerate(names) if i != index}
-    return table[:, index], columns
+    columns: dict[str, np.ndarray] = {}
+    for name, column in zip(header, zip(*rows, strict=False), strict=False):
+        try:
+            columns[_port_of(name)] = np.array([_number(text) for text in column])
+        except ValueError:
+            # Tools write text as well, parameters for example.
+            continue
+    time = next((columns[name] for name in columns if name.lower() in _TIME), None)
+    if time is None or len(time) < 2:
+        raise InputError(f"{path}: no column of numbers is named time")
+    return time, columns
+
+
+def _port_of(name: str) -> str:
+    """Our name of a column: some tools write component::port, [REAL] behind it, or the system's."""
+    return _KIND.sub("", name.strip()).replace("::", ".").removeprefix("auv.")
+
+
+def _number(text: str) -> float:
+    return float({"true": "1", "false": "0"}.get(text.strip().lower(), text))
 
 
 def _first_difference(

@@ -52,8 +52,8 @@ def test_table_of_another_tool_is_understood(system: System, tmp_path: Path):
     result = simulate(system, 2.0, 0.02, "jacobi")
     path = tmp_path / "theirs.csv"
     rows = zip(result.time[::5], result["plant.eta.x"][::5], strict=True)
-    lines = ['"Time","auv.plant::eta.x","controller.fault"']
-    lines += [f"{t!r},{x!r},False" for t, x in ((float(t), float(x)) for t, x in rows)]
+    lines = ['"Time", "auv.plant::eta.x[REAL]","controller.fault","controller.saturation"']
+    lines += [f"{t!r}, {x!r},False,tanh" for t, x in ((float(t), float(x)) for t, x in rows)]
     path.write_text("\n".join(lines))
     assert "2 ports agree over 2 s, in jacobi order" in verify(path, system, 1e-9)
 
@@ -70,12 +70,12 @@ def test_first_port_that_differs_is_named(system: System, tmp_path: Path):
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("", "no table"),
+        ("", "not a readable table"),
         ("time,plant.eta.x\n0,1\n1,nan\n", "differs first"),
-        ("time,depth\n0,1\n1,2\n", "no column is named after a port"),
-        ("clock,plant.eta.x\n0,1\n1,2\n", "no column is named time"),
+        ("time,depth\n0,1\n1,2\n", "no column is named after an output"),
+        ("clock,plant.eta.x\n0,1\n1,2\n", "no column of numbers is named time"),
         ("time,plant.eta.x\n0,1\n0,2\n", "does not advance"),
-        ("time,plant.eta.x\n0,one\n", "not a readable table"),
+        ("time,plant.eta.x\nzero,1\none,2\n", "no column of numbers is named time"),
     ],
 )
 def test_table_that_cannot_be_used_is_refused(system, tmp_path, text, reason):
