@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+import sys
+import sysconfig
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -9,7 +13,10 @@ import pytest
 
 from orchestrator import bundle
 from orchestrator.hosts import HOSTS, compare
+from orchestrator.reference import verify
 from orchestrator.scenario import read_scenario
+
+LIBDIR = sysconfig.get_config_var("LIBDIR")
 
 
 @pytest.mark.parametrize("scenario", ["fig4", "fig5-pd"])
@@ -34,3 +41,20 @@ def test_missing_host_is_reported_and_does_not_end_the_others(dist: Path, monkey
     verdicts = compare(system, ["ghost", "fmpy-ssp"], 50, 0.02)
     assert "not installed" in str(verdicts[0].failure)
     assert verdicts[1].failure is None
+
+
+@pytest.mark.skipif(find_spec("ecospy") is None, reason="ecospy is not installed")
+def test_ecos_command_line_runs_the_ssp_with_an_empty_environment(dist: Path, tmp_path: Path):
+    """A host that is no Python program; its table has six digits."""
+    [package] = getattr(find_spec("ecospy"), "submodule_search_locations", [])
+    command = tmp_path / "ecos"
+    shutil.copy(Path(package, "binaries", "ecos"), command)
+    command.chmod(0o755)
+    process = subprocess.run(
+        [command, "simulate", "--path", dist / "auv.ssp", "--stopTime", "5", "--stepSize", "0.02"],
+        cwd=tmp_path, env={"LD_LIBRARY_PATH": f"{sys.prefix}/lib:{LIBDIR}"},
+        check=False, capture_output=True, text=True,
+    )  # fmt: skip
+    assert process.returncode == 0, process.stdout + process.stderr
+    said = verify(tmp_path / "auv.csv", bundle.closed_loop(dist), 1e-5)
+    assert "agree over 5 s, in jacobi order" in said
