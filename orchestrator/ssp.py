@@ -176,7 +176,10 @@ def structure_xml(system: System) -> bytes:
     elements = ElementTree.SubElement(structure, _ssd("Elements"))
     for position, component in enumerate(system.components.values()):
         _add_component(elements, component, position, bool(system.parameters_of(component.name)))
-    connections = ElementTree.SubElement(structure, _ssd("Connections"))
+    # The schema has no empty list of connections.
+    connections = ElementTree.Element(_ssd("Connections"))
+    if system.connections:
+        structure.append(connections)
     for connection in system.connections:
         ElementTree.SubElement(
             connections,

@@ -15,6 +15,7 @@ from fmpy.util import read_csv
 
 from orchestrator.command_line import main
 from orchestrator.scenario import FOLDER as SCENARIOS
+from orchestrator.scenario import names
 
 
 @pytest.fixture
@@ -153,6 +154,20 @@ def test_inputs_that_were_set_are_on_record(workplace):
     assert main(["run", "fig3a", "--stop-time", "0.1"]) == 0
     values = json.loads((workplace / "results/fig3a/metrics.json").read_text())
     assert values["parameters"]["plant.tau.u"] == 10.0
+
+
+@pytest.mark.parametrize("scenario", names())
+def test_every_scenario_is_exported_and_runs_from_its_ssp(workplace, scenario):
+    """The same rows from the export as from the scenario itself."""
+    assert main(["export", scenario]) == 0
+    assert main(["export", scenario, "--format", "osp"]) == 0
+    folder = workplace / "exports" / scenario
+    assert {f"{scenario}.ssp", "OspSystemStructure.xml", "AuvPlant.fmu"} <= files(folder)
+    archive = str(folder / f"{scenario}.ssp")
+    assert main(["run", scenario, "--stop-time", "0.5", "--out", "direct"]) == 0
+    assert main(["run", archive, "--stop-time", "0.5", "--out", "exported"]) == 0
+    direct, exported = (Path(name, "result.csv").read_text() for name in ("direct", "exported"))
+    assert exported == direct
 
 
 def test_animation_of_a_failed_run_says_so(workplace, capsys):

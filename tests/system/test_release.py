@@ -9,6 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from orchestrator import bundle
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -37,6 +39,12 @@ def test_wheel_builds_the_bundle_and_runs_fig4_in_an_empty_folder(tmp_path: Path
     )  # fmt: skip
     assert (empty / "fmus/dist/auv.ssp").is_file()
     assert (empty / "results/fig4/fig4.png").is_file()
+
+
+def test_bundle_built_again_elsewhere_is_the_same_to_the_last_byte(dist: Path, tmp_path: Path):
+    bundle.build(tmp_path / "elsewhere")
+    again = {path.name: path.read_bytes() for path in (tmp_path / "elsewhere").iterdir()}
+    assert again == {path.name: path.read_bytes() for path in dist.iterdir()}
 
 
 def test_checksums_are_those_of_the_files(dist: Path):
