@@ -184,7 +184,12 @@ def test_termination_keeps_the_rows_and_leaves_nothing_behind(workplace):
         [sys.executable, "-m", "orchestrator.command_line", "run", "fig4", "--step", "0.0005"],
         env={**os.environ, "TMPDIR": str(temporary)}, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
-    time.sleep(3.0)
+    # Unpacked FMUs are the sign that the run has begun; a slow machine takes its time.
+    for _ in range(600):
+        if any(temporary.iterdir()):
+            break
+        time.sleep(0.1)
+    time.sleep(1.0)
     process.terminate()
     _, error = process.communicate(timeout=120)
     assert process.returncode == 1
