@@ -18,7 +18,7 @@ from typing import Any
 from tqdm import tqdm
 
 from orchestrator import bundle
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, last_line
 from orchestrator.scenario import FOLDER as SCENARIOS
 
 #: What a folder of results was computed from.
@@ -115,7 +115,6 @@ def _run(job: Job, folder: Path, sources: str) -> None:
         [*command, "--out", str(folder)], capture_output=True, text=True, check=False
     )
     if process.returncode != 0:
-        lines = process.stderr.strip().splitlines() or ["no reason given"]
-        raise InputError(f"{job.command}: {lines[-1]}")
+        raise InputError(f"{job.command}: {last_line(process.stderr)}")
     text = json.dumps(_stamp(job, sources))
     (folder / _STAMP).write_text(text + "\n", encoding="utf-8")

@@ -12,7 +12,7 @@ from typing import Any
 from uuid import uuid4
 
 from orchestrator.bill_of_materials import BILL, CHECKSUMS, bill, checksums
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, last_line
 from orchestrator.scenario import Scenario
 from orchestrator.ssp import ssp_bytes
 from orchestrator.system import Component, Connection, PortName, System, port_name, read_component
@@ -89,8 +89,7 @@ def run_fmus(module: str, folder: Path, *options: str) -> list[Path]:
         check=False,
     )
     if process.returncode != 0:
-        lines = process.stderr.strip().splitlines() or ["no reason given"]
-        raise InputError(lines[-1])
+        raise InputError(last_line(process.stderr))
     return [Path(line) for line in process.stdout.splitlines()]
 
 

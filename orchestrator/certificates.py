@@ -14,7 +14,7 @@ import numpy as np
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.lyapunov import composite_errors, lyapunov
 from auv_fmu.saturation import INTEGRALS, SATURATIONS
-from orchestrator.metrics import ACTUATORS, AXES, POSTURE, true_control_point
+from orchestrator.metrics import ACTUATORS, AXES, LIMITS, POSTURE, true_control_point
 from orchestrator.result import Result
 from orchestrator.system import PortName, System, unit_of
 from orchestrator.vehicle_parameters import VEHICLE_PARAMETERS, vehicle
@@ -68,9 +68,8 @@ def has_certificates(result: Result) -> bool:
     columns += [f"controller.tau.{k}" for k in ACTUATORS]
     gains = ["controller.lambda", "controller.saturation"]
     gains += [f"controller.K2[{i}]" for i in (1, 2, 3)]
-    limits = [f"plant.{limit}.{k}" for limit in ("tau_min", "tau_max") for k in ACTUATORS]
     vehicle_parameters = [f"plant.{name}" for name in (*VEHICLE_PARAMETERS, "ell")]
-    return result.has(columns, [*gains, *limits, *vehicle_parameters])
+    return result.has(columns, [*gains, *LIMITS, *vehicle_parameters])
 
 
 def certificates(result: Result) -> np.ndarray:

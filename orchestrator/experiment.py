@@ -143,6 +143,9 @@ def write(runs: list[Run], folder: Path) -> list[dict[str, Any]]:
     Returns:
         The metrics of each run.
 
+    Raises:
+        InputError: a file cannot be written.
+
     """
     try:
         return _write(runs, folder)

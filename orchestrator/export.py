@@ -12,9 +12,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 from xml.etree import ElementTree
 
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, last_line
 from orchestrator.ssp import ssp_bytes
-from orchestrator.system import System
+from orchestrator.system import System, literal
 
 _OSP = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
 
@@ -49,9 +49,8 @@ def export_osp(system: System, step: float, folder: Path) -> list[Path]:
             values = ElementTree.SubElement(simulator, "InitialValues")
             for name, value in parameters.items():
                 element = ElementTree.SubElement(values, "InitialValue", variable=name)
-                kind = component.variable(name).type
-                literal = str(value).lower() if kind == "Boolean" else str(value)
-                ElementTree.SubElement(element, kind, value=literal)
+                variable = component.variable(name)
+                ElementTree.SubElement(element, variable.type, value=literal(variable, value))
     connections = ElementTree.SubElement(root, "Connections")
     for connection in system.connections:
         element = ElementTree.SubElement(connections, "VariableConnection")
@@ -111,9 +110,9 @@ def export_container(system: System, step: float, folder: Path) -> list[Path]:
         )
         built = Path(work, f"{system.name}.fmu")
         if process.returncode != 0 or not built.is_file():
-            lines = (process.stderr + process.stdout).strip().splitlines() or ["no reason given"]
+            reason = last_line(process.stderr + process.stdout)
             raise InputError(
-                f"the container was not built: {lines[-1]}; it needs pip install 'auv-fmu[hosts]'"
+                f"the container was not built: {reason}; it needs pip install 'auv-fmu[hosts]'"
             )
         path = folder / built.name
         shutil.copyfile(built, path)

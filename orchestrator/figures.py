@@ -11,7 +11,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestrator.metrics import ACTUATORS, AXES, POSTURE, tracking_error, true_control_point
+from orchestrator.metrics import (
+    ACTUATORS,
+    AXES,
+    LIMITS,
+    POSTURE,
+    tracking_error,
+    true_control_point,
+)
 from orchestrator.result import Result
 from orchestrator.system import PortName
 
@@ -93,8 +100,7 @@ def is_drawable(kind: str, result: Result) -> bool:
     if not kind.startswith("open-loop"):
         needed += [f"planner.y_d.{k}" for k in AXES]
         needed += [f"controller.theta_hat[{i}]" for i in range(1, 5)]
-    limits = [f"plant.{limit}.{k}" for limit in ("tau_min", "tau_max") for k in ACTUATORS]
-    return result.computed > 1 and result.has(needed, ["plant.ell", *limits])
+    return result.computed > 1 and result.has(needed, ["plant.ell", *LIMITS])
 
 
 def _tracking(title: str, runs: Sequence[Drawn]) -> dict[str, Figure]:

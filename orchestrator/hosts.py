@@ -22,7 +22,7 @@ import fmpy
 import numpy as np
 from fmpy.ssp.simulation import simulate_ssp
 
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, last_line
 from orchestrator.export import export_container, export_osp, export_ssp
 from orchestrator.master import simulate
 from orchestrator.ssp import read_ssp
@@ -218,8 +218,8 @@ def _verdict(
         except subprocess.TimeoutExpired:
             return Verdict(host, labelled, failure=f"no end after {_TIMEOUT} s")
         if process.returncode != 0:
-            lines = process.stderr.strip().splitlines() or [f"exit status {process.returncode}"]
-            return Verdict(host, labelled, failure=lines[-1])
+            reason = last_line(process.stderr, f"exit status {process.returncode}")
+            return Verdict(host, labelled, failure=reason)
         with np.load(Path(folder, "rows.npz")) as content:
             rows, seconds = content["rows"], float(content["seconds"])
     if rows.shape != table.shape:

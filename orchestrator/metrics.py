@@ -17,6 +17,9 @@ AXES = ("x", "y", "z")
 #: What the control point follows from.
 POSTURE = tuple(f"plant.eta.{k}" for k in (*AXES, "phi", "theta", "psi"))
 
+#: The parameters of (3).
+LIMITS = tuple(f"plant.{limit}.{k}" for limit in ("tau_min", "tau_max") for k in ACTUATORS)
+
 #: T_L of section 4.2 [s].
 LAST_SECONDS = 5.0
 
@@ -41,9 +44,8 @@ def metrics(system: System, result: Result, scenario: str) -> dict[str, Any]:
     }
     if result.failure is not None:
         values["failure"] = result.failure
-    limits = [f"plant.{limit}.{k}" for limit in ("tau_min", "tau_max") for k in ACTUATORS]
     applied = [f"plant.{signal}.{k}" for signal in ("tau", "tau_applied") for k in ACTUATORS]
-    if result.computed > 1 and result.has(applied, limits):
+    if result.computed > 1 and result.has(applied, LIMITS):
         values.update(effort(result))
     if result.has([*(f"planner.y_d.{k}" for k in AXES), *POSTURE], ["plant.ell"]):
         values["final_error"] = final_error(result).tolist()

@@ -12,7 +12,15 @@ from zipfile import BadZipFile, ZipFile, ZipInfo
 from fmpy.ssp import ssd as fmpy_ssd
 
 from orchestrator.errors import InputError
-from orchestrator.system import Component, Connection, PortName, System, port_name, read_component
+from orchestrator.system import (
+    Component,
+    Connection,
+    PortName,
+    System,
+    literal,
+    port_name,
+    read_component,
+)
 
 STRUCTURE = "SystemStructure.ssd"
 
@@ -148,8 +156,9 @@ def parameter_set_xml(system: System, component: Component) -> bytes:
     for name, value in system.parameters_of(component.name).items():
         variable = component.variable(name)
         element = ElementTree.SubElement(parameters, f"{{{_SSV}}}Parameter", name=name)
-        literal = str(value).lower() if variable.type == "Boolean" else str(value)
-        ElementTree.SubElement(element, f"{{{_SSV}}}{variable.type}", value=literal)
+        ElementTree.SubElement(
+            element, f"{{{_SSV}}}{variable.type}", value=literal(variable, value)
+        )
     return _serialised(root)
 
 

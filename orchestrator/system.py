@@ -223,3 +223,8 @@ def typed(name: str, variable: ModelVariable, value: Any) -> Any:
     if upper is not None and number > float(upper):
         raise InputError(f"{name} = {text}: must be at most {upper}")
     return number
+
+
+def literal(variable: ModelVariable, value: Any) -> str:
+    """A value of a variable as XML writes it."""
+    return str(value).lower() if variable.type == "Boolean" else str(value)
