@@ -27,10 +27,10 @@ from unittest.mock import patch
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from orchestrator import bundle
-from orchestrator.instance import Instance
-from orchestrator.master import simulate
-from orchestrator.system import System
+from orchestrator.experiments import bundle
+from orchestrator.master.instance import Instance
+from orchestrator.master.simulation import simulate
+from orchestrator.system.structure import System
 from straight_line import STEP, closed_loop
 
 
@@ -71,7 +71,7 @@ def master_alone(system: System, steps: int) -> float:
 
     calls = ([nothing], nothing, [nothing])
     with (
-        patch("orchestrator.master._calls", lambda _: calls),
+        patch("orchestrator.master.simulation._calls", lambda _: calls),
         patch.object(Instance, "parameters", lambda _: {}),
     ):
         return loop_time(system, steps)

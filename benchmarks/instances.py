@@ -15,7 +15,7 @@ from time import perf_counter
 import fmpy
 from fmpy.fmi2 import FMU2Slave
 
-from orchestrator import bundle
+from orchestrator.experiments import bundle
 
 REPETITIONS = 200
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from orchestrator import bundle
+from orchestrator.experiments import bundle
 
 # A slow machine is no error, and what CI checks does not change from run to run.
 settings.register_profile("patient", deadline=None, derandomize="CI" in os.environ)

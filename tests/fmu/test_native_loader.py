@@ -11,7 +11,7 @@ import fmpy
 import pytest
 
 from fmus.loader import compiler
-from orchestrator import bundle
+from orchestrator.experiments import bundle
 
 NAMES = [
     "AuvPlant", "DisturbanceGenerator", "MotionPlanner", "ObserverController", "PdController",

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Slave
 
-from orchestrator import bundle
-from orchestrator.master import simulate
-from orchestrator.metrics import effort, final_error, tracking_error, true_control_point
-from orchestrator.result import Result
-from orchestrator.system import PortName, System
+from orchestrator.analysis.metrics import effort, final_error, tracking_error, true_control_point
+from orchestrator.experiments import bundle
+from orchestrator.master.result import Result
+from orchestrator.master.simulation import simulate
+from orchestrator.system.structure import PortName, System
 from straight_line import Instant, closed_loop
 
 STEPS = 5000

@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 from fmpy.util import read_csv
 
-from orchestrator.command_line import main
-from orchestrator.scenario import FOLDER as SCENARIOS
-from orchestrator.scenario import names
+from orchestrator.commands.main import main
+from orchestrator.experiments.scenario import FOLDER as SCENARIOS
+from orchestrator.experiments.scenario import names
 
 
 @pytest.fixture
@@ -181,7 +181,7 @@ def test_termination_keeps_the_rows_and_leaves_nothing_behind(workplace):
     temporary = workplace / "temporary"
     temporary.mkdir()
     process = subprocess.Popen(
-        [sys.executable, "-m", "orchestrator.command_line", "run", "fig4", "--step", "0.0005"],
+        [sys.executable, "-m", "orchestrator.commands.main", "run", "fig4", "--step", "0.0005"],
         env={**os.environ, "TMPDIR": str(temporary)}, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     # Unpacked FMUs are the sign that the run has begun; a slow machine takes its time.

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import bundle
-from orchestrator.hosts import HOSTS, compare
-from orchestrator.reference import verify
-from orchestrator.scenario import read_scenario
+from orchestrator.exchange.hosts import HOSTS, compare
+from orchestrator.exchange.reference import verify
+from orchestrator.experiments import bundle
+from orchestrator.experiments.scenario import read_scenario
 
 LIBDIR = sysconfig.get_config_var("LIBDIR")
 

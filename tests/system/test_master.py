@@ -16,11 +16,11 @@ import pytest
 from fmpy.ssp.ssd import read_ssd
 from fmpy.util import read_csv
 
-from orchestrator import bundle
 from orchestrator.errors import InputError
-from orchestrator.master import simulate, stages
-from orchestrator.ssp import read_ssp, ssp_bytes
-from orchestrator.system import Connection, PortName, System, read_component
+from orchestrator.experiments import bundle
+from orchestrator.master.simulation import simulate, stages
+from orchestrator.system.ssp import read_ssp, ssp_bytes
+from orchestrator.system.structure import Connection, PortName, System, read_component
 
 
 def port(text: str) -> PortName:

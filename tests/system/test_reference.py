@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from fmpy.util import read_csv, read_ref_opt_file
 
-from orchestrator import bundle
 from orchestrator.errors import InputError
-from orchestrator.master import simulate
-from orchestrator.reference import reference_outputs, verify
-from orchestrator.system import System, read_component
+from orchestrator.exchange.reference import reference_outputs, verify
+from orchestrator.experiments import bundle
+from orchestrator.master.simulation import simulate
+from orchestrator.system.structure import System, read_component
 
 COMMITTED = Path(__file__).parents[2] / "reference"
 NAMES = ["AuvPlant", "DisturbanceGenerator", "MotionPlanner", "ObserverController", "PdController"]

@@ -9,7 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from orchestrator import bundle
+from orchestrator.experiments import bundle
 
 ROOT = Path(__file__).parents[2]
 
@@ -32,7 +32,7 @@ def test_wheel_builds_the_bundle_and_runs_fig4_in_an_empty_folder(tmp_path: Path
         env=environment, cwd=empty, check=True, capture_output=True, text=True,
     )  # fmt: skip
     assert where.stdout.startswith(str(packages))
-    command = [sys.executable, "-P", "-m", "orchestrator.command_line", "run", "fig4"]
+    command = [sys.executable, "-P", "-m", "orchestrator.commands.main", "run", "fig4"]
     subprocess.run(
         [*command, "--stop-time", "1"],
         env=environment, cwd=empty, check=True, capture_output=True,

@@ -10,20 +10,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator import bundle
-from orchestrator.certificates import COLUMNS, certificates, velocities_reaching
-from orchestrator.master import simulate
-from orchestrator.metrics import effort, final_error, tracking_error
-from orchestrator.published import (
+from orchestrator.analysis.certificates import COLUMNS, certificates, velocities_reaching
+from orchestrator.analysis.metrics import effort, final_error, tracking_error
+from orchestrator.experiments import bundle
+from orchestrator.experiments.scenario import names, read_scenario
+from orchestrator.master.result import Result
+from orchestrator.master.simulation import simulate
+from orchestrator.paper.published import (
     EFFORT_PD,
     EFFORT_PROPOSED,
     TURNING_RADIUS,
     total_variation_until,
     turning_radius,
 )
-from orchestrator.result import Result
-from orchestrator.scenario import names, read_scenario
-from orchestrator.system import PortName, System
+from orchestrator.system.structure import PortName, System
 
 Runner = Callable[..., Result]
 

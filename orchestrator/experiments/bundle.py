@@ -11,11 +11,18 @@ from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
-from orchestrator.bill_of_materials import BILL, CHECKSUMS, bill, checksums
 from orchestrator.errors import InputError, last_line
-from orchestrator.scenario import Scenario
-from orchestrator.ssp import ssp_bytes
-from orchestrator.system import Component, Connection, PortName, System, port_name, read_component
+from orchestrator.experiments.bill_of_materials import BILL, CHECKSUMS, bill, checksums
+from orchestrator.experiments.scenario import Scenario
+from orchestrator.system.ssp import ssp_bytes
+from orchestrator.system.structure import (
+    Component,
+    Connection,
+    PortName,
+    System,
+    port_name,
+    read_component,
+)
 
 #: Where the bundle is built unless another folder is named.
 DEFAULT_FOLDER = Path("fmus", "dist")

@@ -7,10 +7,10 @@ from typing import Any
 
 from auv_fmu.gain_conditions import Bounds, Condition, bounds, conditions
 from auv_fmu.saturation import MAXIMUM_SLOPE
-from orchestrator import bundle
+from orchestrator.analysis.vehicle_parameters import vehicle
 from orchestrator.errors import InputError
-from orchestrator.system import PortName, System, typed
-from orchestrator.vehicle_parameters import vehicle
+from orchestrator.experiments import bundle
+from orchestrator.system.structure import PortName, System, typed
 
 #: What the paper says of these conditions, in Remark 4, and what they leave open.
 _NOTE = """\

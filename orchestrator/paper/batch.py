@@ -17,9 +17,9 @@ from typing import Any
 
 from tqdm import tqdm
 
-from orchestrator import bundle
 from orchestrator.errors import InputError, last_line
-from orchestrator.scenario import FOLDER as SCENARIOS
+from orchestrator.experiments import bundle
+from orchestrator.experiments.scenario import FOLDER as SCENARIOS
 
 #: What a folder of results was computed from.
 _STAMP = "run.json"
@@ -87,8 +87,8 @@ def _sources() -> str:
     digest.update(sys.version.encode())
     for name in ("fmpy", "matplotlib", "numpy", "pythonfmu"):
         digest.update(version(name).encode())
-    package = Path(__file__).parent
-    for path in sorted([*package.glob("*.py"), *package.glob("*.toml"), *SCENARIOS.iterdir()]):
+    package = Path(__file__).parents[1]
+    for path in sorted([*package.rglob("*.py"), *package.rglob("*.toml"), *SCENARIOS.iterdir()]):
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()
@@ -110,7 +110,7 @@ def _is_finished(job: Job, folder: Path, sources: str) -> bool:
 
 def _run(job: Job, folder: Path, sources: str) -> None:
     (folder / _STAMP).unlink(missing_ok=True)
-    command = [sys.executable, "-P", "-m", "orchestrator.command_line", "run", *job.arguments]
+    command = [sys.executable, "-P", "-m", "orchestrator.commands.main", "run", *job.arguments]
     process = subprocess.run(
         [*command, "--out", str(folder)], capture_output=True, text=True, check=False
     )

@@ -8,8 +8,8 @@ import numpy as np
 
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import control_point
-from orchestrator.result import Result
-from orchestrator.system import PortName, System, typed
+from orchestrator.master.result import Result
+from orchestrator.system.structure import PortName, System, typed
 
 ACTUATORS = ("u", "q", "r")
 AXES = ("x", "y", "z")

@@ -1,7 +1,7 @@
 """Other co-simulation tools as hosts of the bundle, held against our own Jacobi master.
 
-Every host runs in a process of its own, `python -m orchestrator.hosts HOST FOLDER STEPS STEP`: some
-leave threads behind or end the process when something is wrong.
+Every host runs in a process of its own, `python -m orchestrator.exchange.hosts HOST FOLDER STEPS
+STEP`: some leave threads behind or end the process when something is wrong.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ import numpy as np
 from fmpy.ssp.simulation import simulate_ssp
 
 from orchestrator.errors import InputError, last_line
-from orchestrator.export import export_container, export_osp, export_ssp
-from orchestrator.master import simulate
-from orchestrator.ssp import read_ssp
-from orchestrator.system import System
+from orchestrator.exchange.export import export_container, export_osp, export_ssp
+from orchestrator.master.simulation import simulate
+from orchestrator.system.ssp import read_ssp
+from orchestrator.system.structure import System
 
 #: How long a host may take for a run before it is given up [s].
 _TIMEOUT = 300
@@ -206,7 +206,15 @@ def _verdict(
         return Verdict(host, package, failure="not installed: pip install 'auv-fmu[hosts]'")
     with TemporaryDirectory(prefix="auvfmu") as folder:
         export_ssp(replace(system, name="given"), step, Path(folder))
-        command = [sys.executable, "-P", "-m", "orchestrator.hosts", host, folder, str(steps)]
+        command = [
+            sys.executable,
+            "-P",
+            "-m",
+            "orchestrator.exchange.hosts",
+            host,
+            folder,
+            str(steps),
+        ]
         try:
             process = subprocess.run(
                 [*command, str(step)],

@@ -14,10 +14,10 @@ import numpy as np
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.lyapunov import composite_errors, lyapunov
 from auv_fmu.saturation import INTEGRALS, SATURATIONS
-from orchestrator.metrics import ACTUATORS, AXES, LIMITS, POSTURE, true_control_point
-from orchestrator.result import Result
-from orchestrator.system import PortName, System, unit_of
-from orchestrator.vehicle_parameters import VEHICLE_PARAMETERS, vehicle
+from orchestrator.analysis.metrics import ACTUATORS, AXES, LIMITS, POSTURE, true_control_point
+from orchestrator.analysis.vehicle_parameters import VEHICLE_PARAMETERS, vehicle
+from orchestrator.master.result import Result
+from orchestrator.system.structure import PortName, System, unit_of
 
 #: Units of a velocity at a port.
 _VELOCITY_UNITS = {"m/s", "rad/s"}

@@ -28,7 +28,7 @@ from fmpy.logging import addLoggerProxy
 from fmpy.model_description import ModelVariable
 
 from orchestrator.errors import InputError
-from orchestrator.system import Component, typed
+from orchestrator.system.structure import Component, typed
 
 #: Kinds of values that can be connected and recorded.
 KINDS = ("Real", "Integer", "Boolean")

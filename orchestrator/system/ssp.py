@@ -12,7 +12,7 @@ from zipfile import BadZipFile, ZipFile, ZipInfo
 from fmpy.ssp import ssd as fmpy_ssd
 
 from orchestrator.errors import InputError
-from orchestrator.system import (
+from orchestrator.system.structure import (
     Component,
     Connection,
     PortName,

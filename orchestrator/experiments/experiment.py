@@ -11,16 +11,20 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from orchestrator import bundle
-from orchestrator.certificates import has_certificates, velocities_reaching, write_certificates
+from orchestrator.analysis.certificates import (
+    has_certificates,
+    velocities_reaching,
+    write_certificates,
+)
+from orchestrator.analysis.figures import FIGURES, Drawn, draw, is_drawable
+from orchestrator.analysis.metrics import metrics
 from orchestrator.errors import InputError
-from orchestrator.figures import FIGURES, Drawn, draw, is_drawable
-from orchestrator.master import ORDERS, simulate
-from orchestrator.metrics import metrics
-from orchestrator.result import Result
-from orchestrator.scenario import Scenario, read_scenario
-from orchestrator.ssp import read_ssp
-from orchestrator.system import PortName, System
+from orchestrator.experiments import bundle
+from orchestrator.experiments.scenario import Scenario, read_scenario
+from orchestrator.master.result import Result
+from orchestrator.master.simulation import ORDERS, simulate
+from orchestrator.system.ssp import read_ssp
+from orchestrator.system.structure import PortName, System
 
 #: Communication step of the paper [s], for systems that name none.
 DEFAULT_STEP = 0.02

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestrator.metrics import (
+from orchestrator.analysis.metrics import (
     ACTUATORS,
     AXES,
     LIMITS,
@@ -19,8 +19,8 @@ from orchestrator.metrics import (
     tracking_error,
     true_control_point,
 )
-from orchestrator.result import Result
-from orchestrator.system import PortName
+from orchestrator.master.result import Result
+from orchestrator.system.structure import PortName
 
 #: Okabe and Ito's colours, which stay apart for colour-blind eyes, darkest first; every line
 #: also has a style of its own, for print.

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import InputError
-from orchestrator.system import PortName, port_name
+from orchestrator.system.structure import PortName, port_name
 
 FOLDER = Path(__file__).parent / "scenarios"
 
@@ -22,7 +22,7 @@ class Scenario:
         name: of the file, without its ending.
         title: heading of the figures.
         label: of its lines where two runs are drawn together.
-        figure: which figure to draw, a key of `orchestrator.figures.FIGURES`.
+        figure: which figure to draw, a key of `orchestrator.analysis.figures.FIGURES`.
         compare: name of a scenario that is run and drawn together with this one.
         stop_time, step: experiment [s]; None: the system's own.
         components: FMUs that take the place of those of the closed loop: names of the bundle's

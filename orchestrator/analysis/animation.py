@@ -11,10 +11,10 @@ from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.figure import Figure
 
 from auv_fmu.attitude import rotation_from_euler
+from orchestrator.analysis.figures import COLOURS, SETTINGS
+from orchestrator.analysis.metrics import AXES, true_control_point
 from orchestrator.errors import InputError
-from orchestrator.figures import COLOURS, SETTINGS
-from orchestrator.metrics import AXES, true_control_point
-from orchestrator.result import Result
+from orchestrator.master.result import Result
 
 FRAMES_PER_SECOND = 20
 

@@ -15,11 +15,11 @@ import fmpy
 import numpy as np
 from fmpy.util import write_csv
 
-from orchestrator import bundle
 from orchestrator.errors import InputError
-from orchestrator.master import ORDERS, simulate
-from orchestrator.result import Result
-from orchestrator.system import Component, PortName, System, read_component
+from orchestrator.experiments import bundle
+from orchestrator.master.result import Result
+from orchestrator.master.simulation import ORDERS, simulate
+from orchestrator.system.structure import Component, PortName, System, read_component
 
 #: Length of the reference runs [s] and their step [s].
 STOP_TIME, STEP = 4.0, 0.02

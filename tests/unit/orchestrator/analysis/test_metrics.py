@@ -5,9 +5,9 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from orchestrator.metrics import effort, final_error
-from orchestrator.result import Result
-from orchestrator.system import PortName
+from orchestrator.analysis.metrics import effort, final_error
+from orchestrator.master.result import Result
+from orchestrator.system.structure import PortName
 
 
 def result_of(**columns: np.ndarray) -> Result:

@@ -24,9 +24,9 @@ from fmpy.fmi1 import FMICallException
 from tqdm import tqdm
 
 from orchestrator.errors import InputError
-from orchestrator.instance import KINDS, Block, Instance, Log, initialise, running
-from orchestrator.result import Result
-from orchestrator.system import Connection, PortName, System
+from orchestrator.master.instance import KINDS, Block, Instance, Log, initialise, running
+from orchestrator.master.result import Result
+from orchestrator.system.structure import Connection, PortName, System
 
 ORDERS = ("gauss-seidel", "jacobi")
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.errors import InputError
-from orchestrator.system import PortName, System, port_name, typed
+from orchestrator.system.structure import PortName, System, port_name, typed
 
 
 @dataclass

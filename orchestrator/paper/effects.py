@@ -10,12 +10,20 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestrator.certificates import COLUMNS
-from orchestrator.figures import COLOURS, SETTINGS, STYLES, Drawn, draw_commands, draw_errors, save
-from orchestrator.metrics import ACTUATORS
-from orchestrator.published import NOISE_LEVELS
-from orchestrator.result import Result
-from orchestrator.system import PortName
+from orchestrator.analysis.certificates import COLUMNS
+from orchestrator.analysis.figures import (
+    COLOURS,
+    SETTINGS,
+    STYLES,
+    Drawn,
+    draw_commands,
+    draw_errors,
+    save,
+)
+from orchestrator.analysis.metrics import ACTUATORS
+from orchestrator.master.result import Result
+from orchestrator.paper.published import NOISE_LEVELS
+from orchestrator.system.structure import PortName
 
 
 def draw_effects(

@@ -11,10 +11,15 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from orchestrator import bundle, gains
-from orchestrator.animation import animate, check_format
+from orchestrator.analysis import gains
+from orchestrator.analysis.animation import animate, check_format
+from orchestrator.analysis.figures import is_drawable
 from orchestrator.errors import InputError
-from orchestrator.experiment import (
+from orchestrator.exchange.export import FORMATS
+from orchestrator.exchange.hosts import HOSTS, compare
+from orchestrator.exchange.reference import verify, write_reference
+from orchestrator.experiments import bundle
+from orchestrator.experiments.experiment import (
     DEFAULT_STEP,
     Request,
     Run,
@@ -23,14 +28,10 @@ from orchestrator.experiment import (
     perform,
     write,
 )
-from orchestrator.export import FORMATS
-from orchestrator.figures import is_drawable
-from orchestrator.hosts import HOSTS, compare
-from orchestrator.master import ORDERS
-from orchestrator.reference import verify, write_reference
-from orchestrator.report import write_report
-from orchestrator.scenario import names, read_scenario
-from orchestrator.system import PortName, port_name
+from orchestrator.experiments.scenario import names, read_scenario
+from orchestrator.master.simulation import ORDERS
+from orchestrator.paper.report import write_report
+from orchestrator.system.structure import PortName, port_name
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 

@@ -13,8 +13,8 @@ from typing import Any
 from xml.etree import ElementTree
 
 from orchestrator.errors import InputError, last_line
-from orchestrator.ssp import ssp_bytes
-from orchestrator.system import System, literal
+from orchestrator.system.ssp import ssp_bytes
+from orchestrator.system.structure import System, literal
 
 _OSP = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
 

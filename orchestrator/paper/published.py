@@ -13,9 +13,9 @@ from auv_fmu.gain_conditions import bounds, conditions
 from auv_fmu.output_feedback import Gains
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from auv_fmu.vehicle import Vehicle
-from orchestrator.batch import Job
-from orchestrator.metrics import ACTUATORS, tracking_error
-from orchestrator.result import Result
+from orchestrator.analysis.metrics import ACTUATORS, tracking_error
+from orchestrator.master.result import Result
+from orchestrator.paper.batch import Job
 
 #: Control efforts of section 4.2, in the order u, q, r, and e_f, in the order x, y, z [m].
 EFFORT_PROPOSED, EFFORT_PD = (130.0, 40.0, 53.0), (235.0, 163.0, 172.0)

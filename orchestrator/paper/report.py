@@ -14,13 +14,14 @@ from typing import Any
 
 from markdown_it import MarkdownIt
 
-from orchestrator import bundle, gains
-from orchestrator.batch import Job, run_all
-from orchestrator.effects import draw_effects
-from orchestrator.metrics import ACTUATORS
-from orchestrator.published import VARIANTS, Row, numbers, rows
-from orchestrator.result import Result, read_result
-from orchestrator.scenario import FOLDER, names, read_scenario
+from orchestrator.analysis import gains
+from orchestrator.analysis.metrics import ACTUATORS
+from orchestrator.experiments import bundle
+from orchestrator.experiments.scenario import FOLDER, names, read_scenario
+from orchestrator.master.result import Result, read_result
+from orchestrator.paper.batch import Job, run_all
+from orchestrator.paper.effects import draw_effects
+from orchestrator.paper.published import VARIANTS, Row, numbers, rows
 
 _PAGE = Path(__file__).with_name("report.html")
 

@@ -1,0 +1,1 @@
+"""The loop's signals: indices, certificates, gains, figures, film."""

@@ -1,0 +1,1 @@
+"""Other tools: exports, hosts, reference results."""

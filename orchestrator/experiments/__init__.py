@@ -1,0 +1,1 @@
+"""Scenarios, wiring, bundle, one run and its files."""

@@ -1,0 +1,1 @@
+"""How a system is stepped: instances, order, loop, table."""
