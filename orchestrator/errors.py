@@ -1,11 +1,31 @@
 """What can go wrong, in words for the user."""
 
+from __future__ import annotations
 
-class InputError(Exception):
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class InputError(ValueError):
     """The user asked for something that cannot be done; the text says what to change."""
+
+
+def reason(error: BaseException) -> str:
+    """All that an exception says, in one line."""
+    return "; ".join(line.strip() for line in str(error).splitlines() if line.strip()) or repr(
+        error
+    )
 
 
 def last_line(text: str, otherwise: str = "no reason given") -> str:
     """The last line of what a child process has said: the reason why it failed."""
     lines = text.strip().splitlines()
     return lines[-1] if lines else otherwise
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """A hint at names that resemble a mistaken one, or begin with it; empty if there is none."""
+    names = list(known)
+    members = [other for other in names if other.startswith((f"{name}[", f"{name}."))]
+    near = members[:3] or get_close_matches(name, names, n=3)
+    return f"; did you mean {' or '.join(near)}?" if near else ""

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 
 from auv_fmu.attitude import rotation_from_euler
 from orchestrator.analysis.figures import COLOURS, SETTINGS
-from orchestrator.analysis.metrics import AXES, true_control_point
+from orchestrator.analysis.signals import ATTITUDE, Y_D, true_control_point
 from orchestrator.errors import InputError
-from orchestrator.master.result import Result
+from orchestrator.master.table import Table
 
 FRAMES_PER_SECOND = 20
 
@@ -39,7 +39,7 @@ def check_format(path: Path) -> None:
         raise InputError(f"{path}: an .mp4 needs ffmpeg, which is not installed; write a .gif")
 
 
-def animate(title: str, result: Result, path: Path) -> None:
+def animate(title: str, result: Table, path: Path) -> None:
     """Write a film of a run.
 
     Args:
@@ -60,14 +60,14 @@ def animate(title: str, result: Result, path: Path) -> None:
             raise InputError(f"cannot write {path}: {error}") from error
 
 
-def _film(title: str, result: Result) -> FuncAnimation:
+def _film(title: str, result: Table) -> FuncAnimation:
     frames = int(_DURATION * FRAMES_PER_SECOND)
     rows = np.linspace(0, len(result.time) - 1, frames).astype(int)
     y = true_control_point(result)
-    euler = result.group(*(f"plant.eta.{k}" for k in ("phi", "theta", "psi")))
+    euler = result.group(*ATTITUDE)
     paths = [y]
     if "planner.y_d.x" in result:
-        paths.append(result.group(*(f"planner.y_d.{k}" for k in AXES)))
+        paths.append(result.group(*Y_D))
     lower, upper = np.min(np.vstack(paths), axis=0), np.max(np.vstack(paths), axis=0)
     size = _VEHICLE_SIZE * float((upper - lower).max())
     figure = Figure(figsize=(7, 6))

@@ -8,19 +8,40 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.lyapunov import composite_errors, lyapunov
 from auv_fmu.saturation import INTEGRALS, SATURATIONS
-from orchestrator.analysis.metrics import ACTUATORS, AXES, LIMITS, POSTURE, true_control_point
-from orchestrator.analysis.vehicle_parameters import VEHICLE_PARAMETERS, vehicle
-from orchestrator.master.result import Result
-from orchestrator.system.structure import PortName, System, unit_of
+from orchestrator.analysis.signals import (
+    ACTUATORS,
+    ATTITUDE,
+    AXES,
+    DY,
+    DY_HAT,
+    ELL,
+    LIMITS,
+    POSTURE,
+    SEEN_DY_D,
+    SEEN_Y_D,
+    TAU,
+    VEHICLE,
+    Y_HAT,
+    Z,
+    limits,
+    parameter,
+    true_control_point,
+    vehicle,
+)
+from orchestrator.master.observer import Ending, Header
+from orchestrator.master.selection import Every
+from orchestrator.master.table import Table
+from orchestrator.system.names import port_name
 
-#: Units of a velocity at a port.
-_VELOCITY_UNITS = {"m/s", "rad/s"}
+_K2 = ("controller.K2[1]", "controller.K2[2]", "controller.K2[3]")
+_LAMBDA, _SATURATION = "controller.lambda", "controller.saturation"
 
 COLUMNS = (
     "time",
@@ -31,90 +52,39 @@ COLUMNS = (
 )
 
 
-def velocities_reaching(system: System, component: str = "controller") -> list[str]:
-    """Velocities of the vehicle that reach a component, directly or through others.
-
-    The vehicle is what the component feeds. Follows the connections upstream and stops there.
-    Empty for a controller without velocity sensors.
-    """
-    vehicles = {
-        connection.target.component
-        for connection in system.connections
-        if connection.source.component == component
-    }
-    found, seen, waiting = [], {component}, [component]
-    while waiting:
-        name = waiting.pop()
-        for connection in system.connections:
-            source = connection.source
-            if connection.target.component != name:
-                continue
-            if source.component in vehicles:
-                variable = system.components[source.component].variable(source.port)
-                if unit_of(variable) in _VELOCITY_UNITS:
-                    found.append(str(source))
-            elif source.component not in seen:
-                seen.add(source.component)
-                waiting.append(source.component)
-    return sorted(set(found))
+def missing_for_certificates(table: Table) -> list[str]:
+    """Ports and parameters of the proposed controller and the plant that a run does not have."""
+    columns = (*POSTURE, *DY, *SEEN_Y_D, *SEEN_DY_D, *Y_HAT, *DY_HAT, *Z, *TAU)
+    return table.missing(columns, (*_K2, _LAMBDA, _SATURATION, *LIMITS, *VEHICLE, ELL))
 
 
-def has_certificates(result: Result) -> bool:
-    """Whether the run has the ports and parameters of the proposed controller and the plant."""
-    columns = [*POSTURE, *(f"plant.dy.{k}" for k in AXES)]
-    columns += [
-        f"controller.{group}.{k}" for group in ("y_d", "dy_d", "y_hat", "dy_hat", "z") for k in AXES
-    ]
-    columns += [f"controller.tau.{k}" for k in ACTUATORS]
-    gains = ["controller.lambda", "controller.saturation"]
-    gains += [f"controller.K2[{i}]" for i in (1, 2, 3)]
-    vehicle_parameters = [f"plant.{name}" for name in (*VEHICLE_PARAMETERS, "ell")]
-    return result.has(columns, [*gains, *LIMITS, *vehicle_parameters])
-
-
-def certificates(result: Result) -> np.ndarray:
+def certificates(table: Table) -> np.ndarray:
     """Table with :data:`COLUMNS`, one row for each instant at which the controller was evaluated.
 
     V is (34), or (55) for another saturation function, without its term in theta - theta_hat:
     theta is unknown. r_1 is (17), r_2 is (19). The margin is the distance of a command from its
     nearer limit, negative beyond it.
     """
-    return np.array(list(_rows(result)))
+    return _certificates(table.header, table.rows[:-1], table.rows[1:])
 
 
-def _rows(result: Result) -> Iterator[list[float]]:
-    def parameter(name: str) -> float:
-        value: float = result.parameters[PortName("plant", name)]
-        return value
+def _certificates(header: Header, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Certificates of some steps, from the rows at their starts and at their ends."""
+    return np.array(list(_rows(Table.of(header, starts), Table.of(header, ends))))
 
-    def gain(name: str) -> float:
-        value: float = result.parameters[PortName("controller", name)]
-        return value
 
-    plant = vehicle(parameter)
-    ell, lambda_ = parameter("ell"), gain("lambda")
-    K2 = (gain("K2[1]"), gain("K2[2]"), gain("K2[3]"))
-    name = str(result.parameters[PortName("controller", "saturation")])
+def _rows(start: Table, end: Table) -> Iterator[list[float]]:
+    plant = vehicle(lambda name: parameter(start, name))
+    ell, lambda_ = parameter(start, ELL), parameter(start, _LAMBDA)
+    K2 = (parameter(start, _K2[0]), parameter(start, _K2[1]), parameter(start, _K2[2]))
+    name = str(start.parameters[port_name(_SATURATION)])
     s, integral = SATURATIONS[name], INTEGRALS[name]
-    lower = np.array([parameter(f"tau_min.{k}") for k in ACTUATORS])
-    upper = np.array([parameter(f"tau_max.{k}") for k in ACTUATORS])
+    lower, upper = limits(start)
 
-    # A row holds the controller's values of the beginning of its step: the plant's of the row
-    # before.
-    y = true_control_point(result)[:-1]
-    dy = result.group(*(f"plant.dy.{k}" for k in AXES))[:-1]
-    euler = result.group(*(f"plant.eta.{k}" for k in ("phi", "theta", "psi")))[:-1]
-    y_d, dy_d, y_hat, dy_hat, z_measured, tau = (
-        result.group(*(f"{group}.{k}" for k in members))[1:]
-        for group, members in (
-            ("controller.y_d", AXES),
-            ("controller.dy_d", AXES),
-            ("controller.y_hat", AXES),
-            ("controller.dy_hat", AXES),
-            ("controller.z", AXES),
-            ("controller.tau", ACTUATORS),
-        )
-    )
+    y, dy, euler = true_control_point(start), start.group(*DY), start.group(*ATTITUDE)
+    # The controller is sampled: the row at the end of a step has its values of the start.
+    y_d, dy_d, y_hat, dy_hat = (end.group(*g) for g in (SEEN_Y_D, SEEN_DY_D, Y_HAT, DY_HAT))
+    z_measured, tau = end.group(*Z), end.group(*TAU)
 
     def errors(i: int, k: int) -> tuple[float, float]:
         return composite_errors(
@@ -129,7 +99,7 @@ def _rows(result: Result) -> Iterator[list[float]]:
 
     e, z = y - y_d, y - y_hat
     margin = np.minimum(upper - tau, tau - lower)
-    for i, t in enumerate(result.time[:-1].tolist()):
+    for i, t in enumerate(start.time.tolist()):
         r_1, r_2 = zip(*(errors(i, k) for k in range(3)), strict=True)
         V = lyapunov(
             plant,
@@ -145,9 +115,45 @@ def _rows(result: Result) -> Iterator[list[float]]:
         yield [t, V, *r_1, *r_2, *margin[i]]
 
 
-def write_certificates(result: Result, path: Path) -> None:
-    """Write the table as CSV."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        writer.writerows(certificates(result).tolist())
+class CertificatesFile:
+    """An observer that writes the table as CSV, if the run has what it takes."""
+
+    def __init__(self, path: Path, interval: float | None = None) -> None:
+        """Write into a file, which is made when there is something to write.
+
+        Args:
+            path: of the file.
+            interval: an instant is written for each of these [s]; None: all.
+
+        """
+        self._path = path
+        self._every = None if interval is None else Every(interval)
+        self._file: Any = None
+
+    def begin(self, header: Header) -> None:
+        """Find out whether there will be certificates."""
+        self._header = header
+        self._last = np.empty((0, 1 + len(header.columns)))
+        self._is_possible = not missing_for_certificates(Table.of(header, self._last))
+
+    def take(self, rows: np.ndarray) -> None:
+        """Write the certificates of the steps that end at these rows."""
+        if not self._is_possible:
+            return
+        rows = np.vstack((self._last, rows))
+        self._last = rows[-1:]
+        starts, ends = rows[:-1], rows[1:]
+        if self._every is not None and len(starts):
+            chosen = self._every.chosen(starts[:, 0])
+            starts, ends = starts[chosen], ends[chosen]
+        if len(starts):
+            if self._file is None:
+                self._file = self._path.open("w", newline="", encoding="utf-8")
+                self._writer = csv.writer(self._file, lineterminator="\n")
+                self._writer.writerow(COLUMNS)
+            self._writer.writerows(_certificates(self._header, starts, ends).tolist())
+
+    def end(self, ending: Ending) -> None:
+        """Close the file."""
+        if self._file is not None:
+            self._file.close()

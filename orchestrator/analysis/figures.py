@@ -11,16 +11,21 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestrator.analysis.metrics import (
+from orchestrator.analysis.signals import (
     ACTUATORS,
     AXES,
+    COMMANDED,
+    ELL,
     LIMITS,
+    NU,
     POSTURE,
+    THETA_HAT,
+    Y_D,
+    parameter,
     tracking_error,
     true_control_point,
 )
-from orchestrator.master.result import Result
-from orchestrator.system.structure import PortName
+from orchestrator.master.table import Table
 
 #: Okabe and Ito's colours, which stay apart for colour-blind eyes, darkest first; every line
 #: also has a style of its own, for print.
@@ -56,11 +61,11 @@ class Drawn(NamedTuple):
     """A run in a figure."""
 
     label: str
-    result: Result
+    result: Table
 
 
-def draw(kind: str, title: str, runs: Sequence[Drawn], folder: Path, stem: str) -> list[Path]:
-    """Draw the figures of a scenario, as PNG and SVG.
+def draw(kind: str, title: str, runs: Sequence[Drawn], folder: Path, stem: str) -> list[str]:
+    """Draw the figures of a scenario, as PNG and SVG, as far as the runs have what they show.
 
     Args:
         kind: key of :data:`FIGURES`.
@@ -70,19 +75,19 @@ def draw(kind: str, title: str, runs: Sequence[Drawn], folder: Path, stem: str) 
         stem: of the file names.
 
     Returns:
-        The files written.
+        What was left out, and why.
 
     """
-    written = []
+    for run in runs:
+        if missing := missing_for(kind, run.result):
+            return [f"no figure: the run has no {missing[0]}"]
     # A title is text, and no formula.
     title = title.replace("$", r"\$")
     with mpl.rc_context(SETTINGS):
         for suffix, figure in FIGURES[kind](title, runs).items():
             for ending in ("png", "svg"):
-                path = folder / f"{stem}{suffix}.{ending}"
-                save(figure, path)
-                written.append(path)
-    return written
+                save(figure, folder / f"{stem}{suffix}.{ending}")
+    return []
 
 
 def save(figure: Figure, path: Path) -> None:
@@ -90,17 +95,12 @@ def save(figure: Figure, path: Path) -> None:
     figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else {"Software": None})
 
 
-def is_drawable(kind: str, result: Result) -> bool:
-    """Whether a run has the ports of a figure: a user's own system may have others."""
-    needed = [
-        *POSTURE,
-        *(f"plant.nu.{k}" for k in "uvwpqr"),
-        *(f"plant.tau.{k}" for k in ACTUATORS),
-    ]
+def missing_for(kind: str, result: Table) -> list[str]:
+    """Ports and parameters that a run lacks for a figure: a user's own system may have others."""
+    needed = [*POSTURE, *NU, *COMMANDED]
     if not kind.startswith("open-loop"):
-        needed += [f"planner.y_d.{k}" for k in AXES]
-        needed += [f"controller.theta_hat[{i}]" for i in range(1, 5)]
-    return result.computed > 1 and result.has(needed, ["plant.ell", *LIMITS])
+        needed += [*Y_D, *THETA_HAT]
+    return result.missing(needed, [ELL, *LIMITS]) or ["step"] * (len(result) < 2)
 
 
 def _tracking(title: str, runs: Sequence[Drawn]) -> dict[str, Figure]:
@@ -164,15 +164,12 @@ def draw_lines(
     axes.legend(ncols=len(labels), fontsize="small")
 
 
-def _limits(result: Result, k: str) -> tuple[float, float]:
-    lower, upper = (
-        float(result.parameters[PortName("plant", f"{limit}.{k}")])
-        for limit in ("tau_min", "tau_max")
-    )
+def _limits(result: Table, k: str) -> tuple[float, float]:
+    lower, upper = (parameter(result, f"plant.{limit}.{k}") for limit in ("tau_min", "tau_max"))
     return lower, upper
 
 
-def _draw_controls(axes: Axes, result: Result) -> None:
+def _draw_controls(axes: Axes, result: Table) -> None:
     commands = result.group(*(f"plant.tau.{k}" for k in ACTUATORS))
     # A row holds the command of the step that ends there: drawn from where it began.
     draw_lines(axes, result.time[:-1], commands[1:], _ACTUATOR_LABELS, _NOISY)
@@ -184,7 +181,7 @@ def _draw_controls(axes: Axes, result: Result) -> None:
     axes.legend(ncols=4, fontsize="small", loc="lower right", bbox_to_anchor=(1, 0.08))
 
 
-def _velocity(title: str, result: Result) -> Figure:
+def _velocity(title: str, result: Table) -> Figure:
     """True and estimated velocity of the control point, and their difference."""
     # The controller's row holds what it estimated at the beginning of the step.
     time = result.time[:-1]
@@ -204,7 +201,7 @@ def _velocity(title: str, result: Result) -> Figure:
     return figure
 
 
-def _acceleration(result: Result, *members: str) -> np.ndarray:
+def _acceleration(result: Table, *members: str) -> np.ndarray:
     """D nu/dt as the plant's Euler scheme has it: the difference over the step."""
     nu = result.group(*(f"plant.nu.{k}" for k in members))
     rate: np.ndarray = np.diff(nu, axis=0) / np.diff(result.time)[:, np.newaxis]

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from auv_fmu.gain_conditions import Bounds, Condition, bounds, conditions
 from auv_fmu.saturation import MAXIMUM_SLOPE
-from orchestrator.analysis.vehicle_parameters import vehicle
+from orchestrator.analysis.signals import ELL, vehicle
 from orchestrator.errors import InputError
-from orchestrator.experiments import bundle
-from orchestrator.system.structure import PortName, System, typed
+from orchestrator.system.names import port_name
+from orchestrator.system.structure import System
 
 #: What the paper says of these conditions, in Remark 4, and what they leave open.
 _NOTE = """\
@@ -26,51 +25,38 @@ def evaluate(system: System) -> tuple[Bounds, tuple[Condition, ...]]:
     """Bounds of the vehicle and conditions on the gains, from the parameters of a system.
 
     Raises:
-        InputError: a parameter does not exist, is of the wrong type, or belongs to neither the
-            plant nor the controller.
+        InputError: a parameter does not exist or cannot be set.
 
     """
     system.check()
 
-    def value(component: str, name: str) -> Any:
-        variable = system.component(component).variable(name)
-        port = PortName(component, name)
-        return typed(str(port), variable, system.parameters.get(port, variable.start))
+    def value(name: str) -> Any:
+        return system.value(port_name(name))
 
-    saturation = value("controller", "saturation")
+    saturation = value("controller.saturation")
     if saturation not in MAXIMUM_SLOPE:
         raise InputError(
             f"controller.saturation = {saturation}: use one of {', '.join(MAXIMUM_SLOPE)}"
         )
-    plant = vehicle(lambda name: float(value("plant", name)))
-    known = bounds(plant, value("plant", "ell"))
-    K1, K2 = (
-        (
-            value("controller", f"{K}[1]"),
-            value("controller", f"{K}[2]"),
-            value("controller", f"{K}[3]"),
-        )
-        for K in ("K1", "K2")
-    )
+    known = bounds(vehicle(value), value(ELL))
+    K1, K2 = (tuple(value(f"controller.{K}[{i}]") for i in range(1, 4)) for K in ("K1", "K2"))
     return known, conditions(
         known,
         K1,
         K2,
-        value("controller", "lambda"),
-        value("controller", "k_d"),
+        value("controller.lambda"),
+        value("controller.k_d"),
         MAXIMUM_SLOPE[saturation],
     )
 
 
-def check(changes: Mapping[PortName, Any]) -> str:
-    """The conditions in words and numbers, for the paper's gains with some changes.
+def check(system: System) -> str:
+    """The conditions in words and numbers, for the parameters of a system.
 
     Raises:
-        InputError: a parameter does not exist or is of the wrong type.
+        InputError: a parameter does not exist or cannot be set.
 
     """
-    bundle.build(bundle.DEFAULT_FOLDER)
-    system = bundle.closed_loop(bundle.DEFAULT_FOLDER).with_parameters(changes)
     known, found = evaluate(system)
     lines = [
         "over all attitudes:",
@@ -85,6 +71,6 @@ def check(changes: Mapping[PortName, Any]) -> str:
             f"  {condition.left:.6g} > {condition.right:.6g}{rest}: {condition.verdict}",
         ]
     lines += ["", _NOTE]
-    if not changes:
+    if not system.parameters:
         lines += ["", _PAPER]
     return "\n".join(lines)

@@ -1,1 +1,14 @@
-"""The command line."""
+"""The command line `auv-fmu`, a file a group of commands.
+
+==================  ==================================================================
+module              commands
+==================  ==================================================================
+:mod:`.main`        the parser and the exit status
+:mod:`.options`     options that several commands have
+:mod:`.build`       build, list, gains
+:mod:`.run`         run, animate
+:mod:`.exchange`    export, hosts, verify
+:mod:`.upkeep`      reference, docs: files of this repository
+:mod:`.paper`       report
+==================  ==================================================================
+"""

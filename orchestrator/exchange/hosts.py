@@ -23,9 +23,13 @@ import numpy as np
 from fmpy.ssp.simulation import simulate_ssp
 
 from orchestrator.errors import InputError, last_line
-from orchestrator.exchange.export import export_container, export_osp, export_ssp
+from orchestrator.master.experiment import Experiment
 from orchestrator.master.simulation import simulate
-from orchestrator.system.ssp import read_ssp
+from orchestrator.master.table import Table
+from orchestrator.system.container import write_container
+from orchestrator.system.osp import write_osp
+from orchestrator.system.ssp.reading import read_ssp
+from orchestrator.system.ssp.writing import write_ssp
 from orchestrator.system.structure import System
 
 #: How long a host may take for a run before it is given up [s].
@@ -110,14 +114,14 @@ def _quiet_libcosim() -> Any:
 def _libcosim_ssp(
     system: System, folder: Path, steps: int, step: float
 ) -> tuple[np.ndarray, float]:
-    [path] = export_ssp(system, step, folder)
+    [path] = write_ssp(system, folder)
     return _libcosim(system, folder, steps, _quiet_libcosim().from_ssp_file(ssp_path=str(path)))
 
 
 def _libcosim_osp(
     system: System, folder: Path, steps: int, step: float
 ) -> tuple[np.ndarray, float]:
-    export_osp(system, step, folder)
+    write_osp(system, folder)
     return _libcosim(
         system, folder, steps, _quiet_libcosim().from_osp_config_file(osp_path=str(folder))
     )
@@ -128,7 +132,7 @@ def _ecos(system: System, folder: Path, steps: int, step: float) -> tuple[np.nda
     for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
         ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
     ecospy = importlib.import_module("ecospy")
-    [path] = export_ssp(system, step, folder)
+    [path] = write_ssp(system, folder)
     names = [f"{component}::{port}" for component, port, _ in real_outputs(system)]
     with ecospy.EcosSimulation(step_size=step, ssp_path=str(path)) as simulation:
         if any(system.parameters_of(name) for name in system.components):
@@ -145,7 +149,7 @@ def _ecos(system: System, folder: Path, steps: int, step: float) -> tuple[np.nda
 
 def _fmpy_ssp(system: System, folder: Path, steps: int, step: float) -> tuple[np.ndarray, float]:
     # fmpy.ssp ignores parameter bindings and Boolean connectors without a start value.
-    [path] = export_ssp(replace(system, parameters={}), step, folder)
+    [path] = write_ssp(replace(system, parameters={}), folder)
     start = perf_counter()
     # It accumulates its time, so the last step may be there or not: ask for half a step more.
     table = simulate_ssp(str(path), stop_time=(steps + 0.5) * step, step_size=step)
@@ -155,7 +159,7 @@ def _fmpy_ssp(system: System, folder: Path, steps: int, step: float) -> tuple[np
 
 
 def _container(system: System, folder: Path, steps: int, step: float) -> tuple[np.ndarray, float]:
-    [path] = export_container(system, step, folder)
+    [path] = write_container(system, folder)
     start = perf_counter()
     table = fmpy.simulate_fmu(
         str(path), stop_time=steps * step, step_size=step, output_interval=step
@@ -190,7 +194,8 @@ def compare(system: System, hosts: Sequence[str], steps: int, step: float) -> li
         step: communication step [s].
 
     """
-    expected = simulate(system, steps * step, step, "jacobi")
+    expected = Table()
+    simulate(system, Experiment(steps * step, step, "jacobi"), [expected])
     names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
     table = expected.group(*names)[1:]
     return [_verdict(system, host, steps, step, names, table) for host in hosts]
@@ -205,7 +210,7 @@ def _verdict(
     except PackageNotFoundError:
         return Verdict(host, package, failure="not installed: pip install 'auv-fmu[hosts]'")
     with TemporaryDirectory(prefix="auvfmu") as folder:
-        export_ssp(replace(system, name="given"), step, Path(folder))
+        write_ssp(replace(system, name="given", step=step), Path(folder))
         command = [
             sys.executable,
             "-P",
@@ -247,8 +252,7 @@ def _verdict(
 
 
 def _child(host: str, folder: Path, steps: int, step: float) -> None:
-    unpacked = folder / "unpacked"
-    system = read_ssp(folder / "given.ssp", unpacked)
+    system = read_ssp(folder / "given.ssp")
     export = folder / "export"
     export.mkdir()
     rows, seconds = HOSTS[host].run(replace(system, name="auv"), export, steps, step)

@@ -7,33 +7,25 @@ and `auv_ref.opt`, from a Jacobi run, which is what most tools do.
 
 from __future__ import annotations
 
-import csv
-import re
 from pathlib import Path
 
 import fmpy
 import numpy as np
 from fmpy.util import write_csv
 
-from orchestrator.errors import InputError
-from orchestrator.experiments import bundle
-from orchestrator.master.result import Result
-from orchestrator.master.simulation import ORDERS, simulate
-from orchestrator.system.structure import Component, PortName, System, read_component
+from orchestrator.experiments.wiring import closed_loop
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.files import CsvFile
+from orchestrator.master.simulation import simulate
+from orchestrator.system.component import Component, read_component
 
 #: Length of the reference runs [s] and their step [s].
 STOP_TIME, STEP = 4.0, 0.02
 
-#: What ecos puts behind a name.
-_KIND = re.compile(r"\[[A-Z]+\]$")
-
-#: Columns that name the time, in lower case.
-_TIME = ("time", "t")
-
 
 def reference_inputs(component: Component) -> np.ndarray:
     """Inputs without special values: a sine of its own for each, small enough for the gate."""
-    names = [v.name for v in component.description.modelVariables if v.causality == "input"]
+    names = [variable.name for variable in component.having("input")]
     time = np.arange(round(STOP_TIME / STEP) + 1) * STEP
     table = np.zeros(len(time), dtype=[(name, np.float64) for name in ("time", *names)])
     table["time"] = time
@@ -44,11 +36,7 @@ def reference_inputs(component: Component) -> np.ndarray:
 
 def reference_outputs(component: Component, inputs: np.ndarray) -> np.ndarray:
     """Outputs of an FMU that runs alone with these inputs, by fmpy."""
-    names = [
-        v.name
-        for v in component.description.modelVariables
-        if v.causality == "output" and v.type == "Real"
-    ]
+    names = [variable.name for variable in component.having("output") if variable.type == "Real"]
     table: np.ndarray = fmpy.simulate_fmu(
         str(component.fmu),
         stop_time=STOP_TIME,
@@ -82,9 +70,9 @@ def write_reference(dist: Path, folder: Path) -> list[Path]:
                 written.append(stem.with_name(f"{stem.name}{suffix}.csv"))
                 write_csv(written[-1], table)
         written.append(_write_options(stem))
-    result = simulate(bundle.closed_loop(dist), STOP_TIME, STEP, "jacobi")
     written.append(folder / "auv_ref.csv")
-    result.write_csv(written[-1])
+    jacobi = Experiment(STOP_TIME, STEP, "jacobi")
+    simulate(closed_loop(dist), jacobi, [CsvFile(written[-1])])
     written.append(_write_options(folder / "auv"))
     return written
 
@@ -97,94 +85,3 @@ def _write_options(stem: Path) -> Path:
         encoding="utf-8",
     )
     return path
-
-
-def verify(path: Path, system: System, tolerance: float) -> str:
-    """Compare a table from any tool with our own runs of the same system.
-
-    Args:
-        path: CSV with a time column and columns named after our ports.
-        system: that the tool has run.
-        tolerance: largest difference that is accepted, relative to the larger of one and the
-            largest magnitude of the port.
-
-    Returns:
-        What agrees, and with which order of evaluation.
-
-    Raises:
-        InputError: the file cannot be read, has no column of ours, or differs in both orders; the
-            text names the port that differs first.
-
-    """
-    time, columns = _read(path)
-    stop_time = float(time[-1])
-    if not stop_time > 0.0:
-        raise InputError(f"{path}: the time does not advance")
-    outputs = {
-        str(PortName(component.name, variable.name))
-        for component in system.components.values()
-        for variable in component.description.modelVariables
-        if variable.causality == "output"
-    }
-    complaints = []
-    for order in ORDERS:
-        ours = simulate(system, stop_time, system.step or STEP, order)
-        # Inputs are left out: tools write them before or after the exchange.
-        shared = {name: column for name, column in columns.items() if name in outputs}
-        if not shared:
-            raise InputError(
-                f"{path}: no column is named after an output; they are named as {min(outputs)}"
-            )
-        complaint = _first_difference(time, shared, ours, tolerance)
-        if complaint is None:
-            return f"{len(shared)} ports agree over {stop_time:g} s, in {order} order"
-        complaints.append(f"in {order} order {complaint}")
-    raise InputError(f"{path}: {'; '.join(complaints)}")
-
-
-def _read(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Time and all columns of numbers of a table, by the names of our ports."""
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            header, *rows = csv.reader(file, skipinitialspace=True)
-    except (OSError, UnicodeDecodeError, ValueError, csv.Error) as error:
-        raise InputError(f"{path}: not a readable table: {error}") from error
-    columns: dict[str, np.ndarray] = {}
-    for name, column in zip(header, zip(*rows, strict=False), strict=False):
-        try:
-            columns[_port_of(name)] = np.array([_number(text) for text in column])
-        except ValueError:
-            # Tools write text as well, parameters for example.
-            continue
-    time = next((columns[name] for name in columns if name.lower() in _TIME), None)
-    if time is None or len(time) < 2:
-        raise InputError(f"{path}: no column of numbers is named time")
-    return time, columns
-
-
-def _port_of(name: str) -> str:
-    """Our name of a column: some tools write component::port, [REAL] behind it, or the system's."""
-    return _KIND.sub("", name.strip()).replace("::", ".").removeprefix("auv.")
-
-
-def _number(text: str) -> float:
-    return float({"true": "1", "false": "0"}.get(text.strip().lower(), text))
-
-
-def _first_difference(
-    time: np.ndarray, columns: dict[str, np.ndarray], ours: Result, tolerance: float
-) -> str | None:
-    first: tuple[float, str, float, float] | None = None
-    for name, column in columns.items():
-        expected = np.interp(time, ours.time, ours[name])
-        accepted = tolerance * max(1.0, float(np.abs(expected).max()))
-        # A value that is no number differs.
-        # What is shown before the first step depends on how a tool exchanges initial values.
-        wrong = np.flatnonzero(~(np.abs(column - expected) <= accepted) & (time > 0.0))
-        if len(wrong) and (first is None or time[wrong[0]] < first[0]):
-            k = wrong[0]
-            first = float(time[k]), name, float(column[k]), float(expected[k])
-    if first is None:
-        return None
-    t, name, theirs, mine = first
-    return f"{name} differs first, at t = {t:g} s: {theirs:.9g} instead of {mine:.9g}"

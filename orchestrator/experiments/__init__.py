@@ -1,1 +1,17 @@
-"""Scenarios, wiring, bundle, one run and its files."""
+"""Scenarios, the wiring of the closed loop, the bundle, and one run with its files.
+
+========================  ============================================================
+module                    what it holds
+========================  ============================================================
+:mod:`.scenario`          scenario files
+:mod:`.wiring`            which FMUs there are, and which ports feed which
+:mod:`.bundle`            the FMUs and auv.ssp, built when missing or stale
+:mod:`.bill_of_materials` checksums and packages of the bundle
+:mod:`.experiment`        from a name to what is run
+:mod:`.run`               a run with its files, as the command line makes it
+:mod:`.folder`            a folder of results that changes all at once
+:mod:`.record`            run.json
+:mod:`.stored`            results read from their folders
+:mod:`.result`            a run from Python: `simulate` and `Result`
+========================  ============================================================
+"""

@@ -1,36 +1,37 @@
-"""The bundle: every FMU and the SSP of the closed loop, built when missing or stale."""
+"""The bundle: every FMU and the SSP of the closed loop, built when missing or stale.
+
+`auv-fmu build` writes it where the user wants it. Runs use FMUs of their own in the user's cache
+folder, one folder for each version of the sources, so that nothing appears where they are called.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import subprocess
 import sys
-import tomllib
-from collections.abc import Mapping
+from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from shutil import rmtree
+from tempfile import mkdtemp
 from uuid import uuid4
 
-from orchestrator.errors import InputError, last_line
-from orchestrator.experiments.bill_of_materials import BILL, CHECKSUMS, bill, checksums
-from orchestrator.experiments.scenario import Scenario
-from orchestrator.system.ssp import ssp_bytes
-from orchestrator.system.structure import (
-    Component,
-    Connection,
-    PortName,
-    System,
-    port_name,
-    read_component,
-)
+from platformdirs import user_cache_path
 
-#: Where the bundle is built unless another folder is named.
+from orchestrator.errors import InputError, last_line, reason
+from orchestrator.experiments.bill_of_materials import BILL, CHECKSUMS, bill, checksums
+from orchestrator.experiments.wiring import closed_loop
+from orchestrator.system.ssp.writing import ssp_bytes
+
+#: Where `auv-fmu build` writes unless another folder is named.
 DEFAULT_FOLDER = Path("fmus", "dist")
 
 #: The archive of the closed loop, and what the FMUs beside it were built from.
 ARCHIVE, MANIFEST = "auv.ssp", "build.json"
 
-_WIRING = Path(__file__).parent / "closed_loop.toml"
+#: Packages that the FMUs are made of.
+_SOURCES = ("auv_fmu", "fmus", "pythonfmu")
 
 
 def build(folder: Path, loader: str | None = None) -> list[Path]:
@@ -100,69 +101,48 @@ def run_fmus(module: str, folder: Path, *options: str) -> list[Path]:
     return [Path(line) for line in process.stdout.splitlines()]
 
 
-def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
-    """The wiring of the closed loop over the FMUs in a folder.
-
-    Args:
-        folder: with the built FMUs.
-        scenario: whose components, wires and parameters change it; None: the closed loop as is.
+@cache
+def current_fmus() -> Path:
+    """The folder with the FMUs of the installed sources, built if it is not there.
 
     Raises:
-        InputError: a component or group of ports that the scenario names does not exist.
+        InputError: they cannot be built, or the cache folder cannot be written.
 
     """
-    wiring = tomllib.loads(_WIRING.read_text(encoding="utf-8"))
-    chosen, wires = wiring["components"], wiring["wires"]
-    parameters: Mapping[PortName, Any] = {}
-    if scenario is not None:
-        chosen, wires = chosen | scenario.components, wires | scenario.wires
-        parameters = scenario.parameters
-        missing = set(scenario.only) - chosen.keys()
-        if missing:
-            raise InputError(
-                f"{scenario.name}: only = {', '.join(sorted(missing))}: no such component; "
-                f"there are {', '.join(chosen)}"
-            )
-        if scenario.only:
-            chosen = {name: fmu for name, fmu in chosen.items() if name in scenario.only}
-            wires = {
-                target: source
-                for target, source in wires.items()
-                if {target.split(".")[0], source.split(".")[0]} <= chosen.keys()
-            }
-    components = {
-        name: read_component(name, Path(fmu) if fmu.endswith(".fmu") else folder / f"{fmu}.fmu")
-        for name, fmu in chosen.items()
-    }
-    return System(
-        name=wiring["name"],
-        components=components,
-        connections=tuple(
-            connection
-            for target, source in wires.items()
-            for connection in _wire(components, target, source)
-        ),
-        parameters=parameters,
-        stop_time=wiring["experiment"]["stop_time"],
-        step=wiring["experiment"]["step"],
-    )
+    cache_folder = user_cache_path("auv-fmu", appauthor=False) / "fmus"
+    folder = cache_folder / _fingerprint()
+    if folder.is_dir():
+        return folder
+    try:
+        cache_folder.mkdir(parents=True, exist_ok=True)
+        partial = Path(mkdtemp(prefix=".partial-", dir=cache_folder))
+    except OSError as error:
+        raise InputError(
+            f"cannot keep FMUs in {cache_folder}: {reason(error)}; set XDG_CACHE_HOME to a folder "
+            "that can be written"
+        ) from error
+    try:
+        run_fmus("build", partial)
+        partial.rename(folder)
+    except OSError:
+        # Another process was first; its folder holds the same.
+        if not folder.is_dir():
+            raise
+    finally:
+        rmtree(partial, ignore_errors=True)
+    return folder
 
 
-def _wire(components: Mapping[str, Component], target: str, source: str) -> list[Connection]:
-    """The connections of one wire: every input of the target group takes its namesake."""
-    to, group = port_name(target).component, port_name(target).port
-    start, source_group = port_name(source).component, port_name(source).port
-    for name in (to, start):
-        if name not in components:
-            raise InputError(f"wire {source} -> {target}: there is no component {name!r}")
-    inputs = [
-        variable.name
-        for variable in components[to].description.modelVariables
-        if variable.causality == "input" and variable.name.startswith(f"{group}.")
-    ]
-    if not inputs:
-        raise InputError(f"wire {source} -> {target}: {to} has no inputs {group}.*")
-    return [
-        Connection(PortName(start, source_group + name.removeprefix(group)), PortName(to, name))
-        for name in inputs
-    ]
+def _fingerprint() -> str:
+    """Hash of everything that the FMUs depend on."""
+    digest = hashlib.sha256()
+    for package in _SOURCES:
+        specification = find_spec(package)
+        assert specification is not None and specification.submodule_search_locations
+        [root] = specification.submodule_search_locations
+        for path in sorted(Path(root).rglob("*")):
+            name = path.relative_to(root)
+            if path.is_file() and path.suffix != ".pyc" and name.parts[0] != "dist":
+                digest.update(f"{package}/{name}\0".encode())
+                digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]

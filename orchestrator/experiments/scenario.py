@@ -2,34 +2,26 @@
 
 from __future__ import annotations
 
+import hashlib
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from orchestrator.errors import InputError
-from orchestrator.system.structure import PortName, port_name
+from orchestrator.errors import InputError, did_you_mean, reason
+from orchestrator.system.names import PortName, port_name
 
 FOLDER = Path(__file__).parent / "scenarios"
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """What to run and how to show it.
+    """What to run and how to show it; :data:`ENTRIES` says what each entry means.
 
     Attributes:
         name: of the file, without its ending.
-        title: heading of the figures.
-        label: of its lines where two runs are drawn together.
-        figure: which figure to draw, a key of `orchestrator.analysis.figures.FIGURES`.
-        compare: name of a scenario that is run and drawn together with this one.
-        stop_time, step: experiment [s]; None: the system's own.
-        components: FMUs that take the place of those of the closed loop: names of the bundle's
-            own, or paths of .fmu files.
-        wires: further wires, as in closed_loop.toml.
-        only: the components to keep; empty: all.
-        parameters: values that differ from the components' defaults.
+        digest: SHA-256 of the file; empty for a system that has none.
 
     """
 
@@ -40,24 +32,125 @@ class Scenario:
     compare: str = ""
     stop_time: float | None = None
     step: float | None = None
-    components: Mapping[str, str] = field(default_factory=dict)
-    wires: Mapping[str, str] = field(default_factory=dict)
     only: Sequence[str] = ()
+    remark: str = ""
+    components: Mapping[str, str] = field(default_factory=dict)
+    wires: Mapping[str, str | bool] = field(default_factory=dict)
     parameters: Mapping[PortName, Any] = field(default_factory=dict)
+    ours: Mapping[str, str] = field(default_factory=dict)
+    digest: str = ""
+
+    @property
+    def legend(self) -> str:
+        """Name of its lines where two runs are drawn together."""
+        return self.label or self.name
 
 
-#: Entries of a scenario file and their types.
-_ENTRIES: dict[str, type | tuple[type, ...]] = {
-    "title": str,
-    "label": str,
-    "figure": str,
-    "compare": str,
-    "stop_time": (int, float),
-    "step": (int, float),
-    "components": dict,
-    "wires": dict,
-    "only": list,
-    "parameters": dict,
+class Entry(NamedTuple):
+    """An entry of a scenario file.
+
+    Attributes:
+        kind: what its value is, in words.
+        fits: whether a value is of that kind.
+        meaning: what it does.
+        default: what goes without it, in words.
+
+    """
+
+    kind: str
+    fits: Callable[[Any], bool]
+    meaning: str
+    default: str
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _are_names(value: Any) -> bool:
+    return isinstance(value, list) and all(map(_is_text, value))
+
+
+def _is_table(value: Any) -> bool:
+    return isinstance(value, dict)
+
+
+def _is_table_of_names(value: Any) -> bool:
+    return isinstance(value, dict) and all(map(_is_text, value.values()))
+
+
+def _is_table_of_wires(value: Any) -> bool:
+    return isinstance(value, dict) and all(_is_text(v) or v is False for v in value.values())
+
+
+#: What a scenario file may hold, in the order of the reference page.
+ENTRIES: dict[str, Entry] = {
+    "title": Entry(
+        "text",
+        _is_text,
+        "Heading of the figures and of the section in the report.",
+        "the name of the file",
+    ),
+    "label": Entry(
+        "text",
+        _is_text,
+        "Name of its lines where two runs are drawn together.",
+        "the name of the file",
+    ),
+    "figure": Entry("text", _is_text, "Which figure to draw.", "`tracking`"),
+    "compare": Entry(
+        "text",
+        _is_text,
+        "A scenario that is run and drawn together with this one: a name, or the path of a .toml "
+        "file, relative to this one. What this scenario and the command line set goes for both, "
+        "as far as both have it.",
+        "none",
+    ),
+    "stop_time": Entry("number", _is_number, "End of the run [s].", "100 s"),
+    "step": Entry("number", _is_number, "Communication step [s].", "0.02 s"),
+    "only": Entry(
+        "list of names",
+        _are_names,
+        "The components to keep; the wires of the others go with them.",
+        "all of them",
+    ),
+    "remark": Entry(
+        "text", _is_text, "What the report says below the figure, in Markdown.", "none"
+    ),
+    "components": Entry(
+        "table of names",
+        _is_table_of_names,
+        "FMUs that take the place of the closed loop's own, or stand beside them, as "
+        '`component = "FMU"`: a name of the bundle\'s, or the path of a .fmu file, relative to '
+        "this file.",
+        "none",
+    ),
+    "wires": Entry(
+        "table of names, or false",
+        _is_table_of_wires,
+        'Further wires, as `"component.group" = "component.group"`: every input of the group on '
+        "the left takes the output of the same name in the group on the right. `false` removes "
+        "a wire.",
+        "none",
+    ),
+    "parameters": Entry(
+        "table of values",
+        _is_table,
+        "Parameters, and inputs that nothing feeds, as `component.parameter = value`. Names with "
+        'brackets are quoted: `"controller.K1[1]" = 12.0`.',
+        "the FMUs' own",
+    ),
+    "ours": Entry(
+        "table of texts",
+        _is_table,
+        'Which of the values above are not the paper\'s, and why: `stop_time = "why"`, '
+        '`plant.noise.std = "why"`.',
+        "none",
+    ),
 }
 
 
@@ -75,36 +168,40 @@ def read_scenario(name: str) -> Scenario:
     """
     path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        content = tomllib.loads(text)
     except FileNotFoundError:
         raise InputError(
-            f"no scenario {name!r}; there are {', '.join(names())}, or give a .toml or .ssp file"
+            f"no scenario {name!r}{did_you_mean(name, names())}; there are {', '.join(names())}, "
+            "or give a .toml or .ssp file"
         ) from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: {error}") from error
+        raise InputError(f"{path}: {reason(error)}") from error
     for key, value in content.items():
-        if key not in _ENTRIES:
-            raise InputError(f"{path}: unknown entry {key!r}; use {', '.join(_ENTRIES)}")
-        if not isinstance(value, _ENTRIES[key]) or isinstance(value, bool):
-            raise InputError(f"{path}: {key} = {value!r} is of the wrong type")
-        if key in ("components", "wires", "only") and isinstance(value, (dict, list)):
-            texts = list(value.values()) if isinstance(value, dict) else value
-            if not all(isinstance(text, str) for text in texts):
-                raise InputError(f"{path}: {key} = {value!r} holds something else than names")
-    content["parameters"] = dict(_flattened(content.get("parameters", {})))
+        if key not in ENTRIES:
+            hint = did_you_mean(key, ENTRIES) or f"; use {', '.join(ENTRIES)}"
+            raise InputError(f"{path}: unknown entry {key!r}{hint}")
+        if not ENTRIES[key].fits(value):
+            raise InputError(
+                f"{path}: {key} = {value!r} is of the wrong type, not a {ENTRIES[key].kind}"
+            )
+    content["parameters"] = {
+        port_name(key): value for key, value in _flattened(content.get("parameters", {}))
+    }
+    content["ours"] = {key: str(why) for key, why in _flattened(content.get("ours", {}))}
     content["components"] = {
-        component: str(path.parent / fmu) if str(fmu).endswith(".fmu") else str(fmu)
+        component: str(path.parent / fmu) if fmu.endswith(".fmu") else fmu
         for component, fmu in content.get("components", {}).items()
     }
     if content.get("compare", "").endswith(".toml"):
         content["compare"] = str(path.parent / content["compare"])
-    return Scenario(path.stem, **content)
+    return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
 
 
-def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[PortName, Any]]:
+def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     for key, value in table.items():
         name = f"{prefix}.{key}" if prefix else key
         if isinstance(value, dict):
             yield from _flattened(value, name)
         else:
-            yield port_name(name), value
+            yield name, value

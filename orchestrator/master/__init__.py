@@ -1,1 +1,31 @@
-"""How a system is stepped: instances, order, loop, table."""
+"""How a system is stepped: `simulate` runs the loop, observers take what it computes.
+
+======================  ==============================================================
+module                  what it holds
+======================  ==============================================================
+:mod:`.experiment`      start, stop and step of a run: t_k = k h
+:mod:`.simulation`      a run from the first exchange to the last step
+:mod:`.instance`        one running FMU
+:mod:`.row`             the row of all values, and which FMI call moves what
+:mod:`.schedule`        which components are stepped when, and on whose outputs
+:mod:`.observer`        what observers are told, and the blocks in which they are told it
+:mod:`.progress`        a bar
+:mod:`.selection`       which rows and columns are kept
+:mod:`.table`           rows kept in memory
+:mod:`.files`           rows written to CSV or Parquet, and read again
+:mod:`.interrupts`      signals to stop, held back while an FMU computes
+======================  ==============================================================
+
+The loop, in :func:`.simulation.simulate`::
+
+    exchange initial values until they rest
+    tell the observers the first row
+    for every step from t to t + h:
+        for every stage of the schedule:
+            gather the inputs of its components
+            step each of them, and read its outputs
+        tell the observers the row
+        stop if an FMU has failed, or somebody wants it
+
+Nothing here knows which components there are.
+"""

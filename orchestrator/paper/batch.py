@@ -18,11 +18,11 @@ from typing import Any
 from tqdm import tqdm
 
 from orchestrator.errors import InputError, last_line
-from orchestrator.experiments import bundle
+from orchestrator.experiments.bundle import current_fmus
 from orchestrator.experiments.scenario import FOLDER as SCENARIOS
 
 #: What a folder of results was computed from.
-_STAMP = "run.json"
+_STAMP = "job.json"
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def run_all(jobs: Sequence[Job], folder: Path) -> dict[str, dict[str, Any]]:
         InputError: a run could not be made.
 
     """
-    bundle.build(bundle.DEFAULT_FOLDER)
+    current_fmus()
     sources = _sources()
     missing = [job for job in jobs if not _is_finished(job, folder / job.name, sources)]
     with (
@@ -83,7 +83,7 @@ def run_all(jobs: Sequence[Job], folder: Path) -> dict[str, dict[str, Any]]:
 
 def _sources() -> str:
     """Hash of all that a result depends on besides its command."""
-    digest = hashlib.sha256((bundle.DEFAULT_FOLDER / bundle.MANIFEST).read_bytes())
+    digest = hashlib.sha256(current_fmus().name.encode())
     digest.update(sys.version.encode())
     for name in ("fmpy", "matplotlib", "numpy", "pythonfmu"):
         digest.update(version(name).encode())

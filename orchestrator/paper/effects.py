@@ -20,14 +20,14 @@ from orchestrator.analysis.figures import (
     draw_errors,
     save,
 )
-from orchestrator.analysis.metrics import ACTUATORS
-from orchestrator.master.result import Result
+from orchestrator.analysis.signals import ACTUATORS
+from orchestrator.master.table import Table
 from orchestrator.paper.published import NOISE_LEVELS
-from orchestrator.system.structure import PortName
+from orchestrator.system.names import PortName
 
 
 def draw_effects(
-    results: Mapping[str, Result], metrics: Mapping[str, Any], runs: Path, folder: Path
+    results: Mapping[str, Table], metrics: Mapping[str, Any], runs: Path, folder: Path
 ) -> None:
     """Write the figures of all effects as PNG.
 
@@ -67,7 +67,7 @@ def _pair(title: str, runs: Sequence[Drawn]) -> Figure:
     return figure
 
 
-def _orders(results: Mapping[str, Result]) -> Figure:
+def _orders(results: Mapping[str, Table]) -> Figure:
     figure = Figure(figsize=(13, 8))
     figure.suptitle("Order of evaluation: a Jacobi master adds a delay of 20 ms (reading 5)")
     panels = figure.subplots(3, 2)

@@ -13,8 +13,8 @@ from auv_fmu.gain_conditions import bounds, conditions
 from auv_fmu.output_feedback import Gains
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from auv_fmu.vehicle import Vehicle
-from orchestrator.analysis.metrics import ACTUATORS, tracking_error
-from orchestrator.master.result import Result
+from orchestrator.analysis.signals import ACTUATORS, tracking_error
+from orchestrator.master.table import Table
 from orchestrator.paper.batch import Job
 
 #: Control efforts of section 4.2, in the order u, q, r, and e_f, in the order x, y, z [m].
@@ -80,29 +80,29 @@ def _said(holds: bool) -> str:
     return "agrees" if holds else "**differs**"
 
 
-def total_variation_until(result: Result, stop_time: float) -> float:
+def total_variation_until(result: Table, stop_time: float) -> float:
     """Sum of |difference| of the three applied signals up to a time."""
     applied = result.group(*(f"plant.tau_applied.{k}" for k in ACTUATORS))
     return float(np.abs(np.diff(applied[result.time <= stop_time][1:], axis=0)).sum())
 
 
-def turning_radius(result: Result) -> float:
+def turning_radius(result: Table) -> float:
     """Radius of the level circle that the centre of mass ends on [m]."""
     u, v, r = (result[f"plant.nu.{k}"][-1] for k in "uvr")
     return float(np.hypot(u, v) / abs(r))
 
 
-def largest_error_after(result: Result, start: float) -> float:
+def largest_error_after(result: Table, start: float) -> float:
     """Largest tracking error of any axis after a time [m]."""
     return float(np.abs(tracking_error(result)[result.time > start]).max())
 
 
-def largest_estimate(result: Result) -> float:
+def largest_estimate(result: Table) -> float:
     """Largest component of theta_hat in a run."""
     return float(result.group(*(f"controller.theta_hat[{i}]" for i in range(1, 5))).max())
 
 
-def rows(metrics: Mapping[str, Mapping[str, Any]], results: Mapping[str, Result]) -> list[Row]:
+def rows(metrics: Mapping[str, Mapping[str, Any]], results: Mapping[str, Table]) -> list[Row]:
     """Every printed number and claim of section 4 that a simulation can be held against.
 
     Args:

@@ -15,10 +15,12 @@ from typing import Any
 from markdown_it import MarkdownIt
 
 from orchestrator.analysis import gains
-from orchestrator.analysis.metrics import ACTUATORS
-from orchestrator.experiments import bundle
+from orchestrator.analysis.signals import ACTUATORS
+from orchestrator.experiments.bundle import current_fmus
 from orchestrator.experiments.scenario import FOLDER, names, read_scenario
-from orchestrator.master.result import Result, read_result
+from orchestrator.experiments.stored import read_result
+from orchestrator.experiments.wiring import closed_loop
+from orchestrator.master.table import Table
 from orchestrator.paper.batch import Job, run_all
 from orchestrator.paper.effects import draw_effects
 from orchestrator.paper.published import VARIANTS, Row, numbers, rows
@@ -82,12 +84,7 @@ def write_report(folder: Path) -> tuple[Path, Path]:
     jobs = [*scenarios, *VARIANTS]
     runs, figures = folder / "runs", folder / "figures"
     metrics = run_all(jobs, runs)
-    results = {
-        name: read_result(
-            runs / name, bundle.closed_loop(bundle.DEFAULT_FOLDER, read_scenario(scenario))
-        )
-        for name, scenario in _TABLES.items()
-    }
+    results = {name: read_result(runs / name)[1] for name in _TABLES}
     figures.mkdir(exist_ok=True)
     for job in scenarios:
         for picture in (runs / job.name).glob("*.png"):
@@ -104,7 +101,7 @@ def _sections(
     jobs: list[Job],
     scenarios: list[Job],
     metrics: Mapping[str, Any],
-    results: Mapping[str, Result],
+    results: Mapping[str, Table],
 ) -> Iterator[str]:
     yield (
         "# The paper's section 4, run again\n\n"
@@ -131,7 +128,7 @@ def _sections(
     yield "## Effects that the paper does not show"
     yield from _effects(metrics)
     yield "## Gain conditions"
-    yield f"`auv-fmu gains`:\n\n```\n{gains.check({})}\n```"
+    yield f"`auv-fmu gains`:\n\n```\n{gains.check(closed_loop(current_fmus()))}\n```"
     yield "## Certificates along a run"
     yield (
         "For Fig. 4 without noise, from the true state of the plant: the Lyapunov function (34) "

@@ -1,1 +1,18 @@
-"""What is simulated and how it is written down: components, connections, values, SSP."""
+"""What is simulated, and how it is written down.
+
+======================  ==============================================================
+module                  what it holds
+======================  ==============================================================
+:mod:`.names`           `component.port`, and a component's own ports
+:mod:`.values`          values in the types of FMI's variables, from text and to text
+:mod:`.component`       an FMU and what its description says about it
+:mod:`.structure`       components, connections and parameters: a system
+:mod:`.graph`           what depends on what: feedthrough, and what reaches a component
+:mod:`.unpacking`       archives unpacked, once a process and version
+:mod:`.ssp`             systems as SSP 1.0 archives, read and written
+:mod:`.osp`             systems as libcosim's own configuration
+:mod:`.container`       a system as one FMU
+======================  ==============================================================
+
+Nothing here knows which components there are.
+"""

@@ -1,33 +1,16 @@
-"""Systems as SSP 1.0 archives: what the master runs and what other hosts open."""
+"""A system as an SSP 1.0 archive."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
-from zipfile import BadZipFile, ZipFile, ZipInfo
+from zipfile import ZipFile, ZipInfo
 
-from fmpy.ssp import ssd as fmpy_ssd
-
-from orchestrator.errors import InputError
-from orchestrator.system.structure import (
-    Component,
-    Connection,
-    PortName,
-    System,
-    literal,
-    port_name,
-    read_component,
-)
-
-STRUCTURE = "SystemStructure.ssd"
-
-_SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
-_SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
-_SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
-_OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
+from orchestrator.system.component import Component
+from orchestrator.system.ssp import OSP, SSC, SSD, SSV, STRUCTURE
+from orchestrator.system.structure import System
+from orchestrator.system.values import literal
 
 #: Name of every parameter set: ecos applies the sets of the one name that it is given.
 PARAMETER_SET = "scenario"
@@ -39,91 +22,11 @@ _BOX, _GAP = (40.0, 60.0), 30.0
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
-def read_ssp(archive: Path, folder: Path) -> System:
-    """Read the system in an SSP archive.
-
-    Args:
-        archive: the .ssp file.
-        folder: where to unpack its FMUs; the system refers to them there.
-
-    Raises:
-        InputError: the archive is missing, broken, or uses what this master cannot do.
-
-    """
-    try:
-        with ZipFile(archive) as content:
-            content.extractall(folder)
-        description = fmpy_ssd.read_ssd(str(archive))
-    except (OSError, BadZipFile) as error:
-        raise InputError(f"{archive}: cannot be opened: {error}") from error
-    except Exception as error:
-        lines = str(error).strip().splitlines() or [repr(error)]
-        raise InputError(f"{archive}: not a readable SSP: {' '.join(lines[:2])}") from error
-    system = description.system
-    components = {}
-    for element in system.elements:
-        if not isinstance(element, fmpy_ssd.Component):
-            raise InputError(
-                f"{archive}: {element.name}: only a flat system of FMUs is supported, no nested "
-                "systems or signal dictionaries"
-            )
-        components[element.name] = read_component(element.name, folder / element.source)
-    stop_time, step = _default_experiment(folder / STRUCTURE)
-    return System(
-        name=system.name or archive.stem,
-        components=components,
-        connections=tuple(_connections(archive, system)),
-        parameters=dict(_parameters(system)),
-        stop_time=stop_time,
-        step=step,
-    )
-
-
-def _connections(archive: Path, system: Any) -> Iterator[Connection]:
-    for connection in system.connections:
-        if getattr(connection, "linearTransformation", None) is not None:
-            raise InputError(f"{archive}: transformations in connections are not supported")
-        if connection.startElement is None or connection.endElement is None:
-            raise InputError(f"{archive}: connections to the system's own ports are not supported")
-        start = PortName(connection.startElement, connection.startConnector)
-        end = PortName(connection.endElement, connection.endConnector)
-        kinds = {
-            (element.name, connector.name): connector.kind
-            for element in system.elements
-            for connector in element.connectors
-        }
-        # The standard lets a connection be written from either end.
-        backwards = kinds.get((start.component, start.port)) == "input"
-        yield Connection(end, start) if backwards else Connection(start, end)
-
-
-def _parameters(system: Any) -> Iterator[tuple[PortName, Any]]:
-    """Values of the system's own bindings, then those of its components, which win."""
-    for binding in system.parameterBindings:
-        for parameter_set in binding.parameterValues:
-            for parameter in parameter_set.parameters:
-                yield port_name(f"{binding.prefix or ''}{parameter.name}"), parameter.value
-    for component in system.elements:
-        for binding in component.parameterBindings:
-            for parameter_set in binding.parameterValues:
-                for parameter in parameter_set.parameters:
-                    name = f"{binding.prefix or ''}{parameter.name}"
-                    yield PortName(component.name, name), parameter.value
-
-
-def _default_experiment(structure: Path) -> tuple[float | None, float | None]:
-    root = ElementTree.parse(structure).getroot()
-    experiment = root.find(f"{{{_SSD}}}DefaultExperiment")
-    algorithm = root.find(f".//{{{_OSP}}}FixedStepAlgorithm")
-    stop_time = None if experiment is None else experiment.get("stopTime")
-    step = None if algorithm is None else algorithm.get("baseStepSize")
-    try:
-        return (
-            None if stop_time is None else float(stop_time),
-            None if step is None else float(step),
-        )
-    except ValueError as error:
-        raise InputError(f"{STRUCTURE}: stop time {stop_time}, step {step}: {error}") from error
+def write_ssp(system: System, folder: Path) -> list[Path]:
+    """Write `NAME.ssp`; the step is part of the system."""
+    path = folder / f"{system.name}.ssp"
+    path.write_bytes(ssp_bytes(system))
+    return [path]
 
 
 def ssp_bytes(system: System) -> bytes:
@@ -151,20 +54,18 @@ def _parameter_source(component: Component) -> str:
 def parameter_set_xml(system: System, component: Component) -> bytes:
     """The values that a system sets in one component, as an SSV."""
     _register_prefixes()
-    root = ElementTree.Element(f"{{{_SSV}}}ParameterSet", name=PARAMETER_SET, version="1.0")
-    parameters = ElementTree.SubElement(root, f"{{{_SSV}}}Parameters")
+    root = ElementTree.Element(f"{{{SSV}}}ParameterSet", name=PARAMETER_SET, version="1.0")
+    parameters = ElementTree.SubElement(root, f"{{{SSV}}}Parameters")
     for name, value in system.parameters_of(component.name).items():
-        variable = component.variable(name)
-        element = ElementTree.SubElement(parameters, f"{{{_SSV}}}Parameter", name=name)
-        ElementTree.SubElement(
-            element, f"{{{_SSV}}}{variable.type}", value=literal(variable, value)
-        )
+        kind = component.variable(name).type
+        element = ElementTree.SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
+        ElementTree.SubElement(element, f"{{{SSV}}}{kind}", value=literal(value))
     return _serialised(root)
 
 
 def _register_prefixes() -> None:
     """Libcosim accepts no other prefixes than these."""
-    for prefix, namespace in (("ssd", _SSD), ("ssc", _SSC), ("ssv", _SSV), ("osp", _OSP)):
+    for prefix, namespace in (("ssd", SSD), ("ssc", SSC), ("ssv", SSV), ("osp", OSP)):
         ElementTree.register_namespace(prefix, namespace)
 
 
@@ -204,11 +105,11 @@ def structure_xml(system: System) -> bytes:
 
 
 def _ssd(tag: str) -> str:
-    return f"{{{_SSD}}}{tag}"
+    return f"{{{SSD}}}{tag}"
 
 
 def _ssc(tag: str) -> str:
-    return f"{{{_SSC}}}{tag}"
+    return f"{{{SSC}}}{tag}"
 
 
 def _add_component(
@@ -272,7 +173,7 @@ def _add_experiment(root: ElementTree.Element, system: System) -> None:
         annotation = ElementTree.SubElement(
             annotations, _ssc("Annotation"), type="com.opensimulationplatform"
         )
-        algorithm = ElementTree.SubElement(annotation, f"{{{_OSP}}}Algorithm")
+        algorithm = ElementTree.SubElement(annotation, f"{{{OSP}}}Algorithm")
         ElementTree.SubElement(
-            algorithm, f"{{{_OSP}}}FixedStepAlgorithm", baseStepSize=str(system.step)
+            algorithm, f"{{{OSP}}}FixedStepAlgorithm", baseStepSize=str(system.step)
         )

@@ -1,0 +1,53 @@
+"""`auv-fmu build`, `list` and `gains`."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from orchestrator.analysis import gains
+from orchestrator.commands.options import OK, add_out, add_set, assignments
+from orchestrator.experiments import bundle
+from orchestrator.experiments.scenario import names, read_scenario
+from orchestrator.experiments.wiring import closed_loop
+
+
+def add_to(commands: Any) -> None:
+    """Add these commands to the parser."""
+    build = commands.add_parser("build", help="build every FMU and the bundle auv.ssp")
+    add_out(build, bundle.DEFAULT_FOLDER)
+    build.add_argument(
+        "--loader",
+        choices=("native", "plain"),
+        help="native: the FMUs also run in hosts that are no Python programs; needs a C compiler "
+        "and is the default where there is one",
+    )
+    build.set_defaults(action=_build)
+
+    listing = commands.add_parser("list", help="list the scenarios")
+    listing.set_defaults(action=_list)
+
+    check = commands.add_parser("gains", help="check the conditions of Theorems 1 and 2")
+    add_set(check)
+    check.set_defaults(action=_gains)
+
+
+def _build(options: argparse.Namespace) -> int:
+    written = bundle.build(options.out, options.loader)
+    for path in written:
+        print(path)
+    state = "built" if written else "up to date"
+    print(f"{options.out} is {state}, with the {bundle.loader_of(options.out)} loader")
+    return OK
+
+
+def _list(_: argparse.Namespace) -> int:
+    for name in names():
+        print(f"{name:10} {read_scenario(name).title}")
+    return OK
+
+
+def _gains(options: argparse.Namespace) -> int:
+    system = closed_loop(bundle.current_fmus()).with_parameters(assignments(options))
+    print(gains.check(system))
+    return OK

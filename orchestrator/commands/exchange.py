@@ -1,0 +1,125 @@
+"""`auv-fmu export`, `hosts` and `verify`."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from orchestrator.commands.options import FAILED, OK, add_out, add_set, add_system, assignments
+from orchestrator.errors import InputError, reason
+from orchestrator.exchange.hosts import HOSTS, compare
+from orchestrator.exchange.verify import verify
+from orchestrator.experiments.experiment import DEFAULT_STEP, Request, loaded, prepare
+from orchestrator.system.container import write_container
+from orchestrator.system.osp import write_osp
+from orchestrator.system.ssp.writing import write_ssp
+from orchestrator.system.structure import System
+
+#: Writers by the names of their formats.
+FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
+    "ssp": write_ssp,
+    "osp": write_osp,
+    "container": write_container,
+}
+
+
+def add_to(commands: Any) -> None:
+    """Add these commands to the parser."""
+    export = commands.add_parser("export", help="write a scenario for other tools")
+    add_system(export)
+    export.add_argument(
+        "--format",
+        choices=tuple(FORMATS),
+        default="ssp",
+        help="an SSP, libcosim's own folder, or one FMU (needs auv-fmu[hosts]); default: ssp",
+    )
+    export.add_argument(
+        "--step", type=float, metavar="S", help="communication step [s]; default: the scenario's"
+    )
+    add_set(export)
+    add_out(export, None, "exports/SCENARIO/")
+    export.set_defaults(action=_export)
+
+    others = commands.add_parser("hosts", help="run a scenario in other co-simulation tools")
+    others.add_argument(
+        "host", nargs="*", metavar="HOST", help=f"of {', '.join(HOSTS)}; default: all"
+    )
+    _add_scenario(others)
+    others.add_argument(
+        "--steps", type=int, default=5000, metavar="N", help="how many; default: 5000"
+    )
+    others.set_defaults(action=_hosts)
+
+    check = commands.add_parser("verify", help="compare a table from another tool with ours")
+    check.add_argument("table", type=Path, metavar="RESULT.csv", help="with a column `time`")
+    _add_scenario(check)
+    check.add_argument(
+        "--tolerance",
+        type=float,
+        default=1e-6,
+        help="relative to the larger of one and the port's largest value; default: 1e-6",
+    )
+    add_set(check)
+    check.set_defaults(action=_verify)
+
+
+def _add_scenario(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--scenario",
+        default="fig4",
+        metavar="SCENARIO|FILE.toml|FILE.ssp",
+        help="what the other tool runs; default: fig4",
+    )
+
+
+def _export(options: argparse.Namespace) -> int:
+    request = Request(step=options.step, parameters=assignments(options))
+    prepared = prepare(*loaded(options.scenario), request)
+    experiment = prepared.experiment
+    system = replace(
+        prepared.system,
+        name=prepared.scenario.name,
+        stop_time=experiment.stop_time,
+        step=experiment.step,
+    )
+    folder = options.out or Path("exports", prepared.scenario.name)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for path in FORMATS[options.format](system, folder):
+            print(path)
+    except OSError as error:
+        raise InputError(
+            f"cannot write into {folder}: {reason(error)}; choose --out DIR"
+        ) from error
+    return OK
+
+
+def _verify(options: argparse.Namespace) -> int:
+    _, system = loaded(options.scenario)
+    print(verify(options.table, system.with_parameters(assignments(options)), options.tolerance))
+    return OK
+
+
+def _hosts(options: argparse.Namespace) -> int:
+    unknown = set(options.host) - HOSTS.keys()
+    if unknown:
+        raise InputError(f"no host {', '.join(sorted(unknown))}; there are {', '.join(HOSTS)}")
+    _, system = loaded(options.scenario)
+    step = system.step or DEFAULT_STEP
+    verdicts = compare(system, options.host or list(HOSTS), options.steps, step)
+    print(f"{'host':13} {'package':34} {'max deviation':>14} {'steps/s':>8}  worst port")
+    for verdict in verdicts:
+        if verdict.failure is not None:
+            print(f"{verdict.host:13} {verdict.package:34} {verdict.failure}")
+            continue
+        host = HOSTS[verdict.host]
+        note = f" ({host.why})" if host.why else ""
+        note += "" if verdict.agrees else f", above {host.bound:g}"
+        print(
+            f"{verdict.host:13} {verdict.package:34} {verdict.deviation:14.2e} "
+            f"{verdict.steps_per_second:8.0f}  {verdict.port}{note}"
+        )
+    return OK if all(verdict.agrees for verdict in verdicts) else FAILED

@@ -1,0 +1,85 @@
+"""Options that several commands have, and what they say."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from orchestrator.errors import InputError
+from orchestrator.master.experiment import ORDERS
+from orchestrator.system.names import PortName, port_name
+
+#: Exit status: done, a simulation failed, bad usage or input, ended by the user.
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+#: An action of a command: takes the parsed options and gives the exit status.
+Action = Callable[[argparse.Namespace], int]
+
+
+def say(text: str) -> None:
+    """A line for the user beside the output."""
+    print(f"auv-fmu: {text}", file=sys.stderr, flush=True)
+
+
+def add_system(parser: argparse.ArgumentParser) -> None:
+    """What is run."""
+    parser.add_argument(
+        "scenario",
+        metavar="SCENARIO|FILE.toml|FILE.ssp",
+        help="a scenario of `auv-fmu list`, a scenario file, or an SSP",
+    )
+
+
+def add_experiment(parser: argparse.ArgumentParser) -> None:
+    """How long it is run, and how."""
+    parser.add_argument(
+        "--stop-time", type=float, metavar="S", help="end of the run [s]; default: the scenario's"
+    )
+    parser.add_argument(
+        "--step",
+        type=float,
+        metavar="S",
+        help="communication step [s]; default: the scenario's, else 0.02",
+    )
+    parser.add_argument(
+        "--order",
+        choices=ORDERS,
+        default=ORDERS[0],
+        help=f"order in which the components are stepped; default: {ORDERS[0]}",
+    )
+
+
+def add_set(parser: argparse.ArgumentParser) -> None:
+    """Values that win over the scenario's."""
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="COMPONENT.PARAMETER=VALUE",
+        help="change a parameter, for example plant.noise.std=0; may be repeated",
+    )
+
+
+def add_out(parser: argparse.ArgumentParser, default: Path | None, otherwise: str = "") -> None:
+    """Where the files go."""
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=default,
+        metavar="DIR",
+        help=f"folder to write into; default: {default or otherwise}",
+    )
+
+
+def assignments(options: argparse.Namespace) -> dict[PortName, object]:
+    """The values of --set."""
+    return dict(map(_assignment, options.set))
+
+
+def _assignment(text: str) -> tuple[PortName, str]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise InputError(f"--set {text}: write COMPONENT.PARAMETER=VALUE")
+    return port_name(name.strip()), value.strip()

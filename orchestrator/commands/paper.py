@@ -1,0 +1,23 @@
+"""`auv-fmu report`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from orchestrator.commands.options import OK, add_out
+from orchestrator.paper.report import write_report
+
+
+def add_to(commands: Any) -> None:
+    """Add these commands to the parser."""
+    report = commands.add_parser("report", help="run all scenarios and compare with the paper")
+    add_out(report, Path("results", "report"))
+    report.set_defaults(action=_report)
+
+
+def _report(options: argparse.Namespace) -> int:
+    for path in write_report(options.out):
+        print(path)
+    return OK

@@ -1,0 +1,40 @@
+"""`auv-fmu reference` and `docs`: files of this repository that are made by commands."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from orchestrator.commands.options import OK, add_out
+from orchestrator.errors import InputError, reason
+from orchestrator.exchange.reference import write_reference
+from orchestrator.experiments.bundle import current_fmus, run_fmus
+
+
+def add_to(commands: Any) -> None:
+    """Add these commands to the parser."""
+    reference = commands.add_parser("reference", help="write reference results of every FMU")
+    add_out(reference, Path("reference"))
+    reference.set_defaults(action=_reference)
+
+    docs = commands.add_parser("docs", help="write the pages of the components")
+    add_out(docs, Path("docs", "components"))
+    docs.set_defaults(action=_docs)
+
+
+def _reference(options: argparse.Namespace) -> int:
+    try:
+        options.out.mkdir(parents=True, exist_ok=True)
+        written = write_reference(current_fmus(), options.out)
+    except OSError as error:
+        raise InputError(f"cannot write into {options.out}: {reason(error)}") from error
+    for path in written:
+        print(path)
+    return OK
+
+
+def _docs(options: argparse.Namespace) -> int:
+    for path in run_fmus("documentation", options.out):
+        print(path)
+    return OK

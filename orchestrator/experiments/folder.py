@@ -1,0 +1,120 @@
+"""A folder of results that changes all at once.
+
+Files are written into a hidden folder within it. When all are whole they take the place of those of
+an earlier run, `run.json` last: a folder without one holds no whole result. What an earlier run has
+written and this one does not is removed; files of others are left alone.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
+
+from orchestrator.errors import InputError, reason
+
+try:
+    import fcntl
+except ImportError:  # pragma: no cover
+    # Not a POSIX system: two runs into one folder are not told apart there.
+    fcntl = None  # type: ignore[assignment]
+
+#: The record of a run: what is there when everything is.
+RECORD = "run.json"
+
+#: How the hidden folder's name begins.
+_UNFINISHED = ".unfinished-"
+
+
+@contextmanager
+def replaced(folder: Path) -> Iterator[Path]:
+    """A folder to write a result into; at the end it takes the place of what was there before.
+
+    An exception in the context leaves the folder as it was.
+
+    Args:
+        folder: of the result, made if it does not exist.
+
+    Raises:
+        InputError: the folder cannot be written, or another run is writing into it.
+
+    """
+    made = not folder.exists()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with _locked(folder):
+            # Whoever has left these was killed: the lock is ours.
+            for left in folder.glob(f"{_UNFINISHED}*"):
+                rmtree(left)
+            unfinished = Path(mkdtemp(prefix=_UNFINISHED, dir=folder))
+            # As umask would have it, and not private.
+            unfinished.chmod(folder.stat().st_mode)
+            try:
+                yield unfinished
+                _publish(unfinished, folder)
+            except OSError as error:
+                raise InputError(
+                    f"cannot write into {folder}: {reason(error)}; what was computed is in "
+                    f"{unfinished} until the next run; choose --out DIR"
+                ) from error
+            except BaseException:
+                rmtree(unfinished, ignore_errors=True)
+                raise
+            rmtree(unfinished)
+    except OSError as error:
+        raise InputError(
+            f"cannot write into {folder}: {reason(error)}; choose --out DIR"
+        ) from error
+    finally:
+        if made and folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Keep other runs out; the lock ends with the process, however it ends."""
+    if fcntl is None:
+        yield
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(
+                f"another run is writing into {folder}; wait for it, or choose --out DIR"
+            ) from None
+        except OSError:
+            # A file system without locks.
+            pass
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _publish(unfinished: Path, folder: Path) -> None:
+    files = sorted(path.relative_to(unfinished) for path in unfinished.rglob("*") if path.is_file())
+    earlier = files_of(folder)
+    (folder / RECORD).unlink(missing_ok=True)
+    for file in sorted(files, key=lambda file: file == Path(RECORD)):
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        (unfinished / file).replace(folder / file)
+    for file in earlier - set(files):
+        (folder / file).unlink(missing_ok=True)
+        if file.parent != Path() and not any((folder / file.parent).iterdir()):
+            (folder / file.parent).rmdir()
+
+
+def files_of(folder: Path) -> set[Path]:
+    """The files that the run has written whose result is in a folder."""
+    try:
+        record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        files = {Path(name) for name in record["files"]}
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()
+    # A record that somebody has edited must not lead out of the folder.
+    return {file for file in files if not file.is_absolute() and ".." not in file.parts}

@@ -1,0 +1,88 @@
+"""`run.json`: what a result was made from, and with what."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import sys
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from orchestrator.experiments.experiment import Prepared
+from orchestrator.experiments.folder import RECORD
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.observer import Ending, Header
+from orchestrator.system.names import port_name
+
+#: Packages whose versions a result depends on.
+PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy", "matplotlib")
+
+
+def write_record(
+    folder: Path,
+    prepared: Prepared,
+    header: Header,
+    ending: Ending,
+    command: Sequence[str],
+    started: datetime,
+) -> None:
+    """Write the record of a run into the folder of its files.
+
+    Args:
+        folder: with all other files of the result.
+        prepared: what was run.
+        header, ending: of its table.
+        command: that has run it.
+        started: when.
+
+    """
+    experiment = header.experiment
+    content = {
+        "scenario": prepared.scenario.name,
+        "title": prepared.scenario.title,
+        "label": prepared.scenario.label,
+        "sha256": prepared.scenario.digest,
+        "command": list(command),
+        "started": started.isoformat(timespec="seconds"),
+        "seconds": round((datetime.now(UTC) - started).total_seconds(), 3),
+        "failure": ending.failure,
+        "experiment": {
+            "stop_time": experiment.stop_time,
+            "step": experiment.step,
+            "order": experiment.order,
+        },
+        "fmus": {
+            component.name: {"file": component.fmu.name, "sha256": _digest(component.fmu)}
+            for component in prepared.system.components.values()
+        },
+        "parameters": {str(name): value for name, value in header.parameters.items()},
+        "versions": {"python": sys.version.split()[0]}
+        | {package: version(package) for package in PACKAGES},
+        "platform": platform.platform(),
+    }
+    write_files(folder, content)
+
+
+def write_files(folder: Path, content: dict[str, Any]) -> None:
+    """Write a record, with the names of all files beside it."""
+    files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    text = json.dumps({**content, "files": sorted(files | {RECORD})}, indent=2)
+    (folder / RECORD).write_text(text + "\n", encoding="utf-8")
+
+
+def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
+    """The header of a table, from the record beside it."""
+    experiment = record["experiment"]
+    return Header(
+        columns,
+        Experiment(experiment["stop_time"], experiment["step"], experiment["order"]),
+        {port_name(name): value for name, value in record["parameters"].items()},
+    )
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -1,0 +1,150 @@
+"""Runs from Python: `simulate` and its result."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from orchestrator.analysis.metrics import metrics_of
+from orchestrator.analysis.plot import plot
+from orchestrator.experiments.experiment import Prepared, Request, loaded, prepare
+from orchestrator.experiments.folder import replaced
+from orchestrator.experiments.record import write_record
+from orchestrator.experiments.run import metrics_json, write_metrics
+from orchestrator.experiments.scenario import Scenario
+from orchestrator.master.experiment import ORDERS
+from orchestrator.master.files import FORMATS
+from orchestrator.master.progress import Progress
+from orchestrator.master.simulation import simulate as run
+from orchestrator.master.table import Table
+from orchestrator.system.names import PortName, port_name
+from orchestrator.system.structure import System
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+class Result(Table):
+    """The table of a run, with its indices and figures.
+
+    `result["plant.eta.x"]` is a column, `result.time` the times, `result.columns` the names of
+    all columns.
+    """
+
+    def __init__(self, prepared: Prepared) -> None:
+        """Take the rows of what is run."""
+        super().__init__()
+        self._prepared = prepared
+        self._started = datetime.now(UTC)
+
+    def __repr__(self) -> str:
+        """One line: what was run, and how far it came."""
+        end = f", {self.failure}" if self.failure else ""
+        last = self.time[-1] if len(self) else 0.0
+        return (
+            f"<Result {self._prepared.scenario.name}: {len(self)} rows of {len(self.columns)} "
+            f"columns, 0 to {last:g} s, {self.header.experiment.order}{end}>"
+        )
+
+    @property
+    def system(self) -> System:
+        """What was run."""
+        return self._prepared.system
+
+    def metrics(self) -> dict[str, Any]:
+        """What the command line writes into metrics.json."""
+        return metrics_json(metrics_of(self), self._prepared)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """All columns as a pandas DataFrame, with the time as its index.
+
+        Raises:
+            ImportError: pandas is not installed.
+
+        """
+        if find_spec("pandas") is None:
+            raise ImportError("to_dataframe needs pandas: pip install pandas")
+        import pandas as pd  # noqa: PLC0415
+
+        index = pd.Index(self.time, name="time")
+        return pd.DataFrame(self.rows[:, 1:], index=index, columns=list(self.columns), copy=True)
+
+    def plot(self, *patterns: str) -> Figure:
+        """Draw the columns that match patterns such as `plant.y.*` over time.
+
+        Raises:
+            ValueError: a pattern matches no column.
+
+        """
+        return plot([(self._prepared.scenario.name, self)], patterns)
+
+    def save(self, folder: str | Path, format: str = "csv") -> Path:  # noqa: A002
+        """Write table, metrics.json and run.json, as the command line does.
+
+        Args:
+            folder: made if it does not exist; an earlier result in it is replaced.
+            format: of the table, `csv` or `parquet`.
+
+        Returns:
+            The folder.
+
+        Raises:
+            ValueError: the folder cannot be written.
+
+        """
+        folder = Path(folder)
+        with replaced(folder) as unfinished:
+            table = FORMATS[format](unfinished / f"result.{format}")
+            table.begin(self.header)
+            table.take(self.rows)
+            table.end(self.ending)
+            write_metrics(unfinished, self.metrics())
+            write_record(
+                unfinished, self._prepared, self.header, self.ending, sys.argv, self._started
+            )
+        return folder
+
+
+def simulate(
+    system: str | Path | System,
+    parameters: Mapping[str, object] | None = None,
+    *,
+    stop_time: float | None = None,
+    step: float | None = None,
+    order: str = ORDERS[0],
+    progress: bool = False,
+) -> Result:
+    """Run a scenario, an SSP or a system.
+
+    Args:
+        system: name of a scenario, path of a .toml or .ssp file, or what :func:`load` has given.
+        parameters: values that win over the scenario's, by `component.parameter`.
+        stop_time: end of the run [s]; None: the scenario's own.
+        step: communication step [s]; None: the scenario's own.
+        order: `gauss-seidel` or `jacobi`.
+        progress: show a bar on runs that take longer than some seconds.
+
+    Returns:
+        The rows that were computed: all of them, or those before a failure, which
+        `Result.failure` then describes.
+
+    Raises:
+        ValueError: a name, a value or a file is not usable; the text says what to change.
+
+    """
+    if isinstance(system, System):
+        scenario = Scenario(system.name)
+    else:
+        scenario, system = loaded(str(system))
+    changes: dict[PortName, object] = {
+        port_name(name): value for name, value in (parameters or {}).items()
+    }
+    prepared = prepare(scenario, system, Request(stop_time, step, order, changes))
+    result = Result(prepared)
+    run(prepared.system, prepared.experiment, [result, *([Progress(scenario.name)] * progress)])
+    return result

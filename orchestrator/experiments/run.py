@@ -1,0 +1,166 @@
+"""One experiment and its files: the table as it is computed, then metrics, figures and record."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from orchestrator.analysis.certificates import CertificatesFile
+from orchestrator.analysis.figures import Drawn, draw
+from orchestrator.analysis.metrics import Metrics
+from orchestrator.analysis.sensors import velocities_reaching
+from orchestrator.analysis.signals import CONTROLLER
+from orchestrator.analysis.visible import VisibleRows
+from orchestrator.errors import InputError
+from orchestrator.experiments.experiment import Prepared
+from orchestrator.experiments.folder import replaced
+from orchestrator.experiments.record import write_record
+from orchestrator.master.files import FORMATS
+from orchestrator.master.interrupts import Interrupts, held_interrupts
+from orchestrator.master.observer import Ending, Observer
+from orchestrator.master.progress import Progress
+from orchestrator.master.selection import Selection, matching
+from orchestrator.master.simulation import simulate
+from orchestrator.system.structure import System
+
+
+@dataclass(frozen=True)
+class Files:
+    """What is kept of a run.
+
+    Attributes:
+        interval: of the rows in the table [s]; None: every step.
+        columns: of the table: `all`, `outputs`, or patterns with commas between them.
+        format: of the table, a key of :data:`orchestrator.master.files.FORMATS`.
+        figures: whether to draw them.
+
+    """
+
+    interval: float | None = None
+    columns: str = "all"
+    format: str = "csv"
+    figures: bool = True
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A run whose files are written: what metrics.json holds, and how it has ended."""
+
+    name: str
+    metrics: dict[str, Any]
+    ending: Ending
+
+
+def run_into(
+    folder: Path,
+    runs: Sequence[Prepared],
+    files: Files,
+    command: Sequence[str],
+    say: Callable[[str], None],
+) -> list[Finished]:
+    """Run a scenario, and those it is compared with, and write the files of all.
+
+    Args:
+        folder: for the files of the first; those of the others go into folders below it.
+        runs: the scenario, and those it is compared with.
+        files: what to keep.
+        command: for the record.
+        say: takes notes for the user while it goes on.
+
+    Raises:
+        InputError: a run cannot be made, or its files cannot be written.
+
+    """
+    tables = [selected_columns(prepared.system, files.columns) for prepared in runs]
+    started = datetime.now(UTC)
+    with (
+        held_interrupts(lambda interrupts: say(_answer(interrupts))) as interrupts,
+        replaced(folder) as unfinished,
+    ):
+        done: list[tuple[Path, Prepared, Finished, VisibleRows]] = []
+        for prepared, columns in zip(runs, tables, strict=True):
+            target = unfinished / prepared.scenario.name if done else unfinished
+            target.mkdir(exist_ok=True)
+            done.append((target, prepared, *_run(target, prepared, files, columns)))
+            if interrupts:
+                break
+        if files.figures and not interrupts.urgent:
+            scenario = runs[0].scenario
+            drawn = [Drawn(run.scenario.legend, seen) for _, run, _, seen in done]
+            for note in draw(scenario.figure, scenario.title, drawn, unfinished, scenario.name):
+                say(note)
+        # The record of the first names the files of all, so it comes last.
+        for target, prepared, finished, seen in reversed(done):
+            write_record(target, prepared, seen.header, finished.ending, command, started)
+        return [finished for _, _, finished, _ in done]
+
+
+def _answer(interrupts: Interrupts) -> str:
+    if interrupts.urgent:
+        return "stopping at once: what was computed is kept, figures are left out"
+    return "stopping: writing what was computed and drawing it; once more leaves the figures out"
+
+
+def _run(
+    folder: Path, prepared: Prepared, files: Files, columns: Sequence[str] | None
+) -> tuple[Finished, VisibleRows]:
+    scenario, system = prepared.scenario, prepared.system
+    metrics, seen = Metrics(), VisibleRows()
+    table = FORMATS[files.format](folder / f"result.{files.format}")
+    observers: list[Observer] = [
+        Selection(table, files.interval, columns),
+        CertificatesFile(folder / "certificates.csv", files.interval),
+        metrics,
+        seen,
+        Progress(scenario.name),
+    ]
+    ending = simulate(system, prepared.experiment, observers)
+    values = metrics_json(metrics, prepared)
+    write_metrics(folder, values)
+    return Finished(scenario.name, values, ending), seen
+
+
+def metrics_json(metrics: Metrics, prepared: Prepared) -> dict[str, Any]:
+    """What metrics.json holds of a run."""
+    values = metrics.values(prepared.scenario.name, prepared.system)
+    if CONTROLLER in prepared.system.components:
+        values["velocities_reaching_controller"] = velocities_reaching(prepared.system)
+    return values
+
+
+def write_metrics(folder: Path, values: dict[str, Any]) -> None:
+    """Write metrics.json into a folder."""
+    (folder / "metrics.json").write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
+
+
+def selected_columns(system: System, wanted: str) -> list[str] | None:
+    """The columns of a table.
+
+    Args:
+        system: that is run.
+        wanted: `all`, `outputs`, or patterns with commas between them.
+
+    Raises:
+        InputError: a pattern matches no column.
+
+    """
+    if wanted == "all":
+        return None
+    outputs = wanted == "outputs"
+    names = [
+        f"{component.name}.{variable.name}"
+        for component in system.components.values()
+        for causality in (("output",) if outputs else ("input", "output"))
+        for variable in component.having(causality)
+        if variable.type != "String"
+    ]
+    if outputs:
+        return names
+    patterns = [pattern.strip() for pattern in wanted.split(",") if pattern.strip()]
+    if not patterns:
+        raise InputError("--columns: name columns, or write all or outputs")
+    return matching(names, patterns)

@@ -1,0 +1,91 @@
+"""Results that runs have left in folders."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+from typing import Any
+
+from orchestrator.analysis.visible import VisibleRows
+from orchestrator.errors import InputError
+from orchestrator.experiments.folder import RECORD
+from orchestrator.experiments.record import read_header
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.files import FORMATS, count_rows, read_columns, read_rows
+from orchestrator.master.observer import Ending, Header
+from orchestrator.master.table import Table
+
+#: Chooses the columns that are drawn among those that there are.
+Choice = Callable[[Sequence[str]], Collection[str]]
+
+
+def read_result(path: Path, watched: Choice | None = None) -> tuple[str, Table]:
+    """What can be seen of a stored result, and its name.
+
+    Args:
+        path: a folder that a run has written, or a table in CSV or Parquet. Of a table without a
+            record beside it, no parameters are known.
+        watched: which columns will be drawn; None: those of the paper's figures.
+
+    Raises:
+        InputError: there is no result, or it cannot be read.
+
+    """
+    file = table_in(path)
+    record = read_record(file.parent)
+    columns, n = read_columns(file), count_rows(file)
+    if n < 1:
+        raise InputError(f"{file}: has no rows")
+    table = VisibleRows(n=n) if watched is None else VisibleRows(watched(columns), n)
+    blocks = read_rows(file)
+    first = next(blocks)
+    table.begin(_header(record, columns, first))
+    table.take(first)
+    for rows in blocks:
+        table.take(rows)
+    table.end(Ending(record.get("failure")))
+    return str(record.get("label") or record.get("scenario") or file.stem), table
+
+
+def table_in(path: Path) -> Path:
+    """The file with the table of a result.
+
+    Raises:
+        InputError: there is none.
+
+    """
+    if path.is_file():
+        return path
+    for ending in FORMATS:
+        file = path / f"result.{ending}"
+        if file.is_file():
+            return file
+    raise InputError(f"{path}: holds no result.csv or result.parquet")
+
+
+def read_record(folder: Path) -> dict[str, Any]:
+    """The record in a folder; empty if there is none.
+
+    Raises:
+        InputError: it is broken.
+
+    """
+    file = folder / RECORD
+    if not file.is_file():
+        return {}
+    try:
+        record = json.loads(file.read_text(encoding="utf-8"))
+        read_header(record, ())
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{file}: not the record of a run") from error
+    return dict(record)
+
+
+def _header(record: dict[str, Any], columns: tuple[str, ...], rows: Any) -> Header:
+    if record:
+        return read_header(record, columns)
+    step = float(rows[1, 0] - rows[0, 0]) if len(rows) > 1 else 1.0
+    if not step > 0.0:
+        raise InputError("the times of a table must grow")
+    return Header(columns, Experiment(step, step))

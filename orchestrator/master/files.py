@@ -1,0 +1,160 @@
+"""Rows written to files as they come, and read again."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from importlib.util import find_spec
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.errors import InputError, reason
+from orchestrator.master.observer import Ending, Header
+
+#: Rows that are written to Parquet, or read, at once.
+_ROWS = 8192
+
+
+class CsvFile:
+    """An observer that writes CSV; numbers are written so that they read back exactly."""
+
+    def __init__(self, path: Path) -> None:
+        """Write into a file, which is made when the run begins."""
+        self._path = path
+
+    def begin(self, header: Header) -> None:
+        """Write the names of the columns."""
+        self._file = self._path.open("w", newline="", encoding="utf-8")
+        self._writer = csv.writer(self._file, lineterminator="\n")
+        self._writer.writerow(("time", *header.columns))
+
+    def take(self, rows: np.ndarray) -> None:
+        """Write some rows."""
+        self._writer.writerows(rows.tolist())
+
+    def end(self, ending: Ending) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+class ParquetFile:
+    """An observer that writes Apache Parquet, all columns as doubles."""
+
+    def __init__(self, path: Path) -> None:
+        """Write into a file, which is made when the run begins.
+
+        Raises:
+            InputError: pyarrow is not installed.
+
+        """
+        _check_pyarrow()
+        self._path = path
+
+    def begin(self, header: Header) -> None:
+        """Make the file and its schema."""
+        self._arrow: Any = import_module("pyarrow")
+        double = self._arrow.float64()
+        self._schema = self._arrow.schema([(name, double) for name in ("time", *header.columns)])
+        self._writer = import_module("pyarrow.parquet").ParquetWriter(self._path, self._schema)
+        self._waiting: list[np.ndarray] = []
+
+    def take(self, rows: np.ndarray) -> None:
+        """Write some rows, when there are enough of them."""
+        self._waiting.append(rows.copy())
+        if sum(map(len, self._waiting)) >= _ROWS:
+            self._write()
+
+    def end(self, ending: Ending) -> None:
+        """Write the rest and close the file."""
+        self._write()
+        self._writer.close()
+
+    def _write(self) -> None:
+        if self._waiting:
+            columns = [self._arrow.array(column) for column in np.vstack(self._waiting).T]
+            self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))
+            self._waiting.clear()
+
+
+#: Writers by the ending of their files.
+FORMATS: dict[str, type[CsvFile] | type[ParquetFile]] = {"csv": CsvFile, "parquet": ParquetFile}
+
+
+def read_columns(path: Path) -> tuple[str, ...]:
+    """The names of the columns behind the time.
+
+    Raises:
+        InputError: the file is no table of a run.
+
+    """
+    with _explained(path):
+        if path.suffix == ".parquet":
+            with _parquet(path) as file:
+                first, *names = file.schema_arrow.names
+        else:
+            with path.open(encoding="utf-8") as lines:
+                first, *names = lines.readline().rstrip("\n").split(",")
+        if first != "time":
+            raise ValueError(f"its first column is {first!r}, not 'time'")
+    return tuple(names)
+
+
+def count_rows(path: Path) -> int:
+    """How many rows a file has.
+
+    Raises:
+        InputError: the file is no table of a run.
+
+    """
+    with _explained(path):
+        if path.suffix == ".parquet":
+            with _parquet(path) as file:
+                return int(file.metadata.num_rows)
+        with path.open("rb") as lines:
+            return sum(block.count(b"\n") for block in iter(lambda: lines.read(1 << 20), b"")) - 1
+
+
+def read_rows(path: Path) -> Iterator[np.ndarray]:
+    """The rows of a file, time first, some thousand at a time.
+
+    Raises:
+        InputError: the file is no table of a run.
+
+    """
+    with _explained(path):
+        if path.suffix == ".parquet":
+            with _parquet(path) as file:
+                for batch in file.iter_batches(_ROWS):
+                    yield np.column_stack([column.to_numpy() for column in batch.columns])
+        else:
+            with path.open(encoding="utf-8") as lines:
+                next(lines, None)
+                while block := list(islice(lines, _ROWS)):
+                    yield np.loadtxt(block, delimiter=",", ndmin=2)
+
+
+def _parquet(path: Path) -> Any:
+    _check_pyarrow()
+    return import_module("pyarrow.parquet").ParquetFile(path)
+
+
+def _check_pyarrow() -> None:
+    if find_spec("pyarrow") is None:
+        raise InputError("Parquet needs pyarrow: pip install 'auv-fmu[parquet]'")
+
+
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {reason(error)}") from error
+    except ValueError as error:
+        raise InputError(f"{path}: not a table of a run: {reason(error)}") from error

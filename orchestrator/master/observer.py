@@ -1,0 +1,99 @@
+"""What observers of a run are told, and the blocks of rows in which they are told it.
+
+A row holds, at time t_k, the outputs after the step that ended there, and the inputs that this
+step was made with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from time import monotonic
+from typing import Any, Protocol
+
+import numpy as np
+
+from orchestrator.master.experiment import Experiment
+from orchestrator.system.names import PortName
+
+#: Rows in a block, and the longest time until observers are told of them [s].
+_ROWS, _PATIENCE = 512, 0.2
+
+
+@dataclass(frozen=True)
+class Header:
+    """What is known of a run when its first row has been computed.
+
+    Attributes:
+        columns: `component.port` of every value in a row, behind the time.
+        experiment: that is run.
+        parameters: of all components, as the FMUs reported them after initialisation.
+
+    """
+
+    columns: tuple[str, ...]
+    experiment: Experiment
+    parameters: Mapping[PortName, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a run has ended.
+
+    Attributes:
+        failure: why it ended early, or None.
+        messages: what the FMUs logged with status warning or worse.
+
+    """
+
+    failure: str | None = None
+    messages: tuple[str, ...] = ()
+
+
+class Observer(Protocol):
+    """Something that takes what a run computes."""
+
+    def begin(self, header: Header) -> None:
+        """Prepare for the rows of a run."""
+
+    def take(self, rows: np.ndarray) -> None:
+        """Take some rows, time first, (n, 1 + columns); the array is used again afterwards."""
+
+    def end(self, ending: Ending) -> None:
+        """Take note that there are no more rows."""
+
+
+class Blocks:
+    """Hands rows to observers, some hundred at a time."""
+
+    def __init__(self, width: int, observers: Sequence[Observer]) -> None:
+        """Make room for one block.
+
+        Args:
+            width: values in a row, without the time.
+            observers: to be told.
+
+        """
+        self._rows = np.empty((_ROWS, 1 + width))
+        self._times, self._values = self._rows[:, 0], self._rows[:, 1:]
+        self._n = 0
+        self._due = monotonic() + _PATIENCE
+        self._observers = observers
+
+    def append(self, t: float, values: np.ndarray) -> None:
+        """Take a row."""
+        n = self._n
+        self._times[n] = t
+        self._values[n] = values
+        self._n = n + 1
+        if self._n == _ROWS or monotonic() > self._due:
+            self.hand_over()
+
+    def hand_over(self) -> None:
+        """Tell the observers of the rows that they do not know yet."""
+        if self._n:
+            # Counted as told before they are told: an observer that fails is not told twice.
+            rows, self._n = self._rows[: self._n], 0
+            for observer in self._observers:
+                observer.take(rows)
+        self._due = monotonic() + _PATIENCE

@@ -1,0 +1,80 @@
+"""Which components are stepped when, and on whose outputs.
+
+Every communication step has stages. Before a stage is stepped its inputs are gathered; the
+outputs of a component are read as soon as it was stepped.
+
+- `jacobi`: one stage. All inputs are outputs of t_k.
+- `gauss-seidel`: a component whose output has direct feedthrough is stepped in an earlier
+  stage than those it feeds, so they receive without delay what follows from t_k. Outputs
+  without feedthrough are states: everybody takes them at t_k.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from orchestrator.master.instance import Instance
+from orchestrator.master.row import Row
+from orchestrator.system.graph import feedthrough_stages, has_feedthrough
+from orchestrator.system.structure import Connection, System
+
+
+class Member(NamedTuple):
+    """The calls that step one component."""
+
+    set_inputs: list[Callable[[], Any]]
+    do_step: Callable[[float, float, int], Any]
+    get_outputs: list[Callable[[], Any]]
+
+
+class Stage(NamedTuple):
+    """Inputs to gather, and the components to step then."""
+
+    targets: np.ndarray
+    sources: np.ndarray
+    members: list[Member]
+
+
+def stages(system: System, order: str) -> list[list[str]]:
+    """Components in the order in which they are stepped; those of one stage are independent.
+
+    Raises:
+        InputError: direct feedthroughs form a loop.
+
+    """
+    return [list(system.components)] if order == "jacobi" else feedthrough_stages(system)
+
+
+def schedule(
+    system: System, order: str, instances: Mapping[str, Instance], row: Row
+) -> list[Stage]:
+    """The stages of every step.
+
+    Args:
+        system: whose connections say what feeds what.
+        order: one of :data:`orchestrator.master.experiment.ORDERS`.
+        instances: of all components.
+        row: that they are tied to.
+
+    Raises:
+        InputError: direct feedthroughs form a loop.
+
+    """
+    plan = stages(system, order)
+    stage_of = {name: i for i, names in enumerate(plan) for name in names}
+    gathered: list[list[Connection]] = [[] for _ in plan]
+    for connection in system.connections:
+        # What is no feedthrough is a state, and must be taken before anybody advances.
+        late = len(plan) > 1 and has_feedthrough(system, connection)
+        gathered[stage_of[connection.target.component] if late else 0].append(connection)
+    return [
+        Stage(*row.places(connections), [_member(instances[name]) for name in names])
+        for names, connections in zip(plan, gathered, strict=True)
+    ]
+
+
+def _member(instance: Instance) -> Member:
+    return Member(instance.set_inputs, instance.do_step, instance.get_outputs)

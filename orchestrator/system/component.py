@@ -1,0 +1,97 @@
+"""An FMU and what its description says about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+
+import fmpy
+from fmpy.model_description import ModelDescription, ModelVariable
+
+from orchestrator.errors import InputError, did_you_mean, reason
+from orchestrator.system.unpacking import Version, version_of
+from orchestrator.system.values import Value, typed
+
+
+@dataclass(frozen=True)
+class Component:
+    """An FMU in a system.
+
+    Attributes:
+        name: of the instance.
+        fmu: the file.
+        description: what its modelDescription.xml says.
+
+    """
+
+    name: str
+    fmu: Path
+    description: ModelDescription
+
+    @cached_property
+    def variables(self) -> dict[str, ModelVariable]:
+        """The FMU's variables by name."""
+        return {variable.name: variable for variable in self.description.modelVariables}
+
+    def variable(self, name: str) -> ModelVariable:
+        """One variable of the FMU.
+
+        Raises:
+            InputError: there is no such variable.
+
+        """
+        if name not in self.variables:
+            hint = did_you_mean(name, self.variables)
+            raise InputError(f"{self.name} has no port or parameter {name!r}{hint}")
+        return self.variables[name]
+
+    def having(self, causality: str) -> list[ModelVariable]:
+        """The variables of one causality, in the order of the description."""
+        return [v for v in self.description.modelVariables if v.causality == causality]
+
+    def start(self, name: str) -> Value | None:
+        """The start value of a variable, in its type; None: its description names none.
+
+        Raises:
+            InputError: there is no such variable.
+
+        """
+        variable = self.variable(name)
+        if variable.start is None:
+            return None
+        return typed(f"{self.name}.{name}", variable, variable.start)
+
+    def has_feedthrough(self, output: str) -> bool:
+        """Whether an output depends on an input of the same instant.
+
+        An FMU that does not say must be taken to have it (FMI 2.0.4, section 2.2.8).
+        """
+        for unknown in self.description.outputs:
+            if unknown.variable.name == output:
+                known = unknown.dependencies
+                return known is None or any(v.causality == "input" for v in known)
+        return False
+
+
+def read_component(name: str, fmu: Path) -> Component:
+    """An FMU as a component.
+
+    Raises:
+        InputError: the file is missing or is no FMI 2.0 co-simulation FMU.
+
+    """
+    if not fmu.is_file():
+        raise InputError(f"{fmu}: no such FMU")
+    return Component(name, fmu, _description(version_of(fmu)))
+
+
+@lru_cache(maxsize=256)
+def _description(fmu: Version) -> ModelDescription:
+    try:
+        description = fmpy.read_model_description(fmu.path)
+    except Exception as error:
+        raise InputError(f"{fmu.path}: not a readable FMU: {reason(error)}") from error
+    if description.fmiVersion != "2.0" or description.coSimulation is None:
+        raise InputError(f"{fmu.path}: not an FMI 2.0 co-simulation FMU")
+    return description

@@ -1,0 +1,77 @@
+"""A system as one FMU that contains the others."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from orchestrator.errors import InputError, last_line
+from orchestrator.system.structure import System
+
+_TOOLBOX = "fmu_manipulation_toolbox"
+
+
+def write_container(system: System, folder: Path) -> list[Path]:
+    """Write `NAME.fmu`, one FMU that contains the whole system and shows all its outputs.
+
+    Raises:
+        InputError: the FMU manipulation toolbox is not installed, or fails.
+
+    """
+    if find_spec(_TOOLBOX) is None:
+        raise InputError(
+            "a container needs the FMU manipulation toolbox: pip install 'auv-fmu[hosts]'"
+        )
+    fmus = {component.name: component.fmu.name for component in system.components.values()}
+    if len(set(fmus.values())) < len(fmus):
+        raise InputError("a container takes each FMU once; this system has one twice")
+    content: dict[str, Any] = {
+        "name": f"{system.name}.fmu",
+        "step_size": system.step,
+        "auto_link": False,
+        "auto_input": False,
+        "auto_output": False,
+        "auto_parameter": False,
+        "fmu": list(fmus.values()),
+        "link": [
+            [fmus[c.source.component], c.source.port, fmus[c.target.component], c.target.port]
+            for c in system.connections
+        ],
+        "output": [
+            [component.fmu.name, variable.name, f"{component.name}.{variable.name}"]
+            for component in system.components.values()
+            for variable in component.description.modelVariables
+            if variable.causality == "output"
+        ],
+        "start": [
+            [fmus[name], port, value]
+            for name in system.components
+            for port, value in system.parameters_of(name).items()
+        ],
+    }
+    with TemporaryDirectory(prefix="auvfmu") as work:
+        for component in system.components.values():
+            shutil.copyfile(component.fmu, Path(work, component.fmu.name))
+        Path(work, "system.json").write_text(json.dumps(content), encoding="utf-8")
+        command = ["-m", f"{_TOOLBOX}.cli.fmucontainer", "-container", "system.json"]
+        process = subprocess.run(
+            [sys.executable, "-P", *command, "-fmu-directory", work],
+            cwd=work,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        built = Path(work, f"{system.name}.fmu")
+        if process.returncode != 0 or not built.is_file():
+            raise InputError(
+                f"the container was not built: {last_line(process.stderr + process.stdout)}"
+            )
+        path = folder / built.name
+        shutil.copyfile(built, path)
+    return [path]

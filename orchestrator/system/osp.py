@@ -1,0 +1,48 @@
+"""A system as libcosim's own configuration."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from xml.etree import ElementTree
+
+from orchestrator.system.structure import System
+from orchestrator.system.values import literal
+
+_OSP = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
+
+
+def write_osp(system: System, folder: Path) -> list[Path]:
+    """Write `OspSystemStructure.xml` and the FMUs beside it, for libcosim and its command line."""
+    root = ElementTree.Element("OspSystemStructure", xmlns=_OSP, version="0.1")
+    for tag, text in (("StartTime", "0.0"), ("BaseStepSize", str(system.step))):
+        ElementTree.SubElement(root, tag).text = text
+    ElementTree.SubElement(root, "Algorithm").text = "fixedStep"
+    simulators = ElementTree.SubElement(root, "Simulators")
+    written = []
+    for component in system.components.values():
+        written.append(folder / component.fmu.name)
+        shutil.copyfile(component.fmu, written[-1])
+        simulator = ElementTree.SubElement(
+            simulators,
+            "Simulator",
+            name=component.name,
+            source=component.fmu.name,
+            stepSize=str(system.step),
+        )
+        parameters = system.parameters_of(component.name)
+        if parameters:
+            values = ElementTree.SubElement(simulator, "InitialValues")
+            for name, value in parameters.items():
+                element = ElementTree.SubElement(values, "InitialValue", variable=name)
+                kind = component.variable(name).type
+                ElementTree.SubElement(element, kind, value=literal(value))
+    connections = ElementTree.SubElement(root, "Connections")
+    for connection in system.connections:
+        element = ElementTree.SubElement(connections, "VariableConnection")
+        for end in (connection.source, connection.target):
+            ElementTree.SubElement(element, "Variable", simulator=end.component, name=end.port)
+    ElementTree.indent(root)
+    path = folder / "OspSystemStructure.xml"
+    path.write_bytes(ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True))
+    return [path, *written]

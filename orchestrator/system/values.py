@@ -1,0 +1,72 @@
+"""Values of FMI's variables: a value is typed once, where it enters a system."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import TypeAlias
+
+from fmpy.model_description import ModelVariable
+
+from orchestrator.errors import InputError
+
+#: A value in the type of its variable.
+Value: TypeAlias = float | int | bool | str
+
+#: What FMI's Integers can hold.
+_INTEGERS = -(2**31), 2**31 - 1
+
+_BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
+_KINDS = {"Real": "a real number", "Boolean": "a Boolean (true or false)"}
+
+
+def typed(name: str, variable: ModelVariable, value: object) -> Value:
+    """A value, or its text from a command line or file, in the variable's type.
+
+    Args:
+        name: of the variable in the system, for the message.
+        variable: whose type and range count.
+        value: a number, a truth value or a text.
+
+    Raises:
+        InputError: it is not of that type, not finite, or outside the range of the variable.
+
+    """
+    text = str(value).strip()
+    try:
+        if variable.type == "Boolean":
+            return _BOOLEANS[text.lower()]
+        if variable.type == "String":
+            return text
+        number = float(text) if variable.type == "Real" else int(text)
+    except (KeyError, ValueError):
+        kind = _KINDS.get(variable.type, "an integer")
+        raise InputError(f"{name} = {text}: not {kind}") from None
+    if not isfinite(number):
+        raise InputError(f"{name} = {text}: must be finite")
+    lower, upper = _range(variable)
+    if lower is not None and number < lower:
+        raise InputError(f"{name} = {text}: must be at least {lower:g}")
+    if upper is not None and number > upper:
+        raise InputError(f"{name} = {text}: must be at most {upper:.16g}")
+    return number
+
+
+def _range(variable: ModelVariable) -> tuple[float | None, float | None]:
+    lower = None if variable.min is None else float(variable.min)
+    upper = None if variable.max is None else float(variable.max)
+    if variable.type == "Real":
+        return lower, upper
+    least, most = _INTEGERS
+    return (least if lower is None else lower), (most if upper is None else upper)
+
+
+def literal(value: Value) -> str:
+    """A value as XML writes it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def unit_of(variable: ModelVariable) -> str | None:
+    """The unit of a variable, its own or that of its type."""
+    declared = variable.declaredType
+    unit: str | None = variable.unit or (declared.unit if declared is not None else None)
+    return unit
