@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from auv_fmu.attitude import rotation_from_euler
-from auv_fmu.lyapunov import composite_errors, lyapunov
+from auv_fmu.proof.lyapunov import composite_errors, lyapunov
 from auv_fmu.saturation import INTEGRALS, SATURATIONS
 from orchestrator.metrics import ACTUATORS, AXES, LIMITS, POSTURE, true_control_point
 from orchestrator.result import Result
