@@ -1,16 +1,15 @@
-"""Definition 2, Lemma 1 and Lemma 2."""
+"""Definition 2 and Lemma 1."""
 
-from math import cosh, exp, log, sqrt
+from math import cosh, log, sqrt
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu.adaptation import NU
 from auv_fmu.saturation import INTEGRALS as OURS
 from auv_fmu.saturation import MAXIMUM_SLOPE, SATURATIONS
-from strategies import vectors
+from support.strategies import vectors
 
 numbers = st.floats(-50.0, 50.0)
 positive = st.floats(0.01, 20.0)
@@ -90,21 +89,3 @@ def test_lemma_1_iv_to_vi(name, x, k, psi):
     values = np.array([s(xi)[0] for xi in x])
     left = np.array(x) @ np.diag(psi) @ values
     assert left >= min(psi) * (values @ values) * (1 - ROUNDING)
-
-
-def test_constant_of_lemma_2_has_the_digits_it_is_printed_with():
-    assert exp(-(NU + 1)) == pytest.approx(NU, abs=5e-5)
-
-
-@given(x=vectors(numbers, 3), h=numbers, eps_t=positive)
-def test_lemma_2(x, h, eps_t):
-    """h |x| - x' h Tanh(nu h x / eps_t) <= n eps_t, checked in the norm that makes it true.
-
-    The lemma holds component by component, |h x_i| - h x_i tanh(nu h x_i / eps_t) <= eps_t, and
-    the Euclidean norm is not larger than the sum of the components.
-    """
-    slack = 1e-3 * eps_t  # nu has four digits
-    for x_i in x:
-        assert abs(h * x_i) - h * x_i * np.tanh(NU * h * x_i / eps_t) <= eps_t + slack
-    left = h * np.linalg.norm(x) - sum(h * x_i * np.tanh(NU * h * x_i / eps_t) for x_i in x)
-    assert left <= 3 * eps_t + 3 * slack

@@ -9,7 +9,7 @@ from auv_fmu import pd
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import jacobian
 from auv_fmu.pd import PdGains, PdMeasurement
-from strategies import angles, speeds, vectors
+from support.strategies import angles, speeds, vectors
 
 three = vectors(speeds, 3)
 

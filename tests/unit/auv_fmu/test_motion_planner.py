@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from auv_fmu import motion_planner
 from auv_fmu.motion_planner import PlannerState
 from auv_fmu.vehicle import Vehicle
-from strategies import angles, forces, lengths, speeds, vectors
+from support.strategies import angles, forces, lengths, speeds, vectors
 
 VEHICLE = Vehicle()
 

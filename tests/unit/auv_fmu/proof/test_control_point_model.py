@@ -18,7 +18,7 @@ from auv_fmu.proof.control_point_model import (
     kinematic_matrix,
 )
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
-from strategies import angles, forces, lengths, pitch_angles, speeds, vectors
+from support.strategies import angles, forces, lengths, pitch_angles, speeds, vectors
 
 VEHICLE, ELL = Vehicle(), 0.35
 MODEL = ActuatedDynamics(VEHICLE)

@@ -16,7 +16,7 @@ from auv_fmu.control_point import (
 )
 from auv_fmu.plant import RollAxis, initial_state, outputs, step
 from auv_fmu.vehicle import Vehicle
-from strategies import angles, forces, lengths, pitch_angles, speeds, vectors
+from support.strategies import angles, forces, lengths, pitch_angles, speeds, vectors
 
 
 @given(theta=angles, psi=angles, position=vectors(speeds, 3), ell=lengths)
