@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Slave
 
+from auv_fmu.closed_loop import Instant, closed_loop
 from orchestrator import bundle
 from orchestrator.master import simulate
 from orchestrator.metrics import effort, final_error, tracking_error, true_control_point
 from orchestrator.result import Result
 from orchestrator.system import PortName, System
-from straight_line import Instant, closed_loop
 
 STEPS = 5000
 UQR, XYZ = ("u", "q", "r"), ("x", "y", "z")

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from auv_fmu import output_feedback
 from auv_fmu.attitude import rotation_from_euler
+from auv_fmu.closed_loop import closed_loop
 from auv_fmu.control_point import jacobian
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement
 from auv_fmu.saturation import SATURATIONS, algebraic, hyperbolic_tangent
-from straight_line import closed_loop
 from support.strategies import angles, speeds, vectors
 
 NUMPY = {"tanh": np.tanh, "algebraic": lambda x: x / np.sqrt(1 + x**2)}
