@@ -25,7 +25,8 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 from unittest.mock import patch
 
-from auv_fmu.closed_loop import STEP, closed_loop
+from auv_fmu.closed_loop import closed_loop
+from auv_fmu.euler import STEP
 from orchestrator import bundle
 from orchestrator.instance import Instance
 from orchestrator.master import simulate

@@ -1,7 +1,6 @@
-"""The closed loop as one straight line of Python: no FMI, no master, no ports.
+"""The paper's Fig. 2 as one straight line of Python: no FMI, no master, no ports.
 
-It calls the same equations in the order of the paper's Euler scheme: everything is evaluated
-from the states and measurements at t_k, then all states advance together.
+Everything else that runs this loop is held against it.
 """
 
 from __future__ import annotations
@@ -10,75 +9,84 @@ from collections.abc import Iterator
 from random import Random
 from typing import NamedTuple
 
-from auv_fmu import disturbance, motion_planner, output_feedback, plant
-from auv_fmu.actuators import limit_all
-from auv_fmu.disturbance import Disturbance
-from auv_fmu.motion_planner import PlannerState, Reference
+from auv_fmu import motion_planner, output_feedback, plant
+from auv_fmu.actuators import Limits, limit_all
+from auv_fmu.disturbance import Disturbance, disturbance
+from auv_fmu.euler import STEP
+from auv_fmu.motion_planner import ETA_D0, TAU_D, PlannerState, Reference
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement, Signals
-from auv_fmu.plant import PlantOutputs, PlantState, RollAxis
-from auv_fmu.types import Vector3, Vector6
+from auv_fmu.plant import ETA_0, NU_0, Localisation, PlantOutputs, PlantState, RollAxis
+from auv_fmu.types import Vector3, Vector5, Vector6
 from auv_fmu.vehicle import Vehicle
 
-#: Section 4.1, and what the paper leaves open as the components choose it.
-LIMIT = (80.0, 80.0, 80.0)
-NOISE_STD, NOISE_SEED = 0.001, 1
-TAU_D = (5.0, 1.0, 2.0)
-STEP = 0.02
-PAPER = Gains()
+
+class Setting(NamedTuple):
+    """Parameters of every block of Fig. 2, with the values of section 4.1: the run of Fig. 4."""
+
+    vehicle: Vehicle = Vehicle()  #: also the planner's
+    roll: RollAxis = RollAxis()
+    limits: Limits = Limits()
+    eta_0: Vector6 = ETA_0  #: initial posture (x, y, z, phi, theta, psi) [m, rad]
+    nu_0: Vector6 = NU_0  #: initial velocity (u, v, w, p, q, r) [m/s, rad/s]
+    localisation: Localisation = Localisation()
+    disturbance: Disturbance = Disturbance()
+    gains: Gains = Gains()  #: with the distance ell of all control points
+    tau_d: Vector3 = TAU_D  #: drives the reference (u, q, r) [N, N.m]
+    eta_d0: Vector5 = ETA_D0  #: initial posture of the reference (x, y, z, theta, psi) [m, rad]
+    h: float = STEP  #: [s]
+
+
+#: Section 4.1.
+PAPER = Setting()
 
 
 class Instant(NamedTuple):
-    """All values at one time."""
+    """All signals of Fig. 2 at one time t_k."""
 
+    t: float  #: [s]
     plant_state: PlantState
     plant_outputs: PlantOutputs
-    measured: Vector3
-    tau_applied: Vector3
-    controller_state: ControllerState
-    signals: Signals
-    measurement: Measurement
-    tau_w: Vector6
     planner_state: PlannerState
     reference: Reference
+    measurement: Measurement
+    controller_state: ControllerState
+    signals: Signals
+    tau: Vector3  #: applied (tau_u, tau_q, tau_r), after the limits of (3) [N, N.m]
+    tau_w: Vector6  #: disturbance (u, v, w, p, q, r) [N, N.m]
 
 
-def closed_loop(
-    steps: int, noise_std: float = NOISE_STD, gains: Gains = PAPER, h: float = STEP
-) -> Iterator[Instant]:
-    """Fig. 4: the values at the start, then after every step.
+def closed_loop(steps: int, setting: Setting = PAPER) -> Iterator[Instant]:
+    """The loop in the paper's Euler scheme: all signals at t_k, then all states advance.
 
-    As in the table of a run, the controller, the disturbance and the applied torque belong to
-    the beginning of the step that ends at the instant.
+    Args:
+        steps: to take.
+        setting: of the loop.
+
+    Yields:
+        The instants t_0 = 0 to t_steps, one more than steps.
+
     """
-    vehicle, roll, waves = Vehicle(), RollAxis(), Disturbance()
-    lower = (-LIMIT[0], -LIMIT[1], -LIMIT[2])
-    gauss = Random(NOISE_SEED).gauss
-    state = plant.initial_state((2.0, 6.0, 0.0), (0.0, 0.0, 0.0), (0.0,) * 6)
-    planned = PlannerState((0.0, 0.0, -2.0), 0.0, 0.0, (0.0,) * 5)
-    seen = plant.outputs(state, gains.ell)
-    y = plant.measure(seen.y, noise_std, (gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)))
-    moving = motion_planner.motion(vehicle, planned, TAU_D)
-    reference = motion_planner.reference(planned, moving, gains.ell)
-    measurement = Measurement(y, seen.euler, *reference)
-    control = output_feedback.initial_state(gains, y)
-    signals = output_feedback.evaluate(gains, control, measurement)
-    tau_w = disturbance.disturbance(waves, state.nu, 0.0)
-    tau = limit_all(signals.tau, lower, LIMIT)
-    yield Instant(state, seen, y, tau, control, signals, measurement, tau_w, planned, reference)
-    for k in range(steps):
-        control = output_feedback.gated(gains, control, y)
-        measurement = Measurement(y, seen.euler, *reference)
-        signals = output_feedback.evaluate(gains, control, measurement)
-        tau_w = disturbance.disturbance(waves, state.nu, k * h)
-        tau = limit_all(signals.tau, lower, LIMIT)
-        evaluated = control
-        control = output_feedback.step(control, signals, h)
-        state = plant.step(vehicle, roll, state, tau, tau_w, h)
-        planned = motion_planner.step(planned, moving, h)
-        moving = motion_planner.motion(vehicle, planned, TAU_D)
+    vehicle, gains, tau_d, h = setting.vehicle, setting.gains, setting.tau_d, setting.h
+    tau_min, tau_max = setting.limits
+    std, seed = setting.localisation
+    gauss = Random(seed).gauss
+    state = plant.initial_state(setting.eta_0[:3], setting.eta_0[3:], setting.nu_0)
+    planned = motion_planner.initial_state(setting.eta_d0)
+    for k in range(steps + 1):
         seen = plant.outputs(state, gains.ell)
-        y = plant.measure(seen.y, noise_std, (gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)))
+        y = plant.measure(seen.y, std, (gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)))
+        moving = motion_planner.motion(vehicle, planned, tau_d)
         reference = motion_planner.reference(planned, moving, gains.ell)
+        measurement = Measurement(y, seen.euler, *reference)
+        if k == 0:
+            control = output_feedback.initial_state(gains, y)
+        control = output_feedback.gated(gains, control, y)
+        signals = output_feedback.evaluate(gains, control, measurement)
+        tau = limit_all(signals.tau, tau_min, tau_max)
+        tau_w = disturbance(setting.disturbance, state.nu, k * h)
         yield Instant(
-            state, seen, y, tau, evaluated, signals, measurement, tau_w, planned, reference
+            k * h, state, seen, planned, reference, measurement, control, signals, tau, tau_w
         )
+        control = output_feedback.step(control, signals, h)
+        state = plant.step(vehicle, setting.roll, state, tau, tau_w, h)
+        planned = motion_planner.step(planned, moving, h)

@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 
 from auv_fmu import output_feedback
 from auv_fmu.attitude import rotation_from_euler
-from auv_fmu.closed_loop import closed_loop
+from auv_fmu.closed_loop import Setting, closed_loop
 from auv_fmu.control_point import jacobian
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement
+from auv_fmu.plant import Localisation
 from auv_fmu.saturation import SATURATIONS, algebraic, hyperbolic_tangent
 from support.strategies import angles, speeds, vectors
 
@@ -88,5 +89,5 @@ def test_gate_restarts_the_observer_after_a_jump_only():
 @pytest.mark.parametrize("s", [hyperbolic_tangent, algebraic])
 def test_closed_loop_of_either_saturation_function_converges(s):
     """Theorem 2: the tracking error ends in a ball; 10 cm in 60 s from 6 m for our numbers."""
-    *_, last = closed_loop(3000, noise_std=0.0, gains=Gains(s=s))
+    *_, last = closed_loop(3000, Setting(gains=Gains(s=s), localisation=Localisation(std=0.0)))
     assert np.abs(last.signals.e).max() < 0.1
