@@ -85,7 +85,7 @@ def accelerations_6dof(
     u, v, w, p, q, r = nu
     tau_wu, tau_wv, tau_ww, tau_wp, tau_wq, tau_wr = tau_w
     sin_theta, cos_theta_sin_phi = -rotation[0][2], rotation[1][2]
-    m22, m33, m55, m66 = vehicle[1:5]
+    m22, m33, m55, m66 = vehicle.m22, vehicle.m33, vehicle.m55, vehicle.m66
     du, dv, dw, dq, dr = accelerations(
         vehicle,
         (u, v, w, q, r),

@@ -2,32 +2,36 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+from auv_fmu import observer
 from auv_fmu.control_point import actuated_velocity
-from auv_fmu.observer import observer_velocity
-from auv_fmu.output_feedback import virtual_reference
+from auv_fmu.output_feedback import virtual_velocity
 from auv_fmu.saturation import Integral, Saturation
 from auv_fmu.types import Rotation, Vector3
+from auv_fmu.vectors import difference
 from auv_fmu.vehicle import Vehicle
 
 
-def kinetic(vehicle: Vehicle, rotation: Rotation, ell: float, r: Vector3) -> float:
-    """R' M_2 r / 2 [J], with M_2 = J^-T M_1 J^-1 of (15): v' M_1 v / 2 at v = J^-1 r.
+class Errors(NamedTuple):
+    """What (34) weighs, with the true state of the vehicle."""
 
-    Args:
-        vehicle: parameters.
-        rotation: body to earth.
-        ell: distance of the control point [m].
-        r: composite error [m/s], earth frame.
-
-    """
-    u, q, s = actuated_velocity(rotation, ell, r, (0.0, 0.0))
-    return 0.5 * (vehicle.m11 * u * u + vehicle.m55 * q * q + vehicle.m66 * s * s)
+    e: Vector3  #: tracking error y - y_d [m]
+    z: Vector3  #: estimation error y - y_hat [m]
+    r_1: Vector3  #: composite error (17) [m/s]
+    r_2: Vector3  #: composite error (19) [m/s]
 
 
 def composite_errors(
-    dy: float, dy_d: float, e_z: float, dy_hat: float, z: float, lambda_: float, s: Saturation
-) -> tuple[float, float]:
-    """r_1 = dy/dt - dy_r/dt and r_2 = dy/dt - dy_o/dt, one axis: equations (17) and (19).
+    dy: Vector3,
+    dy_d: Vector3,
+    dy_hat: Vector3,
+    e_z: Vector3,
+    z: Vector3,
+    lambda_: float,
+    s: Saturation,
+) -> tuple[Vector3, Vector3]:
+    """r_1 = dy - dy_r and r_2 = dy - dy_o [m/s]: equations (17) and (19).
 
     Args:
         dy, dy_d, dy_hat: true, desired and estimated velocity of the control point [m/s].
@@ -37,34 +41,59 @@ def composite_errors(
         s: saturation function.
 
     """
-    dy_r = virtual_reference(dy_d, s(e_z)[0], lambda_)
-    dy_o = observer_velocity(dy_hat, s(z)[0], lambda_)
-    return dy - dy_r, dy - dy_o
+    dy_r = virtual_velocity(dy_d, s(e_z)[0], lambda_)
+    dy_o = observer.dy_o(dy_hat, s(z)[0], lambda_)
+    return difference(dy, dy_r), difference(dy, dy_o)
+
+
+def potential(K2: Vector3, integral: Integral, e: Vector3, z: Vector3) -> float:
+    """The sums over k_2i of (34) and (55) [J].
+
+    Args:
+        K2: diagonal of K_2 [N].
+        integral: of the saturation function.
+        e, z: tracking and estimation error [m].
+
+    """
+    return sum(k * (integral(e_i - z_i) + integral(z_i)) for k, e_i, z_i in zip(K2, e, z))
+
+
+def kinetic(vehicle: Vehicle, rotation: Rotation, r: Vector3, ell: float) -> float:
+    """r^T M_2 r / 2 [J], with M_2 = J^-T M_1 J^-1 of (15): v^T M_1 v / 2 at v = J^-1 r.
+
+    Args:
+        vehicle: parameters.
+        rotation: body to earth.
+        r: composite error [m/s], earth frame.
+        ell: distance of the control point [m].
+
+    """
+    v_u, v_q, v_r = actuated_velocity(rotation, r, (0.0, 0.0), ell)
+    return 0.5 * (vehicle.m11 * v_u * v_u + vehicle.m55 * v_q * v_q + vehicle.m66 * v_r * v_r)
 
 
 def lyapunov(
     vehicle: Vehicle,
     rotation: Rotation,
-    ell: float,
+    errors: Errors,
     K2: Vector3,
     integral: Integral,
-    e: Vector3,
-    z: Vector3,
-    r_1: Vector3,
-    r_2: Vector3,
+    ell: float,
 ) -> float:
-    """(34) or (55) without its last term, which needs the unknown theta.
+    """V of (34) or (55) [J] without its last term, which needs the unknown theta.
 
     Args:
         vehicle: parameters.
         rotation: body to earth.
-        ell: distance of the control point [m].
+        errors: at the same instant.
         K2: diagonal of K_2 [N].
         integral: of the saturation function.
-        e: tracking error [m].
-        z: estimation error [m].
-        r_1, r_2: composite errors (17) and (19) [m/s].
+        ell: distance of the control point [m].
 
     """
-    potential = sum(k * (integral(e_i - z_i) + integral(z_i)) for k, e_i, z_i in zip(K2, e, z))
-    return potential + kinetic(vehicle, rotation, ell, r_1) + kinetic(vehicle, rotation, ell, r_2)
+    e, z, r_1, r_2 = errors
+    return (
+        potential(K2, integral, e, z)
+        + kinetic(vehicle, rotation, r_1, ell)
+        + kinetic(vehicle, rotation, r_2, ell)
+    )

@@ -22,28 +22,44 @@ three = vectors(speeds, 3)
 @pytest.mark.parametrize("name", SATURATIONS)
 @pytest.mark.parametrize("printed_jacobian", [True, False])
 @given(
-    y=three, euler=vectors(angles, 3), y_d=three, dy_d=three, ddy_d=three, y_hat=three,
-    dy_o=three, theta_hat=vectors(st.floats(0, 20), 4), gains=vectors(st.floats(0.1, 20), 6),
-)  # fmt: skip
+    y=three,
+    euler=vectors(angles, 3),
+    y_d=three,
+    dy_d=three,
+    ddy_d=three,
+    y_hat=three,
+    dy_hat_o=three,
+    theta_hat=vectors(st.floats(0, 20), 4),
+    gains=vectors(st.floats(0.1, 20), 6),
+)
 def test_law_is_48_to_51_in_matrices(
-    name, printed_jacobian, y, euler, y_d, dy_d, ddy_d, y_hat, dy_o, theta_hat, gains
+    name, printed_jacobian, y, euler, y_d, dy_d, ddy_d, y_hat, dy_hat_o, theta_hat, gains
 ):
     """(48), (49), (50), (51) and Remark 3 with numpy matrices, as the paper prints them."""
     s, s_slope = NUMPY[name], SLOPES[name]
     k_1, k_2, lam, k_d, eps_t, sigma = gains
-    g = Gains(K1=(k_1, 2 * k_1, 3 * k_1), K2=(k_2, 3 * k_2, 2 * k_2), lambda_=lam, k_d=k_d,
-              eps_t=eps_t, sigma=sigma, gamma=0.7, theta_0=(0.1, 0.2, 0.3, 0.4),
-              s=SATURATIONS[name], printed_jacobian=printed_jacobian)  # fmt: skip
-    signals = output_feedback.evaluate(
-        g, ControllerState(y_hat, dy_o, theta_hat), Measurement(y, euler, y_d, dy_d, ddy_d)
+    g = Gains(
+        K1=(k_1, 2 * k_1, 3 * k_1),
+        K2=(k_2, 3 * k_2, 2 * k_2),
+        lambda_=lam,
+        k_d=k_d,
+        eps_t=eps_t,
+        sigma=sigma,
+        gamma=0.7,
+        theta_0=(0.1, 0.2, 0.3, 0.4),
+        s=SATURATIONS[name],
+        printed_jacobian=printed_jacobian,
     )
-    y, y_d, dy_d, ddy_d, y_hat, dy_o, theta_hat = map(
-        np.array, (y, y_d, dy_d, ddy_d, y_hat, dy_o, theta_hat)
+    state = ControllerState(y_hat, dy_hat_o, theta_hat)
+    signals = output_feedback.evaluate(g, state, Measurement(y, euler, y_d, dy_d, ddy_d))
+    moved = output_feedback.step(state, signals, 0.02)
+    y, y_d, dy_d, ddy_d, y_hat, dy_hat_o, theta_hat = map(
+        np.array, (y, y_d, dy_d, ddy_d, y_hat, dy_hat_o, theta_hat)
     )
     Lambda, K_1, K_2 = lam * np.eye(3), np.diag(g.K1), np.diag(g.K2)
     e, z = y - y_d, y - y_hat
     dy_r = dy_d - Lambda @ s(e - z)
-    dy_hat = dy_o + Lambda @ s(z) + k_d * z
+    dy_hat = dy_hat_o + Lambda @ s(z) + k_d * z
     ddy_r = ddy_d - Lambda @ np.diag(s_slope(y_hat - y_d)) @ (dy_hat - dy_d)
     r = dy_hat - dy_d + Lambda @ s(y_hat - y_d) + Lambda @ s(z)
     G = np.array([1, np.linalg.norm(dy_r), np.linalg.norm(dy_r) ** 2, np.linalg.norm(ddy_r)])
@@ -64,16 +80,21 @@ def test_law_is_48_to_51_in_matrices(
     np.testing.assert_allclose(signals.dy_hat, dy_hat, **exact)
     np.testing.assert_allclose(signals.e, e, **exact)
     np.testing.assert_allclose(signals.z, z, **exact)
-    np.testing.assert_allclose(signals.ddy_hat_o, ddy_r + k_d * Lambda @ s(z), **exact)
+    ddy_hat_o = ddy_r + k_d * Lambda @ s(z)
+    np.testing.assert_allclose(signals.ddy_hat_o, ddy_hat_o, **exact)
     np.testing.assert_allclose(signals.dtheta_hat, dtheta_hat, **exact)
+    np.testing.assert_allclose(moved.y_hat, y_hat + 0.02 * dy_hat, **exact)
+    np.testing.assert_allclose(moved.dy_hat_o, dy_hat_o + 0.02 * ddy_hat_o, **exact)
+    np.testing.assert_allclose(moved.theta_hat, theta_hat + 0.02 * dtheta_hat, **exact)
 
 
 def test_first_three_terms_cannot_exceed_their_gains():
     """|F| <= k1 + 2 k2 on each axis for every error: what makes the controller saturated."""
     far = output_feedback.evaluate(
-        Gains(), ControllerState((1e6,) * 3, (-1e6,) * 3, (0.0,) * 4),
+        Gains(),
+        ControllerState((1e6,) * 3, (-1e6,) * 3, (0.0,) * 4),
         Measurement((-1e6,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3),
-    )  # fmt: skip
+    )
     assert abs(far.tau[0]) <= 10.0 + 2 * 10.0 + 1e-9
 
 

@@ -34,16 +34,23 @@ def test_undriven_plant_loses_energy_to_damping_alone(nu, euler):
 
 
 @given(
-    nu=vectors(speeds, 5), theta=pitch_angles, psi=angles, tau=vectors(forces, 3),
+    nu=vectors(speeds, 5),
+    theta=pitch_angles,
+    psi=angles,
+    tau=vectors(forces, 3),
     tau_w=vectors(speeds, 5),
-)  # fmt: skip
+)
 def test_plant_without_roll_is_equation_2(nu, theta, psi, tau, tau_w):
     u, v, w, q, r = nu
     a, b, c, d, e = tau_w
     six = plant.accelerations_6dof(
-        VEHICLE, ROLL, (u, v, w, 0.0, q, r), rotation_from_euler(0.0, theta, psi), tau,
+        VEHICLE,
+        ROLL,
+        (u, v, w, 0.0, q, r),
+        rotation_from_euler(0.0, theta, psi),
+        tau,
         (a, b, c, 0.0, d, e),
-    )  # fmt: skip
+    )
     five = accelerations(VEHICLE, nu, sin(theta), tau, tau_w)
     assert (*six[:3], *six[4:]) == five
 
@@ -61,8 +68,16 @@ def test_coriolis_terms_are_those_of_a_diagonal_mass_matrix(nu, euler):
         ]
     )
     phi, theta, _ = euler
-    restoring = np.array([0, 0, 0, sin(phi) * cos(theta) * ROLL.righting_roll,
-                          sin(theta) * VEHICLE.righting_pitch, 0])  # fmt: skip
+    restoring = np.array(
+        [
+            0,
+            0,
+            0,
+            sin(phi) * cos(theta) * ROLL.righting_roll,
+            sin(theta) * VEHICLE.righting_pitch,
+            0,
+        ]
+    )
     expected = np.linalg.solve(M, -coriolis - DAMPING * nu - restoring)
     rotation = rotation_from_euler(*euler)
     actual = plant.accelerations_6dof(VEHICLE, ROLL, nu, rotation, UNDRIVEN, AT_REST)
