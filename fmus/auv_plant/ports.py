@@ -1,6 +1,7 @@
 """Ports of AuvPlant."""
 
-from auv_fmu.plant import RollAxis
+from auv_fmu.actuators import Limits
+from auv_fmu.plant import ETA_0, NU_0, Localisation, RollAxis
 from fmus.base.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters
 from fmus.base.vehicle_ports import CONTROL_POINT, VEHICLE
 
@@ -10,14 +11,7 @@ _POSITION = {"x": "m", "y": "m", "z": "m"}
 _EULER = {"phi": "rad", "theta": "rad", "psi": "rad"}
 _NU = {"u": "m/s", "v": "m/s", "w": "m/s", "p": "rad/s", "q": "rad/s", "r": "rad/s"}
 
-#: Limits of section 4.1 [N, N.m].
-_TAU_MAX = 80.0
-#: Initial posture of section 4.1: x, y, z [m], phi, theta, psi [rad].
-_ETA_0 = (2.0, 6.0, 0.0, 0.0, 0.0, 0.0)
-#: Standard deviation of the measured position [m]; the paper gives none.
-_NOISE_STD = 0.001
-
-_ROLL = RollAxis()
+_ROLL, _LIMITS, _LOCALISATION = RollAxis(), Limits(), Localisation()
 _COMMAND = inputs("tau", _TAU, "Commanded force and moments")
 
 
@@ -43,17 +37,24 @@ PORTS: tuple[Port, ...] = (
         "Righting moment in roll; the paper gives none, ours is that of pitch",
     ),
     CONTROL_POINT,
-    *parameters("tau_max", 3 * (_TAU_MAX,), _dotted(_TAU), "Upper limit of (3)", minimum=0.0),
-    *parameters("tau_min", 3 * (-_TAU_MAX,), _dotted(_TAU), "Lower limit of (3)", maximum=0.0),
-    *parameters("eta0", _ETA_0, _dotted({**_POSITION, **_EULER}), "Initial posture"),
-    *parameters("nu0", 6 * (0.0,), _dotted(_NU), "Initial velocity in the body frame"),
+    *parameters("tau_max", _LIMITS.tau_max, _dotted(_TAU), "Upper limit of (3)", minimum=0.0),
+    *parameters("tau_min", _LIMITS.tau_min, _dotted(_TAU), "Lower limit of (3)", maximum=0.0),
+    *parameters("eta0", ETA_0, _dotted({**_POSITION, **_EULER}), "Initial posture"),
+    *parameters("nu0", NU_0, _dotted(_NU), "Initial velocity in the body frame"),
     parameter(
         "noise.std",
-        _NOISE_STD,
+        _LOCALISATION.std,
         "m",
         "Standard deviation of each measured coordinate; the paper gives none",
         minimum=0.0,
     ),
-    Port("noise.seed", "parameter", "fixed", "Integer", "Seed of the noise", start=1),
+    Port(
+        "noise.seed",
+        "parameter",
+        "fixed",
+        "Integer",
+        "Seed of the noise",
+        start=_LOCALISATION.seed,
+    ),
     H_MAX,
 )

@@ -24,6 +24,7 @@ from pythonfmu import DefaultExperiment, Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
 from auv_fmu import __version__
+from auv_fmu.euler import STEP
 from fmus.base.description import describe
 from fmus.base.port import FAULT, Port, Refusal, Value
 
@@ -55,7 +56,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
     author = "auv-fmu"
     license = "MIT"
     version = __version__
-    default_experiment = DefaultExperiment(0.0, 100.0, 0.02)
+    default_experiment = DefaultExperiment(0.0, 100.0, STEP)
 
     #: Ports without `fault`, inputs first, then outputs, then parameters.
     ports: ClassVar[tuple[Port, ...]] = ()

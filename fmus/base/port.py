@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Union
 
+from auv_fmu.euler import STEP
+
 Value = Union[float, int, bool, str]
 
 #: Smallest value of a parameter that must be positive. FMI knows only inclusive bounds.
@@ -149,7 +151,7 @@ def parameters(
 
 #: Largest internal step of components with a state (see `Component.do_step`).
 H_MAX = parameter(
-    "h_max", 0.02, "s", "Largest internal step; longer steps are split evenly", POSITIVE
+    "h_max", STEP, "s", "Largest internal step; longer steps are split evenly", POSITIVE
 )
 
 #: Present in every component.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from auv_fmu.gain_conditions import Bounds, Condition, bounds, conditions
+from auv_fmu.proof.gain_conditions import Bounds, Condition, bounds, conditions
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from orchestrator.analysis.signals import ELL, vehicle
 from orchestrator.errors import InputError
