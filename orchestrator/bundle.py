@@ -41,7 +41,7 @@ def build(folder: Path, loader: str | None = None) -> list[Path]:
         InputError: the folder cannot be written, or the FMUs cannot be built.
 
     """
-    written = run_fmus("build", folder, *(("--loader", loader) if loader else ()))
+    written = run_fmus("packaging.build", folder, *(("--loader", loader) if loader else ()))
     archive = folder / ARCHIVE
     try:
         written += _write_if_changed(archive, ssp_bytes(closed_loop(folder)))

@@ -272,7 +272,7 @@ def _reference(options: argparse.Namespace) -> int:
 
 def _docs(options: argparse.Namespace) -> int:
     make_writable(options.out)
-    for path in bundle.run_fmus("documentation", options.out):
+    for path in bundle.run_fmus("packaging.documentation", options.out):
         print(path)
     return OK
 

@@ -1,8 +1,8 @@
 """Ports of AuvPlant."""
 
 from auv_fmu.plant import RollAxis
-from fmus.base.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters
-from fmus.base.vehicle_ports import CONTROL_POINT, VEHICLE
+from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters
+from fmus.ports.vehicle import CONTROL_POINT, VEHICLE
 
 _TAU = {"u": "N", "q": "N.m", "r": "N.m"}
 _TAU_W = {"u": "N", "v": "N", "w": "N", "p": "N.m", "q": "N.m", "r": "N.m"}

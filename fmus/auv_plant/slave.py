@@ -11,9 +11,9 @@ from auv_fmu.actuators import limit_all
 from auv_fmu.plant import PlantState, RollAxis
 from auv_fmu.types import Vector3
 from fmus.auv_plant.ports import PORTS
-from fmus.base.component import Component
-from fmus.base.port import Refusal
-from fmus.base.vehicle_ports import vehicle
+from fmus.ports.port import Refusal
+from fmus.ports.vehicle import vehicle
+from fmus.slave.component import Component
 
 _OUTPUTS = [port.name for port in PORTS if port.causality == "output"]
 #: The measured control point among the outputs.

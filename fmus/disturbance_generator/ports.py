@@ -1,7 +1,7 @@
 """Ports of DisturbanceGenerator."""
 
 from auv_fmu.disturbance import Disturbance
-from fmus.base.port import Port, inputs, outputs, parameter
+from fmus.ports.port import Port, inputs, outputs, parameter
 
 _NU = {"u": "m/s", "v": "m/s", "w": "m/s", "p": "rad/s", "q": "rad/s", "r": "rad/s"}
 _TAU_W = {"u": "N", "v": "N", "w": "N", "p": "N.m", "q": "N.m", "r": "N.m"}

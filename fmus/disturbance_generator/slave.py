@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from auv_fmu.disturbance import Disturbance, disturbance
-from fmus.base.component import Component
 from fmus.disturbance_generator.ports import PORTS
+from fmus.slave.component import Component
 
 
 class NoState(NamedTuple):

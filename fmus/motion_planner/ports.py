@@ -1,7 +1,7 @@
 """Ports of MotionPlanner."""
 
-from fmus.base.port import H_MAX, Port, outputs, parameters
-from fmus.base.vehicle_ports import CONTROL_POINT, VEHICLE
+from fmus.ports.port import H_MAX, Port, outputs, parameters
+from fmus.ports.vehicle import CONTROL_POINT, VEHICLE
 
 _AXES = ("x", "y", "z")
 _POSITION = dict.fromkeys(_AXES, "m")

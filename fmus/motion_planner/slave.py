@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 from auv_fmu import motion_planner
 from auv_fmu.motion_planner import Motion, PlannerState
-from fmus.base.component import Component
-from fmus.base.vehicle_ports import vehicle
 from fmus.motion_planner.ports import PORTS
+from fmus.ports.vehicle import vehicle
+from fmus.slave.component import Component
 
 
 class Planned(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from auv_fmu.output_feedback import Gains
 from auv_fmu.saturation import SATURATIONS
-from fmus.base.controller_ports import (
+from fmus.ports.controllers import (
     ADAPTATION,
     INPUTS,
     POSITION,
@@ -15,8 +15,8 @@ from fmus.base.controller_ports import (
     Y,
     command,
 )
-from fmus.base.port import H_MAX, POSITIVE, Port, outputs, parameter, parameters
-from fmus.base.vehicle_ports import CONTROL_POINT
+from fmus.ports.port import H_MAX, POSITIVE, Port, outputs, parameter, parameters
+from fmus.ports.vehicle import CONTROL_POINT
 
 _GAINS = Gains()
 _PER_AXIS = {"[1]": "N", "[2]": "N", "[3]": "N"}

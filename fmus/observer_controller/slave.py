@@ -10,9 +10,9 @@ from pythonfmu.enums import Fmi2Status
 from auv_fmu import output_feedback
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement, Signals
 from auv_fmu.saturation import SATURATIONS
-from fmus.base.component import Component
-from fmus.base.controller_ports import vector
 from fmus.observer_controller.ports import PORTS
+from fmus.ports.controllers import vector
+from fmus.slave.component import Component
 
 
 class ObserverController(Component):

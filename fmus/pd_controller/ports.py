@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from auv_fmu.pd import PdGains
-from fmus.base.controller_ports import (
+from fmus.ports.controllers import (
     ADAPTATION,
     INPUTS,
     PRINTED_JACOBIAN,
@@ -12,8 +12,8 @@ from fmus.base.controller_ports import (
     VELOCITY,
     command,
 )
-from fmus.base.port import H_MAX, POSITIVE, Port, inputs, parameter, parameters
-from fmus.base.vehicle_ports import CONTROL_POINT
+from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, parameter, parameters
+from fmus.ports.vehicle import CONTROL_POINT
 
 _GAINS = PdGains()
 _PER_AXIS = {"[1]": "kg/s", "[2]": "kg/s", "[3]": "kg/s"}

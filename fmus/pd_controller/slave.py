@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 from auv_fmu import pd
 from auv_fmu.pd import PdGains, PdMeasurement, PdSignals
 from auv_fmu.types import Vector4
-from fmus.base.component import Component
-from fmus.base.controller_ports import vector
 from fmus.pd_controller.ports import PORTS
+from fmus.ports.controllers import vector
+from fmus.slave.component import Component
 
 
 class PdState(NamedTuple):

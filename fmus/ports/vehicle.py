@@ -7,7 +7,7 @@ from typing import Any
 
 from auv_fmu.control_point import ELL
 from auv_fmu.vehicle import Vehicle
-from fmus.base.port import POSITIVE, Port, parameter, parameters
+from fmus.ports.port import POSITIVE, Port, parameter, parameters
 
 _VEHICLE = Vehicle()
 

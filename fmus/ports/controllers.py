@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from auv_fmu.output_feedback import Gains
-from fmus.base.port import POSITIVE, Port, inputs, outputs, parameter, parameters
+from fmus.ports.port import POSITIVE, Port, inputs, outputs, parameter, parameters
 
 AXES = ("x", "y", "z")
 POSITION = dict.fromkeys(AXES, "m")

@@ -12,8 +12,8 @@ from xml.etree.ElementTree import Element, SubElement
 
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Initial, Fmi2Variability, Integer, Real, String
 
-from fmus.base.port import Port
-from fmus.base.units import UNITS
+from fmus.ports.port import Port
+from fmus.ports.units import UNITS
 
 _VARIABLES = {"Real": Real, "Integer": Integer, "Boolean": Boolean, "String": String}
 

@@ -24,8 +24,8 @@ from pythonfmu import DefaultExperiment, Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
 from auv_fmu import __version__
-from fmus.base.description import describe
-from fmus.base.port import FAULT, Port, Refusal, Value
+from fmus.ports.description import describe
+from fmus.ports.port import FAULT, Port, Refusal, Value
 
 #: A step may exceed `h_max` by this share without being split: hosts round their time.
 ROUNDING = 1e-9
