@@ -1,21 +1,15 @@
-"""modelDescription.xml: what PythonFMU writes, completed from the declared ports.
+"""modelDescription.xml, as far as it follows from the ports.
 
-PythonFMU 0.7 writes no units, types, ranges, InitialUnknowns or dependencies. Validators reject
-such a file, and hosts cannot derive an order of evaluation from it.
+Whatever runs a component, PythonFMU or a library, adds its own elements and attributes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Callable
 from xml.etree.ElementTree import Element, SubElement
 
-from pythonfmu import Boolean, Fmi2Causality, Fmi2Initial, Fmi2Variability, Integer, Real, String
-
-from fmus.ports.port import Port
+from fmus.ports.port import Port, Value
 from fmus.ports.units import UNITS
-
-_VARIABLES = {"Real": Real, "Integer": Integer, "Boolean": Boolean, "String": String}
 
 _CAPABILITIES = {
     "needsExecutionTool": "false",
@@ -25,59 +19,55 @@ _CAPABILITIES = {
 }
 
 
-def _variable(port: Port) -> Any:
-    """PythonFMU's variable of a port."""
-    initial = Fmi2Initial.calculated if port.causality == "output" else Fmi2Initial.exact
-    return _VARIABLES[port.kind](
-        port.name,
-        causality=Fmi2Causality[port.causality],
-        variability=Fmi2Variability[port.variability],
-        # The standard forbids `initial` on inputs.
-        initial=None if port.causality == "input" else initial,
-        description=port.description,
-    )
-
-
-def describe(slave: Any, ports: Sequence[Port], pythonfmu_xml: Callable[[], Element]) -> Element:
-    """The complete model description of a slave.
+def complete(root: Element, ports: Sequence[Port]) -> Element:
+    """Fill in what the ports of a component say.
 
     Args:
-        slave: instance of the component; its variables are registered anew.
-        ports: all ports, in the order of their value references.
-        pythonfmu_xml: PythonFMU's own `to_xml`, bound to the slave.
+        root: fmiModelDescription with the elements CoSimulation, ModelVariables and
+            ModelStructure.
+        ports: all, in the order of their value references.
 
     """
-    slave.vars.clear()
-    for port in ports:
-        slave.register_variable(_variable(port), nested=False)
-    root = pythonfmu_xml()
-    # Two builds of the same sources must be the same bytes; the time of the build is not in them.
-    del root.attrib["generationDateAndTime"]
     implementation = root.find("CoSimulation")
     variables = root.find("ModelVariables")
     structure = root.find("ModelStructure")
     assert implementation is not None and variables is not None and structure is not None
     implementation.attrib.update(_CAPABILITIES)
-    for element, port in zip(variables, ports):
-        _complete_variable(element, port)
+    variables[:] = [_variable(reference, port) for reference, port in enumerate(ports)]
+    structure[:] = _structure(ports)
     units = sorted({port.unit for port in ports if port.unit})
     root.insert(1, _unit_definitions(units))
     root.insert(2, _type_definitions(units))
-    _fill_structure(structure, ports)
     return root
 
 
-def _complete_variable(element: Element, port: Port) -> None:
-    value = element[0]
+def _variable(reference: int, port: Port) -> Element:
+    variable = Element(
+        "ScalarVariable",
+        name=port.name,
+        valueReference=str(reference),
+        description=port.description,
+        causality=port.causality,
+        variability=port.variability,
+    )
+    # The standard forbids `initial` on inputs.
+    if port.causality != "input":
+        variable.set("initial", "calculated" if port.causality == "output" else "exact")
+    value = SubElement(variable, port.kind)
     if port.unit is not None:
-        value.attrib = {
-            "declaredType": UNITS[port.unit].type_name,
-            "unit": port.unit,
-            **value.attrib,
-        }
-    for attribute, bound in (("min", port.minimum), ("max", port.maximum)):
-        if bound is not None:
-            value.set(attribute, f"{bound:.16g}")
+        value.set("declaredType", UNITS[port.unit].type_name)
+        value.set("unit", port.unit)
+    for attribute, number in (("start", port.start), ("min", port.minimum), ("max", port.maximum)):
+        if number is not None:
+            value.set(attribute, literal(number))
+    return variable
+
+
+def literal(value: Value) -> str:
+    """A value as XML writes it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:.16g}" if isinstance(value, float) else str(value)
 
 
 def _unit_definitions(units: Sequence[str]) -> Element:
@@ -97,13 +87,11 @@ def _type_definitions(units: Sequence[str]) -> Element:
     return definitions
 
 
-def _fill_structure(structure: Element, ports: Sequence[Port]) -> None:
+def _structure(ports: Sequence[Port]) -> tuple[Element, Element]:
     """Outputs with their direct feedthrough; InitialUnknowns with the parameters as well."""
-    structure.clear()
     index = {port.name: str(i) for i, port in enumerate(ports, start=1)}
     parameters = [index[port.name] for port in ports if port.causality == "parameter"]
-    outputs = SubElement(structure, "Outputs")
-    initial_unknowns = SubElement(structure, "InitialUnknowns")
+    outputs, initial_unknowns = Element("Outputs"), Element("InitialUnknowns")
     for port in ports:
         if port.causality == "output":
             inputs = [index[name] for name in port.feedthrough]
@@ -117,3 +105,4 @@ def _fill_structure(structure: Element, ports: Sequence[Port]) -> None:
                     dependencies=" ".join(known),
                     dependenciesKind=" ".join(["dependent"] * len(known)),
                 )
+    return outputs, initial_unknowns

@@ -24,7 +24,7 @@ class Driver:
 
     def __init__(self, component: type[Component], **values: object) -> None:
         self.slave = component(instance_name="under_test")
-        self.ports = (*component.ports, self.slave._ports[-1])
+        self.ports = self.slave._store.ports
         self.slave.setup_experiment(0.0)
         self.set(**values)
         self.slave.enter_initialization_mode()
