@@ -2,7 +2,7 @@
 
 Every repetition times, one after the other in this process:
 
-- the straight-line loop of the tests, which calls the same equations without FMI or master;
+- the straight line `auv_fmu.closed_loop`, the same equations without FMI or master;
 - the loop of FMUs, with all checks of the components on;
 - the same FMUs with an empty do_step, set on their loaded classes;
 - the master alone, with every FMI call replaced by nothing.
@@ -25,13 +25,12 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 from unittest.mock import patch
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-
+from auv_fmu.closed_loop import closed_loop
+from auv_fmu.euler import STEP
 from orchestrator import bundle
 from orchestrator.instance import Instance
 from orchestrator.master import simulate
 from orchestrator.system import System
-from straight_line import STEP, closed_loop
 
 
 def timed(function: Callable[[], object]) -> float:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from auv_fmu.attitude import rotation_from_euler
-from auv_fmu.lyapunov import composite_errors, lyapunov
+from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
 from auv_fmu.saturation import INTEGRALS, SATURATIONS
 from orchestrator.metrics import ACTUATORS, AXES, LIMITS, POSTURE, true_control_point
 from orchestrator.result import Result
@@ -116,32 +116,13 @@ def _rows(result: Result) -> Iterator[list[float]]:
         )
     )
 
-    def errors(i: int, k: int) -> tuple[float, float]:
-        return composite_errors(
-            dy[i, k],
-            dy_d[i, k],
-            y_hat[i, k] - y_d[i, k],
-            dy_hat[i, k],
-            z_measured[i, k],
-            lambda_,
-            s,
-        )
-
-    e, z = y - y_d, y - y_hat
+    e, z, e_z = y - y_d, y - y_hat, y_hat - y_d
     margin = np.minimum(upper - tau, tau - lower)
     for i, t in enumerate(result.time[:-1].tolist()):
-        r_1, r_2 = zip(*(errors(i, k) for k in range(3)), strict=True)
-        V = lyapunov(
-            plant,
-            rotation_from_euler(*euler[i].tolist()),
-            ell,
-            K2,
-            integral,
-            tuple(e[i].tolist()),
-            tuple(z[i].tolist()),
-            r_1,
-            r_2,
-        )
+        r_1, r_2 = composite_errors(dy[i], dy_d[i], dy_hat[i], e_z[i], z_measured[i], lambda_, s)
+        errors = Errors(e[i].tolist(), z[i].tolist(), r_1, r_2)
+        rotation = rotation_from_euler(*euler[i].tolist())
+        V = lyapunov(plant, rotation, errors, K2, integral, ell)
         yield [t, V, *r_1, *r_2, *margin[i]]
 
 

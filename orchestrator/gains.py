@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from auv_fmu.gain_conditions import Bounds, Condition, bounds, conditions
+from auv_fmu.proof.gain_conditions import Bounds, Condition, bounds, conditions
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from orchestrator import bundle
 from orchestrator.errors import InputError

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from auv_fmu.control_point import ELL
-from auv_fmu.gain_conditions import bounds, conditions
 from auv_fmu.output_feedback import Gains
+from auv_fmu.proof.gain_conditions import bounds, conditions
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from auv_fmu.vehicle import Vehicle
 from orchestrator.batch import Job

@@ -4,33 +4,17 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from auv_fmu.plant import RollAxis
-from auv_fmu.types import Vector3, Vector6
+from auv_fmu.actuators import Limits
+from auv_fmu.plant import ETA_0, NU_0, Localisation, RollAxis
+from auv_fmu.types import Vector6
 from auv_fmu.vehicle import Vehicle
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters
 from fmus.ports.quantities import ETA, NU, POSITION, TAU, TAU_W, VELOCITY
 from fmus.ports.vehicle import CONTROL_POINT, VEHICLE
 
-#: Limits of section 4.1 [N, N.m].
-_TAU_MAX = 80.0
-#: Initial posture of section 4.1: x, y, z [m], phi, theta, psi [rad].
-_ETA_0 = (2.0, 6.0, 0.0, 0.0, 0.0, 0.0)
-#: Standard deviation of the measured position [m]; the paper gives none.
-_NOISE_STD = 0.001
-
-_ROLL = RollAxis()
+_ROLL, _LIMITS, _LOCALISATION = RollAxis(), Limits(), Localisation()
 _COMMAND = inputs("tau", TAU, "Commanded force and moments")
-
-
-class Limits(NamedTuple):
-    tau_max: Vector3
-    tau_min: Vector3
-
-
-class Localisation(NamedTuple):
-    std: float
-    seed: int
 
 
 class Parameters(NamedTuple):
@@ -62,21 +46,28 @@ PARAMETERS = ParameterSet(
     ell=CONTROL_POINT,
     limits=ParameterSet(
         Limits,
-        tau_max=parameters("tau_max", 3 * (_TAU_MAX,), TAU, "Upper limit of (3)", minimum=0.0),
-        tau_min=parameters("tau_min", 3 * (-_TAU_MAX,), TAU, "Lower limit of (3)", maximum=0.0),
+        tau_max=parameters("tau_max", _LIMITS.tau_max, TAU, "Upper limit of (3)", minimum=0.0),
+        tau_min=parameters("tau_min", _LIMITS.tau_min, TAU, "Lower limit of (3)", maximum=0.0),
     ),
-    eta0=parameters("eta0", _ETA_0, ETA, "Initial posture"),
-    nu0=parameters("nu0", 6 * (0.0,), NU, "Initial velocity in the body frame"),
+    eta0=parameters("eta0", ETA_0, ETA, "Initial posture"),
+    nu0=parameters("nu0", NU_0, NU, "Initial velocity in the body frame"),
     noise=ParameterSet(
         Localisation,
         std=parameter(
             "noise.std",
-            _NOISE_STD,
+            _LOCALISATION.std,
             "m",
             "Standard deviation of each measured coordinate; the paper gives none",
             minimum=0.0,
         ),
-        seed=Port("noise.seed", "parameter", "fixed", "Integer", "Seed of the noise", start=1),
+        seed=Port(
+            "noise.seed",
+            "parameter",
+            "fixed",
+            "Integer",
+            "Seed of the noise",
+            start=_LOCALISATION.seed,
+        ),
     ),
 )
 

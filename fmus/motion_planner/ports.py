@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from auv_fmu.motion_planner import ETA_D0, TAU_D
 from auv_fmu.types import Vector3, Vector5
 from auv_fmu.vehicle import Vehicle
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, Port, outputs, parameters
 from fmus.ports.quantities import ACCELERATION, ETA_WITHOUT_ROLL, POSITION, TAU, VELOCITY
 from fmus.ports.vehicle import CONTROL_POINT, VEHICLE
-
-#: Torques of section 4.1 that make the reference a helix [N, N.m].
-_TAU_D = (5.0, 1.0, 2.0)
-#: Initial posture of the reference vehicle in section 4.1: x, y, z [m], theta, psi [rad].
-_ETA_0 = (0.0, 0.0, -2.0, 0.0, 0.0)
 
 
 class Parameters(NamedTuple):
@@ -28,8 +24,8 @@ class Parameters(NamedTuple):
 
 PARAMETERS = ParameterSet(
     Parameters,
-    tau_d=parameters("tau_d", _TAU_D, TAU, "Driving force and moments"),
-    eta0=parameters("eta0", _ETA_0, ETA_WITHOUT_ROLL, "Initial posture"),
+    tau_d=parameters("tau_d", TAU_D, TAU, "Driving force and moments"),
+    eta0=parameters("eta0", ETA_D0, ETA_WITHOUT_ROLL, "Initial posture"),
     vehicle=VEHICLE,
     ell=CONTROL_POINT,
 )

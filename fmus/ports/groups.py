@@ -8,9 +8,7 @@ number in the wrong place.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
 from itertools import groupby
-from operator import itemgetter
 from typing import Any, Generic, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from fmus.ports.port import Port, Value
@@ -63,13 +61,11 @@ def unpacking(
         TypeError: `made` has other groups than the ports.
 
     """
-    places = [*_hold(made, ports, groups).values()]
-    make: Callable[..., T] = partial(tuple.__new__, made)  # type: ignore[type-var]
-    if len(places) > 1:
-        # One call of C for all groups: this runs once a step.
-        split = itemgetter(*places)
-        return lambda values: make(split(tuple(values)))
-    return lambda values: make((tuple(values),) if places else ())
+    text = "".join(
+        f"({''.join(f'values[{i}], ' for i in range(place.start, place.stop))}), "
+        for place in _hold(made, ports, groups).values()
+    )
+    return _compiled(f"lambda values: make(made, ({text}))", made)
 
 
 def packing(given: type[T], ports: Sequence[Port]) -> Callable[[T], list[float]]:
@@ -83,15 +79,18 @@ def packing(given: type[T], ports: Sequence[Port]) -> Callable[[T], list[float]]
         TypeError: `given` has other groups than the ports.
 
     """
-    names = tuple(_hold(given, ports, {}))
+    groups = ", ".join(f"*groups[{name!r}]" for name in _hold(given, ports, {}))
+    return _compiled(f"lambda groups: [{groups}]", given)
 
-    def pack(groups: Any) -> list[float]:
-        values: list[float] = []
-        for name in names:
-            values += groups[name]
-        return values
 
-    return pack
+def _compiled(function: str, made: type) -> Callable[..., Any]:
+    """A function from its text.
+
+    It runs once a step in each component, and a loop over the groups costs several times the
+    same thing written out.
+    """
+    compiled: Callable[..., Any] = eval(function, {"made": made, "make": tuple.__new__})
+    return compiled
 
 
 Field = Union[Port, tuple[Port, ...], "ParameterSet[Any]"]

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import Union
 
+from auv_fmu.euler import STEP
 from fmus.ports.quantities import Members, member_name
 
 Value = Union[float, int, bool, str]
@@ -154,7 +155,7 @@ def parameters(
 
 #: Largest internal step of components with a state (see `Component.do_step`).
 H_MAX = parameter(
-    "h_max", 0.02, "s", "Largest internal step; longer steps are split evenly", POSITIVE
+    "h_max", STEP, "s", "Largest internal step; longer steps are split evenly", POSITIVE
 )
 
 #: Present in every component.

@@ -22,6 +22,7 @@ from pythonfmu import DefaultExperiment, Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
 from auv_fmu import __version__
+from auv_fmu.euler import STEP
 from fmus.ports.description import complete
 from fmus.ports.groups import ParameterSet, packing, unpacking
 from fmus.ports.port import H_MAX, Port, Refusal, Value
@@ -60,7 +61,7 @@ class Component(Fmi2Slave, Generic[State, Inputs, Outputs, Parameters]):  # type
     author = "auv-fmu"
     license = "MIT"
     version = __version__
-    default_experiment = DefaultExperiment(0.0, 100.0, 0.02)
+    default_experiment = DefaultExperiment(0.0, 100.0, STEP)
 
     #: Ports without `fault`, inputs first, then outputs, then parameters.
     ports: ClassVar[tuple[Port, ...]]

@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from auv_fmu.types import Vector3
+
+
+class Limits(NamedTuple):
+    """Limits of (3) for u, q, r, with the values of section 4.1."""
+
+    tau_min: Vector3 = (-80.0, -80.0, -80.0)  #: lower limits [N, N.m]
+    tau_max: Vector3 = (80.0, 80.0, 80.0)  #: upper limits [N, N.m]
 
 
 def limit(tau_k: float, tau_min: float, tau_max: float) -> float:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from math import sqrt, tanh
+from math import tanh
 
 from auv_fmu.types import Vector3, Vector4
+from auv_fmu.vectors import norm
 
 #: The constant of Lemma 2, nu = exp(-(nu + 1)), with the digits the paper gives (reading 9).
 NU = 0.2785
-
-
-def norm(x: Vector3) -> float:
-    """Euclidean norm."""
-    return sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
 
 
 def regressor(velocity: Vector3, acceleration: Vector3) -> Vector4:
@@ -32,22 +28,26 @@ def bound(G: Vector4, theta_hat: Vector4) -> float:
     return G[0] * theta_hat[0] + G[1] * theta_hat[1] + G[2] * theta_hat[2] + G[3] * theta_hat[3]
 
 
-def robust_force(rho_hat: float, r: float, eps_t: float) -> float:
-    """rho_hat tanh(nu rho_hat r / eps_t) [N], one axis: the last term of (21), (48) and (57).
+def robust_force(rho_hat: float, r: Vector3, eps_t: float) -> Vector3:
+    """rho_hat Tanh(nu rho_hat r / eps_t) [N]: the last term of (21), (48) and (57).
 
     Args:
         rho_hat: estimated bound [N].
-        r: composite error of the axis [m/s].
+        r: r_hat_1 + r_hat_2 in (21) and (48), r in (57) [m/s].
         eps_t: width of the boundary layer [W].
 
     """
-    return rho_hat * tanh(NU * rho_hat * r / eps_t)
+    return (
+        rho_hat * tanh(NU * rho_hat * r[0] / eps_t),
+        rho_hat * tanh(NU * rho_hat * r[1] / eps_t),
+        rho_hat * tanh(NU * rho_hat * r[2] / eps_t),
+    )
 
 
 def theta_hat_rate(
     G: Vector4, r_norm: float, theta_hat: Vector4, theta_0: Vector4, gamma: float, sigma: float
 ) -> Vector4:
-    """D theta_hat/dt = Gamma G^T |r| - Gamma Sigma (theta_hat - theta_0): (22), (49), (58).
+    """dtheta_hat = Gamma G^T |r| - Gamma Sigma (theta_hat - theta_0): (22), (49), (58).
 
     Args:
         G: regressor.

@@ -15,7 +15,7 @@ ELL = 0.35
 
 
 def control_point(position: Vector3, rotation: Rotation, ell: float) -> Vector3:
-    """Y = h(eta): equation (9).
+    """y = h(eta): equation (9).
 
     Args:
         position: centre of mass (x, y, z) [m], earth frame.
@@ -61,13 +61,13 @@ def jacobian(rotation: Rotation, ell: float) -> tuple[Vector3, Vector3, Vector3]
     )
 
 
-def actuator_command(rotation: Rotation, ell: float, force: Vector3) -> Vector3:
+def actuator_command(rotation: Rotation, force: Vector3, ell: float) -> Vector3:
     """tau_a = J^T F: the force-torque transformation before (15), as used by (21) and (57).
 
     Args:
         rotation: body to earth; for (11) as printed, with the roll left out.
-        ell: distance of the control point [m].
         force: F [N] at the control point, earth frame.
+        ell: distance of the control point [m].
 
     Returns:
         (tau_u [N], tau_q [N.m], tau_r [N.m]).
@@ -83,17 +83,17 @@ def actuator_command(rotation: Rotation, ell: float, force: Vector3) -> Vector3:
 
 
 def actuated_velocity(
-    rotation: Rotation, ell: float, dy: Vector3, w: tuple[float, float]
+    rotation: Rotation, dy: Vector3, w: tuple[float, float], ell: float
 ) -> Vector3:
-    """V = J^-1 (dy/dt - J_delta): equation (13).
+    """v = J^-1 (dy/dt - J_delta): equation (13).
 
     J^-1 needs no elimination: the columns of J are multiples of the columns of R.
 
     Args:
         rotation: body to earth.
-        ell: distance of the control point [m], not zero.
         dy: velocity of the control point [m/s], earth frame.
         w: sway and heave (v, w) [m/s].
+        ell: distance of the control point [m], not zero.
 
     Returns:
         (u [m/s], q [rad/s], r [rad/s]).

@@ -14,6 +14,12 @@ from auv_fmu.control_point import control_point, control_point_velocity
 from auv_fmu.types import Rotation, Vector3, Vector5
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 
+#: Driving force and moments (u, q, r) of section 4.1 [N, N.m]; they make the reference a helix.
+TAU_D: Vector3 = (5.0, 1.0, 2.0)
+
+#: Initial posture of section 4.1: x, y, z [m], theta, psi [rad].
+ETA_D0: Vector5 = (0.0, 0.0, -2.0, 0.0, 0.0)
+
 _UNDISTURBED = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -39,6 +45,12 @@ class Reference(NamedTuple):
     y_d: Vector3  #: [m]
     dy_d: Vector3  #: [m/s]
     ddy_d: Vector3  #: [m/s2]
+
+
+def initial_state(eta_d: Vector5) -> PlannerState:
+    """State at rest in the posture eta_d = (x, y, z, theta, psi) [m, rad]."""
+    x, y, z, theta, psi = eta_d
+    return PlannerState((x, y, z), theta, psi, (0.0, 0.0, 0.0, 0.0, 0.0))
 
 
 def motion(vehicle: Vehicle, state: PlannerState, tau_d: Vector3) -> Motion:

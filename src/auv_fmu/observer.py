@@ -1,43 +1,54 @@
 """The saturated velocity observer: equations (18), (23) and (24), or (50) and (51).
 
-All gain matrices of the paper are diagonal and its saturation functions act component by
-component, so the observer is written for one axis of the control point.
-
 The paper has two signals of almost the same name (reading 15): the state dy_hat_o of (23) and
-(24), and dy_o of (18), which the control law and the proof use. They differ by k_d z.
+(24), and dy_o of (18), which the control law and the proof use. They differ by k_d z. Every
+function here has the name of the signal that it states; ddy_hat_o is the rate of dy_hat_o.
 """
 
 from __future__ import annotations
 
+from auv_fmu.types import Vector3
 
-def velocity_estimate(dy_hat_o: float, s_z: float, z: float, lambda_: float, k_d: float) -> float:
-    """D y_hat/dt: equations (23) and (50), which are (18) solved for it.
+
+def dy_hat(dy_hat_o: Vector3, s_z: Vector3, z: Vector3, lambda_: float, k_d: float) -> Vector3:
+    """dy_hat = dy_hat_o + Lambda s(z) + k_d z: equations (23) and (50).
 
     Args:
-        dy_hat_o: observer state [m/s].
+        dy_hat_o: state of the observer [m/s].
         s_z: s(z) of the estimation error.
         z: estimation error y - y_hat [m].
         lambda_: diagonal entry of Lambda [m/s].
         k_d: observer gain [1/s].
 
+    Returns:
+        Estimated velocity of the control point [m/s], the rate of y_hat.
+
     """
-    return dy_hat_o + lambda_ * s_z + k_d * z
+    return (
+        dy_hat_o[0] + lambda_ * s_z[0] + k_d * z[0],
+        dy_hat_o[1] + lambda_ * s_z[1] + k_d * z[1],
+        dy_hat_o[2] + lambda_ * s_z[2] + k_d * z[2],
+    )
 
 
-def observer_velocity(dy_hat: float, s_z: float, lambda_: float) -> float:
-    """dy_o/dt = d y_hat/dt - Lambda s(z): equation (18).
+def dy_o(dy_hat: Vector3, s_z: Vector3, lambda_: float) -> Vector3:
+    """dy_o = dy_hat - Lambda s(z) [m/s]: equation (18).
 
     Args:
-        dy_hat: estimated velocity [m/s].
+        dy_hat: estimated velocity (23) [m/s].
         s_z: s(z) of the estimation error.
         lambda_: diagonal entry of Lambda [m/s].
 
     """
-    return dy_hat - lambda_ * s_z
+    return (
+        dy_hat[0] - lambda_ * s_z[0],
+        dy_hat[1] - lambda_ * s_z[1],
+        dy_hat[2] - lambda_ * s_z[2],
+    )
 
 
-def observer_acceleration(ddy_r: float, s_z: float, lambda_: float, k_d: float) -> float:
-    """D dy_o/dt: equation (51), the derivative of (24) (reading 4).
+def ddy_hat_o(ddy_r: Vector3, s_z: Vector3, lambda_: float, k_d: float) -> Vector3:
+    """ddy_hat_o = ddy_r + k_d Lambda s(z) [m/s2]: equation (51), the rate of (24) (reading 4).
 
     Args:
         ddy_r: acceleration of the virtual reference [m/s2].
@@ -46,12 +57,20 @@ def observer_acceleration(ddy_r: float, s_z: float, lambda_: float, k_d: float) 
         k_d: observer gain [1/s].
 
     """
-    return ddy_r + k_d * lambda_ * s_z
+    return (
+        ddy_r[0] + k_d * lambda_ * s_z[0],
+        ddy_r[1] + k_d * lambda_ * s_z[1],
+        ddy_r[2] + k_d * lambda_ * s_z[2],
+    )
 
 
-def initial_dy_hat_o(s_z: float, z: float, lambda_: float, k_d: float) -> float:
-    """dy_hat_o(0) = -(Lambda s(z(0)) + k_d z(0)), so that the first velocity estimate is zero.
+def initial_dy_hat_o(s_z: Vector3, z: Vector3, lambda_: float, k_d: float) -> Vector3:
+    """dy_hat_o(0) = -(Lambda s(z(0)) + k_d z(0)) [m/s]: the initial condition below (24).
 
-    The initial condition below (24). With y_hat(0) = y(0) it is zero.
+    With it the first velocity estimate (23) is zero.
     """
-    return -(lambda_ * s_z + k_d * z)
+    return (
+        -(lambda_ * s_z[0] + k_d * z[0]),
+        -(lambda_ * s_z[1] + k_d * z[1]),
+        -(lambda_ * s_z[2] + k_d * z[2]),
+    )

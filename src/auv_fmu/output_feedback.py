@@ -9,17 +9,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from auv_fmu.adaptation import bound, norm, regressor, robust_force, theta_hat_rate
+from auv_fmu import observer
+from auv_fmu.adaptation import bound, regressor, robust_force, theta_hat_rate
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import ELL, actuator_command
-from auv_fmu.observer import (
-    initial_dy_hat_o,
-    observer_acceleration,
-    observer_velocity,
-    velocity_estimate,
-)
+from auv_fmu.euler import advance, advance_4
 from auv_fmu.saturation import Saturation, hyperbolic_tangent
 from auv_fmu.types import Vector3, Vector4
+from auv_fmu.vectors import difference, norm
 
 
 class Gains(NamedTuple):
@@ -70,16 +67,11 @@ class Signals(NamedTuple):
 
 def initial_state(gains: Gains, y: Vector3) -> ControllerState:
     """The initial conditions below (24): y_hat(0) = y(0), and theta_hat(0) = theta_0."""
-    return ControllerState(y, _rest(gains, y, y), gains.theta_0)
-
-
-def _rest(gains: Gains, y: Vector3, y_hat: Vector3) -> Vector3:
-    z = (y[0] - y_hat[0], y[1] - y_hat[1], y[2] - y_hat[2])
-    return (
-        initial_dy_hat_o(gains.s(z[0])[0], z[0], gains.lambda_, gains.k_d),
-        initial_dy_hat_o(gains.s(z[1])[0], z[1], gains.lambda_, gains.k_d),
-        initial_dy_hat_o(gains.s(z[2])[0], z[2], gains.lambda_, gains.k_d),
-    )
+    y_hat = y
+    z = difference(y, y_hat)
+    s_z, _ = gains.s(z)
+    dy_hat_o = observer.initial_dy_hat_o(s_z, z, gains.lambda_, gains.k_d)
+    return ControllerState(y_hat, dy_hat_o, gains.theta_0)
 
 
 def gated(gains: Gains, state: ControllerState, y: Vector3) -> ControllerState:
@@ -98,64 +90,85 @@ def gated(gains: Gains, state: ControllerState, y: Vector3) -> ControllerState:
         `state` itself when the measurement is credible.
 
     """
-    y_hat = state.y_hat
     gate = gains.innovation_gate
-    if not gate or norm((y[0] - y_hat[0], y[1] - y_hat[1], y[2] - y_hat[2])) <= gate:
+    if not gate or norm(difference(y, state.y_hat)) <= gate:
         return state
-    return ControllerState(y, _rest(gains, y, y), state.theta_hat)
+    return initial_state(gains, y)._replace(theta_hat=state.theta_hat)
 
 
-def virtual_reference(dy_d: float, s_ez: float, lambda_: float) -> float:
-    """dy_r/dt = dy_d/dt - Lambda s(e - z): equation (16), one axis.
+def virtual_velocity(dy_d: Vector3, s_ez: Vector3, lambda_: float) -> Vector3:
+    """dy_r = dy_d - Lambda s(e - z) [m/s]: equation (16).
 
     Args:
         dy_d: velocity of the reference [m/s].
-        s_ez: s(e - z) = s(y_hat - y_d).
+        s_ez: s(e - z), where e - z = y_hat - y_d.
         lambda_: diagonal entry of Lambda [m/s].
 
     """
-    return dy_d - lambda_ * s_ez
+    return (
+        dy_d[0] - lambda_ * s_ez[0],
+        dy_d[1] - lambda_ * s_ez[1],
+        dy_d[2] - lambda_ * s_ez[2],
+    )
 
 
-def axis(
-    y: float,
-    y_hat: float,
-    dy_hat_o: float,
-    y_d: float,
-    dy_d: float,
-    ddy_d: float,
-    k1: float,
-    k2: float,
-    lambda_: float,
-    k_d: float,
-    s: Saturation,
-) -> tuple[float, float, float, float, float, float, float]:
-    """One axis of (16), (18), (21) without its last term, (23), (51) and Remark 3.
+def virtual_acceleration(
+    ddy_d: Vector3, dy_d: Vector3, dy_hat: Vector3, slope_ez: Vector3, lambda_: float
+) -> Vector3:
+    """ddy_r = ddy_d - Lambda S'(y_hat - y_d) (dy_hat - dy_d) [m/s2]: Remark 3.
 
     Args:
-        y, y_hat, y_d: measured, estimated and desired control point [m].
-        dy_hat_o: observer state [m/s].
-        dy_d, ddy_d: derivatives of the reference [m/s, m/s2].
-        k1, k2: diagonal entries of K_1 and K_2 [N].
-        lambda_, k_d, s: as in :class:`Gains`.
-
-    Returns:
-        (dy_hat, dy_r, ddy_r, r_hat, force, ddy_hat_o, z): the estimated velocity (23) [m/s], the
-        virtual reference (16) [m/s] and its derivative (Remark 3) [m/s2], r_1 + r_2 with the
-        estimated velocity (below (21)) [m/s], the first three terms of (21) [N], the observer
-        acceleration (51) [m/s2] and the estimation error [m].
+        ddy_d, dy_d: derivatives of the reference [m/s2, m/s].
+        dy_hat: estimated velocity (23) [m/s].
+        slope_ez: diagonal of S'(e - z).
+        lambda_: diagonal entry of Lambda [m/s].
 
     """
-    z = y - y_hat
-    s_z, _ = s(z)
-    s_ez, slope_ez = s(y_hat - y_d)
-    dy_hat = velocity_estimate(dy_hat_o, s_z, z, lambda_, k_d)
-    dy_r = virtual_reference(dy_d, s_ez, lambda_)
-    ddy_r = ddy_d - lambda_ * slope_ez * (dy_hat - dy_d)
-    r_hat = dy_hat - dy_d + lambda_ * s_ez + lambda_ * s_z
-    dy_o = observer_velocity(dy_hat, s_z, lambda_)
-    force = -k1 * s(dy_o - dy_r)[0] - k2 * s_ez - k2 * s_z
-    return dy_hat, dy_r, ddy_r, r_hat, force, observer_acceleration(ddy_r, s_z, lambda_, k_d), z
+    return (
+        ddy_d[0] - lambda_ * slope_ez[0] * (dy_hat[0] - dy_d[0]),
+        ddy_d[1] - lambda_ * slope_ez[1] * (dy_hat[1] - dy_d[1]),
+        ddy_d[2] - lambda_ * slope_ez[2] * (dy_hat[2] - dy_d[2]),
+    )
+
+
+def estimated_error_sum(
+    dy_hat: Vector3, dy_d: Vector3, s_ez: Vector3, s_z: Vector3, lambda_: float
+) -> Vector3:
+    """r_hat_1 + r_hat_2 = dy_hat - dy_d + Lambda s(y_hat - y_d) + Lambda s(z) [m/s], below (21).
+
+    (17) and (19) with the estimated in place of the true velocity, added up.
+
+    Args:
+        dy_hat: estimated velocity (23) [m/s].
+        dy_d: velocity of the reference [m/s].
+        s_ez, s_z: s(e - z) and s(z).
+        lambda_: diagonal entry of Lambda [m/s].
+
+    """
+    return (
+        dy_hat[0] - dy_d[0] + lambda_ * s_ez[0] + lambda_ * s_z[0],
+        dy_hat[1] - dy_d[1] + lambda_ * s_ez[1] + lambda_ * s_z[1],
+        dy_hat[2] - dy_d[2] + lambda_ * s_ez[2] + lambda_ * s_z[2],
+    )
+
+
+def control_force(
+    K1: Vector3, K2: Vector3, s_or: Vector3, s_ez: Vector3, s_z: Vector3, robust: Vector3
+) -> Vector3:
+    """F [N] at the control point, earth frame: the bracket of (21) and (48).
+
+    Args:
+        K1, K2: diagonals of K_1 and K_2 [N].
+        s_or: s(dy_o - dy_r).
+        s_ez, s_z: s(e - z) and s(z).
+        robust: the last term of (21) [N].
+
+    """
+    return (
+        -K1[0] * s_or[0] - K2[0] * s_ez[0] - K2[0] * s_z[0] - robust[0],
+        -K1[1] * s_or[1] - K2[1] * s_ez[1] - K2[1] * s_z[1] - robust[1],
+        -K1[2] * s_or[2] - K2[2] * s_ez[2] - K2[2] * s_z[2] - robust[2],
+    )
 
 
 def evaluate(gains: Gains, state: ControllerState, measurement: Measurement) -> Signals:
@@ -170,31 +183,23 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement) -> 
     K1, K2, lambda_, k_d, gamma, sigma, theta_0, eps_t, ell, s, printed_jacobian, _ = gains
     y, (phi, theta, psi), y_d, dy_d, ddy_d = measurement
     y_hat, dy_hat_o, theta_hat = state
-    dy_hat0, dy_r0, ddy_r0, r0, f0, ddy_hat_o0, z0 = axis(
-        y[0], y_hat[0], dy_hat_o[0], y_d[0], dy_d[0], ddy_d[0], K1[0], K2[0], lambda_, k_d, s
-    )
-    dy_hat1, dy_r1, ddy_r1, r1, f1, ddy_hat_o1, z1 = axis(
-        y[1], y_hat[1], dy_hat_o[1], y_d[1], dy_d[1], ddy_d[1], K1[1], K2[1], lambda_, k_d, s
-    )
-    dy_hat2, dy_r2, ddy_r2, r2, f2, ddy_hat_o2, z2 = axis(
-        y[2], y_hat[2], dy_hat_o[2], y_d[2], dy_d[2], ddy_d[2], K1[2], K2[2], lambda_, k_d, s
-    )
-    G = regressor((dy_r0, dy_r1, dy_r2), (ddy_r0, ddy_r1, ddy_r2))
-    rho_hat = bound(G, theta_hat)
-    force = (
-        f0 - robust_force(rho_hat, r0, eps_t),
-        f1 - robust_force(rho_hat, r1, eps_t),
-        f2 - robust_force(rho_hat, r2, eps_t),
-    )
-    rotation = rotation_from_euler(0.0 if printed_jacobian else phi, theta, psi)
-    return Signals(
-        actuator_command(rotation, ell, force),
-        (dy_hat0, dy_hat1, dy_hat2),
-        (y[0] - y_d[0], y[1] - y_d[1], y[2] - y_d[2]),
-        (z0, z1, z2),
-        (ddy_hat_o0, ddy_hat_o1, ddy_hat_o2),
-        theta_hat_rate(G, norm((r0, r1, r2)), theta_hat, theta_0, gamma, sigma),
-    )
+    e, z = difference(y, y_d), difference(y, y_hat)  # above (16)
+    s_z, _ = s(z)
+    s_ez, slope_ez = s(difference(y_hat, y_d))  # e - z = y_hat - y_d
+    dy_hat = observer.dy_hat(dy_hat_o, s_z, z, lambda_, k_d)  # (23)
+    dy_o = observer.dy_o(dy_hat, s_z, lambda_)  # (18)
+    dy_r = virtual_velocity(dy_d, s_ez, lambda_)  # (16)
+    ddy_r = virtual_acceleration(ddy_d, dy_d, dy_hat, slope_ez, lambda_)  # Remark 3
+    r_hat_sum = estimated_error_sum(dy_hat, dy_d, s_ez, s_z, lambda_)  # below (21)
+    G = regressor(dy_r, ddy_r)  # below (20)
+    rho_hat = bound(G, theta_hat)  # below (21)
+    s_or, _ = s(difference(dy_o, dy_r))
+    F = control_force(K1, K2, s_or, s_ez, s_z, robust_force(rho_hat, r_hat_sum, eps_t))  # (21)
+    rotation = rotation_from_euler(0.0 if printed_jacobian else phi, theta, psi)  # reading 3
+    tau = actuator_command(rotation, F, ell)  # (21)
+    dtheta_hat = theta_hat_rate(G, norm(r_hat_sum), theta_hat, theta_0, gamma, sigma)  # (22)
+    ddy_hat_o = observer.ddy_hat_o(ddy_r, s_z, lambda_, k_d)  # (51)
+    return Signals(tau, dy_hat, e, z, ddy_hat_o, dtheta_hat)
 
 
 def step(state: ControllerState, signals: Signals, h: float) -> ControllerState:
@@ -206,12 +211,9 @@ def step(state: ControllerState, signals: Signals, h: float) -> ControllerState:
         h: step [s]; stable only while k_d h stays below 2, without ringing below 1.
 
     """
-    (a0, a1, a2), (b0, b1, b2), (c0, c1, c2, c3) = state
-    v0, v1, v2 = signals.dy_hat
-    w0, w1, w2 = signals.ddy_hat_o
-    g0, g1, g2, g3 = signals.dtheta_hat
+    y_hat, dy_hat_o, theta_hat = state
     return ControllerState(
-        (a0 + h * v0, a1 + h * v1, a2 + h * v2),
-        (b0 + h * w0, b1 + h * w1, b2 + h * w2),
-        (c0 + h * g0, c1 + h * g1, c2 + h * g2, c3 + h * g3),
+        advance(y_hat, signals.dy_hat, h),
+        advance(dy_hat_o, signals.ddy_hat_o, h),
+        advance_4(theta_hat, signals.dtheta_hat, h),
     )

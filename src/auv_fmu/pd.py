@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from auv_fmu.adaptation import bound, norm, regressor, robust_force, theta_hat_rate
+from auv_fmu.adaptation import bound, regressor, robust_force, theta_hat_rate
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import ELL, actuator_command
+from auv_fmu.euler import advance_4
 from auv_fmu.types import Vector3, Vector4
+from auv_fmu.vectors import difference, norm
 
 
 class PdGains(NamedTuple):
@@ -42,6 +44,34 @@ class PdSignals(NamedTuple):
     dtheta_hat: Vector4  #: rate of theta_hat
 
 
+def filtered_error(dy: Vector3, dy_d: Vector3, e: Vector3, lambda_: float) -> Vector3:
+    """r = de + Lambda e [m/s] with de = dy - dy_d, below (57).
+
+    Args:
+        dy, dy_d: true and desired velocity of the control point [m/s].
+        e: tracking error [m].
+        lambda_: diagonal entry of Lambda [1/s].
+
+    """
+    return (
+        dy[0] - dy_d[0] + lambda_ * e[0],
+        dy[1] - dy_d[1] + lambda_ * e[1],
+        dy[2] - dy_d[2] + lambda_ * e[2],
+    )
+
+
+def control_force(K1: Vector3, r: Vector3, robust: Vector3) -> Vector3:
+    """F [N] at the control point, earth frame: the bracket of (57).
+
+    Args:
+        K1: diagonal of K_1 [kg/s].
+        r: filtered error [m/s].
+        robust: the last term of (57) [N].
+
+    """
+    return -K1[0] * r[0] - robust[0], -K1[1] * r[1] - robust[1], -K1[2] * r[2] - robust[2]
+
+
 def evaluate(gains: PdGains, theta_hat: Vector4, measurement: PdMeasurement) -> PdSignals:
     """The control law (57) and the rate of its parameters (58).
 
@@ -53,23 +83,15 @@ def evaluate(gains: PdGains, theta_hat: Vector4, measurement: PdMeasurement) -> 
     """
     K1, lambda_, gamma, sigma, theta_0, eps_t, ell, printed_jacobian = gains
     y, (phi, theta, psi), y_d, dy_d, ddy_d, dy = measurement
-    e0, e1, e2 = y[0] - y_d[0], y[1] - y_d[1], y[2] - y_d[2]
-    r0 = dy[0] - dy_d[0] + lambda_ * e0
-    r1 = dy[1] - dy_d[1] + lambda_ * e1
-    r2 = dy[2] - dy_d[2] + lambda_ * e2
-    G = regressor(dy_d, ddy_d)
-    rho_hat = bound(G, theta_hat)
-    force = (
-        -K1[0] * r0 - robust_force(rho_hat, r0, eps_t),
-        -K1[1] * r1 - robust_force(rho_hat, r1, eps_t),
-        -K1[2] * r2 - robust_force(rho_hat, r2, eps_t),
-    )
+    e = difference(y, y_d)
+    r = filtered_error(dy, dy_d, e, lambda_)  # below (57)
+    G = regressor(dy_d, ddy_d)  # below (57)
+    rho_hat = bound(G, theta_hat)  # below (57)
+    F = control_force(K1, r, robust_force(rho_hat, r, eps_t))  # (57)
     rotation = rotation_from_euler(0.0 if printed_jacobian else phi, theta, psi)
-    return PdSignals(
-        actuator_command(rotation, ell, force),
-        (e0, e1, e2),
-        theta_hat_rate(G, norm((r0, r1, r2)), theta_hat, theta_0, gamma, sigma),
-    )
+    tau = actuator_command(rotation, F, ell)  # (57)
+    dtheta_hat = theta_hat_rate(G, norm(r), theta_hat, theta_0, gamma, sigma)  # (58)
+    return PdSignals(tau, e, dtheta_hat)
 
 
 def step(theta_hat: Vector4, signals: PdSignals, h: float) -> Vector4:
@@ -81,10 +103,4 @@ def step(theta_hat: Vector4, signals: PdSignals, h: float) -> Vector4:
         h: step [s].
 
     """
-    g0, g1, g2, g3 = signals.dtheta_hat
-    return (
-        theta_hat[0] + h * g0,
-        theta_hat[1] + h * g1,
-        theta_hat[2] + h * g2,
-        theta_hat[3] + h * g3,
-    )
+    return advance_4(theta_hat, signals.dtheta_hat, h)

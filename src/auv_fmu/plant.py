@@ -22,6 +22,12 @@ from auv_fmu.control_point import control_point, control_point_velocity
 from auv_fmu.types import Rotation, Vector3, Vector4, Vector6
 from auv_fmu.vehicle import Vehicle, accelerations
 
+#: Initial posture of section 4.1: x, y, z [m], phi, theta, psi [rad]; it does not give phi.
+ETA_0: Vector6 = (2.0, 6.0, 0.0, 0.0, 0.0, 0.0)
+
+#: Initial velocity (u, v, w, p, q, r) [m/s, rad/s]: at rest, which section 4.1 does not say.
+NU_0: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
 
 class RollAxis(NamedTuple):
     """What the sixth degree of freedom adds to :class:`~auv_fmu.vehicle.Vehicle`."""
@@ -29,6 +35,13 @@ class RollAxis(NamedTuple):
     m44: float = 22.5  #: roll inertia with added inertia [kg.m2]
     d44: float = 20.0  #: roll damping [kg.m2/s]
     righting_roll: float = 5.0  #: righting moment in roll [N.m]; not in the paper (reading 1)
+
+
+class Localisation(NamedTuple):
+    """The localisation system; section 4.1 gives none of its numbers (reading 7)."""
+
+    std: float = 0.001  #: standard deviation of each measured coordinate [m]
+    seed: int = 1  #: of the white noise
 
 
 class PlantState(NamedTuple):
@@ -72,7 +85,7 @@ def accelerations_6dof(
     u, v, w, p, q, r = nu
     tau_wu, tau_wv, tau_ww, tau_wp, tau_wq, tau_wr = tau_w
     sin_theta, cos_theta_sin_phi = -rotation[0][2], rotation[1][2]
-    m22, m33, m55, m66 = vehicle[1:5]
+    m22, m33, m55, m66 = vehicle.m22, vehicle.m33, vehicle.m55, vehicle.m66
     du, dv, dw, dq, dr = accelerations(
         vehicle,
         (u, v, w, q, r),

@@ -1,6 +1,7 @@
 """Saturation functions: Definition 2, the subject of Lemma 1 and Theorem 2.
 
-Each function returns its value and its derivative together, because Remark 3 needs both.
+As in section 2.1 and above Theorem 2 they act on vectors, component by component. Each returns
+its value and its slope together, because Remark 3 needs both.
 """
 
 from __future__ import annotations
@@ -8,20 +9,29 @@ from __future__ import annotations
 from math import exp, hypot, log, log1p, tanh
 from typing import Callable
 
-#: xi -> (s(xi), s'(xi))
-Saturation = Callable[[float], "tuple[float, float]"]
+from auv_fmu.types import Vector3
+
+#: xi -> (s(xi), diagonal of S'(xi))
+Saturation = Callable[[Vector3], "tuple[Vector3, Vector3]"]
 
 
-def hyperbolic_tangent(xi: float) -> tuple[float, float]:
-    """s(xi) = tanh(xi), s'(xi) = sech^2(xi): M = 1, s'_M = 1."""
-    s = tanh(xi)
-    return s, 1.0 - s * s
+def hyperbolic_tangent(xi: Vector3) -> tuple[Vector3, Vector3]:
+    """Tanh(xi) and the diagonal of Sech^2(xi): M = 1, s'_M = 1."""
+    s_1, s_2, s_3 = tanh(xi[0]), tanh(xi[1]), tanh(xi[2])
+    return (s_1, s_2, s_3), (1.0 - s_1 * s_1, 1.0 - s_2 * s_2, 1.0 - s_3 * s_3)
 
 
-def algebraic(xi: float) -> tuple[float, float]:
-    """s(xi) = xi / sqrt(1 + xi^2), s'(xi) = (1 + xi^2)^(-3/2): M = 1, s'_M = 1."""
-    root = hypot(1.0, xi)
-    return xi / root, 1.0 / (root * root * root)
+def algebraic(xi: Vector3) -> tuple[Vector3, Vector3]:
+    """xi_i / sqrt(1 + xi_i^2) and its slopes (1 + xi_i^2)^(-3/2): M = 1, s'_M = 1."""
+    root_1, root_2, root_3 = hypot(1.0, xi[0]), hypot(1.0, xi[1]), hypot(1.0, xi[2])
+    return (
+        (xi[0] / root_1, xi[1] / root_2, xi[2] / root_3),
+        (
+            1.0 / (root_1 * root_1 * root_1),
+            1.0 / (root_2 * root_2 * root_2),
+            1.0 / (root_3 * root_3 * root_3),
+        ),
+    )
 
 
 def log_cosh(xi: float) -> float:
@@ -34,7 +44,7 @@ def algebraic_integral(xi: float) -> float:
     return hypot(1.0, xi) - 1.0
 
 
-#: xi -> integral of s from 0 to xi, items (i) and (ii) of Lemma 1
+#: xi_i -> integral of s_i from 0 to xi_i, items (i) and (ii) of Lemma 1
 Integral = Callable[[float], float]
 
 #: The saturation functions named in the paper, by the names users select them with.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -10,12 +11,12 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Slave
 
+from auv_fmu.closed_loop import Instant, closed_loop
 from orchestrator import bundle
 from orchestrator.master import simulate
 from orchestrator.metrics import effort, final_error, tracking_error, true_control_point
 from orchestrator.result import Result
 from orchestrator.system import PortName, System
-from straight_line import Instant, closed_loop
 
 STEPS = 5000
 UQR, XYZ = ("u", "q", "r"), ("x", "y", "z")
@@ -37,38 +38,41 @@ def quiet(system: System) -> Result:
     return simulate(system.with_parameters(QUIET), 100.0, 0.02)
 
 
-def ports(instant: Instant) -> dict[str, float]:
-    """What every port of the FMU loop must hold at an instant of the straight line."""
+def row(now: Instant, before: Instant) -> dict[str, float]:
+    """What every port of the FMU loop must hold at the end of a step that began at `before`."""
     values: dict[str, float] = {}
 
     def group(name: str, members, numbers) -> None:
         values.update(zip((f"{name}.{m}" for m in members), numbers, strict=True))
 
-    signals, seen, measurement = instant.signals, instant.plant_outputs, instant.measurement
-    group("plant.tau", UQR, signals.tau)
-    group("plant.tau_w", "uvwpqr", instant.tau_w)
-    group("plant.eta", (*XYZ, "phi", "theta", "psi"), (*instant.plant_state.position, *seen.euler))
-    group("plant.nu", "uvwpqr", instant.plant_state.nu)
-    group("plant.y", XYZ, instant.measured)
+    def both(names: tuple[str, str], members, numbers) -> None:
+        for name in names:
+            group(name, members, numbers)
+
+    signals, state, measurement = before.signals, before.controller_state, before.measurement
+    seen, planned = now.plant_outputs, now.planner_state
+    both(("plant.tau", "controller.tau"), UQR, signals.tau)
+    both(("plant.tau_w", "disturbance.tau_w"), "uvwpqr", before.tau_w)
+    group("disturbance.nu", "uvwpqr", before.plant_state.nu)
+    group("plant.eta", (*XYZ, "phi", "theta", "psi"), (*now.plant_state.position, *seen.euler))
+    group("plant.nu", "uvwpqr", now.plant_state.nu)
+    group("plant.y", XYZ, now.measurement.y)
     group("plant.dy", XYZ, seen.dy)
-    group("plant.tau_applied", UQR, instant.tau_applied)
+    group("plant.tau_applied", UQR, before.tau)
     group("controller.y", XYZ, measurement.y)
     group("controller.eta", ("phi", "theta", "psi"), measurement.euler)
     group("controller.y_d", XYZ, measurement.y_d)
     group("controller.dy_d", XYZ, measurement.dy_d)
     group("controller.ddy_d", XYZ, measurement.ddy_d)
-    group("controller.tau", UQR, signals.tau)
-    group("controller.y_hat", XYZ, instant.controller_state.y_hat)
+    group("controller.y_hat", XYZ, state.y_hat)
     group("controller.dy_hat", XYZ, signals.dy_hat)
-    for i, estimate in enumerate(instant.controller_state.theta_hat, start=1):
+    for i, estimate in enumerate(state.theta_hat, start=1):
         values[f"controller.theta_hat[{i}]"] = estimate
     group("controller.e", XYZ, signals.e)
     group("controller.z", XYZ, signals.z)
-    group("disturbance.tau_w", "uvwpqr", instant.tau_w)
-    group("planner.y_d", XYZ, instant.reference.y_d)
-    group("planner.dy_d", XYZ, instant.reference.dy_d)
-    group("planner.ddy_d", XYZ, instant.reference.ddy_d)
-    planned = instant.planner_state
+    group("planner.y_d", XYZ, now.reference.y_d)
+    group("planner.dy_d", XYZ, now.reference.dy_d)
+    group("planner.ddy_d", XYZ, now.reference.ddy_d)
     group("planner.eta_d", (*XYZ, "theta", "psi"), (*planned.position, planned.theta, planned.psi))
     return values
 
@@ -76,16 +80,13 @@ def ports(instant: Instant) -> dict[str, float]:
 def test_loop_of_fmus_is_the_straight_line_bit_for_bit(noisy: Result):
     """Every port, 5,000 steps, with noise and disturbance on."""
     assert noisy.failure is None
-    rows = [ports(instant) for instant in closed_loop(STEPS)]
-    # An input of the disturbance is the plant's velocity at the beginning of the step.
-    velocities = [f"nu.{k}" for k in "uvwpqr"]
-    before = [rows[0], *rows[:-1]]
-    for row, previous in zip(rows, before, strict=True):
-        row.update({f"disturbance.{k}": previous[f"plant.{k}"] for k in velocities})
+    instants = list(closed_loop(STEPS))
+    # The first row holds the values of initialisation, all at t = 0.
+    rows = [row(now, before) for before, now in pairwise([instants[0], *instants])]
     faults = {name for name in noisy.columns if name.endswith(".fault")}
     assert set(noisy.columns) == set(rows[0]) | faults
     for name in rows[0]:
-        expected = np.array([row[name] for row in rows])
+        expected = np.array([values[name] for values in rows])
         assert np.array_equal(noisy[name], expected), name
     for name in faults:
         assert not noisy[name].any()

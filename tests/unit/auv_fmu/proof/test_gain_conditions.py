@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from auv_fmu.control_point_model import D_2, M_2
-from auv_fmu.gain_conditions import bounds, conditions
+from auv_fmu.proof.control_point_model import D_2, M_2
+from auv_fmu.proof.gain_conditions import bounds, conditions
 from auv_fmu.vehicle import Vehicle
-from strategies import angles, lengths, pitch_angles
+from support.strategies import angles, lengths, pitch_angles
 
 PAPER = ((10.0, 10.0, 10.0), (10.0, 10.0, 10.0), 1.0, 50.0, 1.0)
 

@@ -66,7 +66,7 @@ class ActuatedDynamics:
 
     def C_1(self, w: Matrix) -> Matrix:
         """Centripetal and Coriolis matrix of (6), (3, 3), at sway and heave w [m/s]."""
-        m11, m22, m33 = self.vehicle[:3]
+        m11, m22, m33 = self.vehicle.m11, self.vehicle.m22, self.vehicle.m33
         return np.array(
             [
                 [0.0, m33 * w[1], -m22 * w[0]],

@@ -9,24 +9,35 @@ from auv_fmu import pd
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import jacobian
 from auv_fmu.pd import PdGains, PdMeasurement
-from strategies import angles, speeds, vectors
+from support.strategies import angles, speeds, vectors
 
 three = vectors(speeds, 3)
 
 
 @pytest.mark.parametrize("printed_jacobian", [True, False])
 @given(
-    y=three, euler=vectors(angles, 3), y_d=three, dy_d=three, ddy_d=three, dy=three,
-    theta_hat=vectors(st.floats(0, 20), 4), gains=vectors(st.floats(0.1, 20), 4),
-)  # fmt: skip
+    y=three,
+    euler=vectors(angles, 3),
+    y_d=three,
+    dy_d=three,
+    ddy_d=three,
+    dy=three,
+    theta_hat=vectors(st.floats(0, 20), 4),
+    gains=vectors(st.floats(0.1, 20), 4),
+)
 def test_law_is_57_and_58_in_matrices(
     printed_jacobian, y, euler, y_d, dy_d, ddy_d, dy, theta_hat, gains
 ):
     k_1, lam, eps_t, sigma = gains
     g = PdGains(
-        K1=(k_1, 2 * k_1, 3 * k_1), lambda_=lam, eps_t=eps_t, sigma=sigma, gamma=0.7,
-        theta_0=(0.1, 0.2, 0.3, 0.4), printed_jacobian=printed_jacobian,
-    )  # fmt: skip
+        K1=(k_1, 2 * k_1, 3 * k_1),
+        lambda_=lam,
+        eps_t=eps_t,
+        sigma=sigma,
+        gamma=0.7,
+        theta_0=(0.1, 0.2, 0.3, 0.4),
+        printed_jacobian=printed_jacobian,
+    )
     signals = pd.evaluate(g, theta_hat, PdMeasurement(y, euler, y_d, dy_d, ddy_d, dy))
     e, de = np.subtract(y, y_d), np.subtract(dy, dy_d)
     r = de + lam * np.eye(3) @ e

@@ -15,7 +15,7 @@ from auv_fmu.attitude import (
     rotation_from_euler,
     rotation_from_quaternion,
 )
-from strategies import angles, pitch_angles, speeds, vectors
+from support.strategies import angles, pitch_angles, speeds, vectors
 
 
 def elementary_rotation(axis: int, angle: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""(1), (2) and (3), and the plant that simulates them with six degrees of freedom."""
+"""The plant: (1) and (2) with six degrees of freedom."""
 
 from math import cos, sin
 
@@ -7,11 +7,10 @@ import pytest
 from hypothesis import given
 
 from auv_fmu import plant
-from auv_fmu.actuators import limit, limit_all
-from auv_fmu.attitude import rotate, rotation_from_euler, rotation_from_quaternion
+from auv_fmu.attitude import rotation_from_euler, rotation_from_quaternion
 from auv_fmu.plant import RollAxis
-from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
-from strategies import angles, forces, pitch_angles, speeds, vectors
+from auv_fmu.vehicle import Vehicle, accelerations
+from support.strategies import angles, forces, pitch_angles, speeds, vectors
 
 VEHICLE, ROLL = Vehicle(), RollAxis()
 MASSES = np.array([VEHICLE.m11, VEHICLE.m22, VEHICLE.m33, ROLL.m44, VEHICLE.m55, VEHICLE.m66])
@@ -35,16 +34,23 @@ def test_undriven_plant_loses_energy_to_damping_alone(nu, euler):
 
 
 @given(
-    nu=vectors(speeds, 5), theta=pitch_angles, psi=angles, tau=vectors(forces, 3),
+    nu=vectors(speeds, 5),
+    theta=pitch_angles,
+    psi=angles,
+    tau=vectors(forces, 3),
     tau_w=vectors(speeds, 5),
-)  # fmt: skip
+)
 def test_plant_without_roll_is_equation_2(nu, theta, psi, tau, tau_w):
     u, v, w, q, r = nu
     a, b, c, d, e = tau_w
     six = plant.accelerations_6dof(
-        VEHICLE, ROLL, (u, v, w, 0.0, q, r), rotation_from_euler(0.0, theta, psi), tau,
+        VEHICLE,
+        ROLL,
+        (u, v, w, 0.0, q, r),
+        rotation_from_euler(0.0, theta, psi),
+        tau,
         (a, b, c, 0.0, d, e),
-    )  # fmt: skip
+    )
     five = accelerations(VEHICLE, nu, sin(theta), tau, tau_w)
     assert (*six[:3], *six[4:]) == five
 
@@ -62,8 +68,16 @@ def test_coriolis_terms_are_those_of_a_diagonal_mass_matrix(nu, euler):
         ]
     )
     phi, theta, _ = euler
-    restoring = np.array([0, 0, 0, sin(phi) * cos(theta) * ROLL.righting_roll,
-                          sin(theta) * VEHICLE.righting_pitch, 0])  # fmt: skip
+    restoring = np.array(
+        [
+            0,
+            0,
+            0,
+            sin(phi) * cos(theta) * ROLL.righting_roll,
+            sin(theta) * VEHICLE.righting_pitch,
+            0,
+        ]
+    )
     expected = np.linalg.solve(M, -coriolis - DAMPING * nu - restoring)
     rotation = rotation_from_euler(*euler)
     actual = plant.accelerations_6dof(VEHICLE, ROLL, nu, rotation, UNDRIVEN, AT_REST)
@@ -94,35 +108,6 @@ def test_vehicle_that_passes_the_vertical_keeps_a_unit_quaternion_and_does_not_j
     assert steepest > np.deg2rad(89)
     # At 1.3 m/s and 1 rad/s the control point moves less than 4 cm in 20 ms.
     assert largest_move < 0.04
-
-
-@given(theta=pitch_angles, psi=angles, nu=vectors(speeds, 5))
-def test_kinematics_is_equation_1(theta, psi, nu):
-    """T_1 and T_2 written out as the paper prints them."""
-    u, v, w, q, r = nu
-    T_1 = np.array(
-        [
-            [cos(psi) * cos(theta), -sin(psi), sin(theta) * cos(psi)],
-            [sin(psi) * cos(theta), cos(psi), sin(theta) * sin(psi)],
-            [-sin(theta), 0.0, cos(theta)],
-        ]
-    )
-    np.testing.assert_allclose(
-        rotate(rotation_from_euler(0.0, theta, psi), (u, v, w)), T_1 @ (u, v, w), atol=1e-14
-    )
-    assert euler_rates(theta, q, r) == (q, r / cos(theta))
-
-
-@given(tau=forces, limits=vectors(forces, 2))
-def test_actuator_stays_within_its_limits_and_is_linear_between_them(tau, limits):
-    tau_min, tau_max = sorted(limits)
-    limited = limit(tau, tau_min, tau_max)
-    assert tau_min <= limited <= tau_max
-    assert limited == tau or tau != np.clip(tau, tau_min, tau_max)
-
-
-def test_limits_of_each_actuator_are_its_own():
-    assert limit_all((9.0, -9.0, 0.5), (-1.0, -2.0, -3.0), (1.0, 2.0, 3.0)) == (1.0, -2.0, 0.5)
 
 
 def test_noise_is_scaled_by_its_standard_deviation():

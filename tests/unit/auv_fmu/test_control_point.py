@@ -16,7 +16,7 @@ from auv_fmu.control_point import (
 )
 from auv_fmu.plant import RollAxis, initial_state, outputs, step
 from auv_fmu.vehicle import Vehicle
-from strategies import angles, forces, lengths, pitch_angles, speeds, vectors
+from support.strategies import angles, forces, lengths, pitch_angles, speeds, vectors
 
 
 @given(theta=angles, psi=angles, position=vectors(speeds, 3), ell=lengths)
@@ -72,7 +72,7 @@ def test_equation_13_gives_the_velocity_back(euler, nu, ell):
     u, v, w, _, q, r = nu
     rotation = rotation_from_euler(*euler)
     dy = control_point_velocity(rotation, nu, ell)
-    assert actuated_velocity(rotation, ell, dy, (v, w)) == pytest.approx((u, q, r), abs=1e-12)
+    assert actuated_velocity(rotation, dy, (v, w), ell) == pytest.approx((u, q, r), abs=1e-12)
 
 
 @given(euler=vectors(angles, 3), force=vectors(forces, 3), ell=lengths)
@@ -80,7 +80,7 @@ def test_command_does_the_work_of_the_force(euler, force, ell):
     """tau_a = J' F is the transpose of the map of velocities: the virtual work agrees."""
     rotation = rotation_from_euler(*euler)
     expected = np.column_stack(jacobian(rotation, ell)).T @ force
-    np.testing.assert_allclose(actuator_command(rotation, ell, force), expected, atol=1e-12)
+    np.testing.assert_allclose(actuator_command(rotation, force, ell), expected, atol=1e-12)
 
 
 def test_velocity_is_the_derivative_of_the_position_of_a_rolling_vehicle():

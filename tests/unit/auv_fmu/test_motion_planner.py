@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from auv_fmu import motion_planner
 from auv_fmu.motion_planner import PlannerState
 from auv_fmu.vehicle import Vehicle
-from strategies import angles, forces, lengths, speeds, vectors
+from support.strategies import angles, forces, lengths, speeds, vectors
 
 VEHICLE = Vehicle()
 
@@ -17,8 +17,13 @@ def stepped(state, tau_d, h):
     return motion_planner.step(state, motion_planner.motion(VEHICLE, state, tau_d), h)
 
 
-@given(theta=st.floats(-1.2, 1.2), psi=angles, nu=vectors(speeds, 5), tau_d=vectors(forces, 3),
-       ell=lengths)  # fmt: skip
+@given(
+    theta=st.floats(-1.2, 1.2),
+    psi=angles,
+    nu=vectors(speeds, 5),
+    tau_d=vectors(forces, 3),
+    ell=lengths,
+)
 def test_closed_form_derivatives_agree_with_differences_of_the_trajectory(
     theta, psi, nu, tau_d, ell
 ):

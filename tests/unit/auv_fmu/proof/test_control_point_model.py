@@ -6,7 +6,7 @@ from hypothesis import given
 
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import control_point_velocity
-from auv_fmu.control_point_model import (
+from auv_fmu.proof.control_point_model import (
     C_2,
     D_2,
     G_2,
@@ -18,7 +18,7 @@ from auv_fmu.control_point_model import (
     kinematic_matrix,
 )
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
-from strategies import angles, forces, lengths, pitch_angles, speeds, vectors
+from support.strategies import angles, forces, lengths, pitch_angles, speeds, vectors
 
 VEHICLE, ELL = Vehicle(), 0.35
 MODEL = ActuatedDynamics(VEHICLE)

@@ -1,0 +1,99 @@
+"""The Lyapunov function (34), or (55), and the composite errors (17) and (19) it is made of."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from auv_fmu import observer
+from auv_fmu.control_point import actuated_velocity
+from auv_fmu.output_feedback import virtual_velocity
+from auv_fmu.saturation import Integral, Saturation
+from auv_fmu.types import Rotation, Vector3
+from auv_fmu.vectors import difference
+from auv_fmu.vehicle import Vehicle
+
+
+class Errors(NamedTuple):
+    """What (34) weighs, with the true state of the vehicle."""
+
+    e: Vector3  #: tracking error y - y_d [m]
+    z: Vector3  #: estimation error y - y_hat [m]
+    r_1: Vector3  #: composite error (17) [m/s]
+    r_2: Vector3  #: composite error (19) [m/s]
+
+
+def composite_errors(
+    dy: Vector3,
+    dy_d: Vector3,
+    dy_hat: Vector3,
+    e_z: Vector3,
+    z: Vector3,
+    lambda_: float,
+    s: Saturation,
+) -> tuple[Vector3, Vector3]:
+    """r_1 = dy - dy_r and r_2 = dy - dy_o [m/s]: equations (17) and (19).
+
+    Args:
+        dy, dy_d, dy_hat: true, desired and estimated velocity of the control point [m/s].
+        e_z: e - z = y_hat - y_d [m].
+        z: estimation error that the observer has seen [m].
+        lambda_: diagonal entry of Lambda [m/s].
+        s: saturation function.
+
+    """
+    dy_r = virtual_velocity(dy_d, s(e_z)[0], lambda_)
+    dy_o = observer.dy_o(dy_hat, s(z)[0], lambda_)
+    return difference(dy, dy_r), difference(dy, dy_o)
+
+
+def potential(K2: Vector3, integral: Integral, e: Vector3, z: Vector3) -> float:
+    """The sums over k_2i of (34) and (55) [J].
+
+    Args:
+        K2: diagonal of K_2 [N].
+        integral: of the saturation function.
+        e, z: tracking and estimation error [m].
+
+    """
+    return sum(k * (integral(e_i - z_i) + integral(z_i)) for k, e_i, z_i in zip(K2, e, z))
+
+
+def kinetic(vehicle: Vehicle, rotation: Rotation, r: Vector3, ell: float) -> float:
+    """r^T M_2 r / 2 [J], with M_2 = J^-T M_1 J^-1 of (15): v^T M_1 v / 2 at v = J^-1 r.
+
+    Args:
+        vehicle: parameters.
+        rotation: body to earth.
+        r: composite error [m/s], earth frame.
+        ell: distance of the control point [m].
+
+    """
+    v_u, v_q, v_r = actuated_velocity(rotation, r, (0.0, 0.0), ell)
+    return 0.5 * (vehicle.m11 * v_u * v_u + vehicle.m55 * v_q * v_q + vehicle.m66 * v_r * v_r)
+
+
+def lyapunov(
+    vehicle: Vehicle,
+    rotation: Rotation,
+    errors: Errors,
+    K2: Vector3,
+    integral: Integral,
+    ell: float,
+) -> float:
+    """V of (34) or (55) [J] without its last term, which needs the unknown theta.
+
+    Args:
+        vehicle: parameters.
+        rotation: body to earth.
+        errors: at the same instant.
+        K2: diagonal of K_2 [N].
+        integral: of the saturation function.
+        ell: distance of the control point [m].
+
+    """
+    e, z, r_1, r_2 = errors
+    return (
+        potential(K2, integral, e, z)
+        + kinetic(vehicle, rotation, r_1, ell)
+        + kinetic(vehicle, rotation, r_2, ell)
+    )

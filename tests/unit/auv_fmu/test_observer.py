@@ -1,0 +1,79 @@
+"""(18), (23), (24) and (51): the velocity observer."""
+
+from math import exp
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from auv_fmu import observer
+from auv_fmu.saturation import hyperbolic_tangent
+from support.strategies import speeds, vectors
+
+three = vectors(speeds, 3)
+
+
+def s(z):
+    return hyperbolic_tangent(z)[0]
+
+
+def test_observer_finds_a_constant_velocity():
+    """With ddy_r = 0 its error obeys dz = -(k_d + lambda) z around rest: it dies out as exp."""
+    lambda_, k_d, h = 1.0, 50.0, 1e-4
+    dy = dy_hat_o = (0.4, -0.2, 0.1)
+    z_0 = np.array([1e-3, -2e-3, 5e-4])
+    y_hat, y = np.zeros(3), z_0
+    for _ in range(1000):
+        z = y - y_hat
+        rate = observer.dy_hat(dy_hat_o, s(z), z, lambda_, k_d)
+        y_hat, y = y_hat + h * np.array(rate), y + h * np.array(dy)
+    np.testing.assert_allclose(y - y_hat, z_0 * exp(-(k_d + lambda_) * 0.1), rtol=0.02)
+    at_rest = (0.0, 0.0, 0.0)
+    assert observer.dy_hat(dy_hat_o, at_rest, at_rest, lambda_, k_d) == dy
+
+
+@given(s_z=three, z=three, lambda_=speeds, k_d=st.floats(0, 100))
+def test_first_velocity_estimate_is_zero(s_z, z, lambda_, k_d):
+    """The initial condition below (24) makes dy_hat(0) = 0."""
+    dy_hat_o = observer.initial_dy_hat_o(s_z, z, lambda_, k_d)
+    first = observer.dy_hat(dy_hat_o, s_z, z, lambda_, k_d)
+    assert first == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
+
+
+@given(y=three, y_hat=three, dy=three, dy_hat_o=three, ddy_r=three)
+def test_observer_is_the_one_of_the_proof(y, y_hat, dy, dy_hat_o, ddy_r):
+    """(18), (23) and (24) "are equivalent to" d/dt (r_1 - r_2) = k_d r_2, above (28).
+
+    r_1 - r_2 = dy_o - dy_r. Its rate is a central difference along y, y_hat and dy_hat_o as they
+    move; only with dy_o of (18), not with the state dy_hat_o in its place, is it k_d r_2.
+    """
+    lambda_, k_d, h = 0.7, 50.0, 1e-6
+    y, y_hat, dy, dy_hat_o, ddy_r = map(np.array, (y, y_hat, dy, dy_hat_o, ddy_r))
+    z = y - y_hat
+    dy_hat = np.array(observer.dy_hat(dy_hat_o, s(z), z, lambda_, k_d))
+    ddy_hat_o = np.array(observer.ddy_hat_o(ddy_r, s(z), lambda_, k_d))
+
+    def dy_o(t):
+        z = y + t * dy - (y_hat + t * dy_hat)
+        moved = observer.dy_hat(dy_hat_o + t * ddy_hat_o, s(z), z, lambda_, k_d)
+        return np.array(observer.dy_o(moved, s(z), lambda_))
+
+    rate = (dy_o(h) - dy_o(-h)) / (2 * h) - ddy_r
+    np.testing.assert_allclose(rate, k_d * (dy - dy_o(0.0)), rtol=1e-6, atol=1e-4)
+
+
+def test_state_of_the_observer_is_equation_24():
+    """dy_hat_o = dy_r + k_d Lambda int s(z), up to its initial value (reading 4).
+
+    Along s(z) = 0.9 cos(w t) and dy_r = sin(w t) the integral is known; that of (51) is taken by
+    the midpoint rule.
+    """
+    lambda_, k_d, end, n = 2.0, 50.0, 3.0, 3000
+    w, h = np.array([0.5, 1.0, 2.0]), end / n
+    integral = np.zeros(3)
+    for t in (np.arange(n) + 0.5) * h:
+        z = np.arctanh(0.9 * np.cos(w * t))
+        integral += h * np.array(observer.ddy_hat_o(w * np.cos(w * t), s(z), lambda_, k_d))
+    expected = np.sin(w * end) + k_d * lambda_ * 0.9 * np.sin(w * end) / w
+    np.testing.assert_allclose(integral, expected, rtol=1e-6)

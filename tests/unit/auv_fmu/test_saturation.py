@@ -1,0 +1,103 @@
+"""Definition 2 and Lemma 1."""
+
+from math import cosh, log
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from auv_fmu.saturation import INTEGRALS, MAXIMUM_SLOPE, SATURATIONS
+from support.strategies import vectors
+
+numbers = st.floats(-50.0, 50.0)
+positive = st.floats(0.01, 20.0)
+both = pytest.mark.parametrize("name", SATURATIONS)
+ROUNDING = 1e-12
+
+
+def s(name, xi):
+    """s_i(xi)."""
+    return SATURATIONS[name]((xi, 0.0, 0.0))[0][0]
+
+
+def slope(name, xi):
+    """s_i'(xi)."""
+    return SATURATIONS[name]((xi, 0.0, 0.0))[1][0]
+
+
+@both
+@given(xi=vectors(numbers, 3))
+def test_vectors_are_saturated_component_by_component(name, xi):
+    values, slopes = SATURATIONS[name](xi)
+    assert values == tuple(s(name, xi_i) for xi_i in xi)
+    assert slopes == tuple(slope(name, xi_i) for xi_i in xi)
+
+
+@both
+@given(xi=st.floats(allow_nan=False, allow_infinity=False), other=numbers)
+def test_definition_2(name, xi, other):
+    value = s(name, xi)
+    assert abs(value) <= 1.0
+    assert xi * value >= 0.0
+    assert (value > 0) == (xi > 0) or abs(xi) < 1e-300
+    assert (value <= s(name, other)) or xi > other
+
+
+@both
+@given(xi=numbers)
+def test_slope_is_the_derivative(name, xi):
+    h = 1e-5
+    difference = (s(name, xi + h) - s(name, xi - h)) / (2 * h)
+    assert slope(name, xi) == pytest.approx(difference, abs=1e-9)
+    assert 0.0 <= slope(name, xi) <= MAXIMUM_SLOPE[name]
+
+
+@both
+@given(xi=numbers, k=positive)
+def test_lemma_1_i_and_ii(name, xi, k):
+    """The integral of s(k r) from 0 to xi is that of s from 0 to k xi, over k."""
+    integral, s_M = INTEGRALS[name](k * xi) / k, MAXIMUM_SLOPE[name]
+    slack = ROUNDING * (1 + abs(integral))
+    assert s(name, k * xi) ** 2 / (2 * k * s_M) <= integral + slack
+    assert integral <= k * s_M * xi**2 / 2 + slack
+    assert integral > 0.0 or abs(k * xi) < 1e-7
+    assert integral >= abs(xi) - 1.0 / k - slack
+
+
+@both
+@given(xi=st.floats(-20.0, 20.0))
+def test_integral_is_the_area_under_the_function(name, xi):
+    """Simpson's rule on 2000 intervals."""
+    nodes = np.linspace(0.0, xi, 2001)
+    weights = np.ones(2001)
+    weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
+    area = weights @ [s(name, node) for node in nodes] * xi / 2000 / 3
+    assert INTEGRALS[name](xi) == pytest.approx(area, abs=1e-8)
+
+
+@given(xi=st.floats(-20.0, 20.0))
+def test_integral_of_tanh_is_the_logarithm_of_cosh(xi):
+    assert INTEGRALS["tanh"](xi) == pytest.approx(log(cosh(xi)), abs=1e-12)
+
+
+@both
+@given(x=numbers, y=numbers, k_1=positive, k_2=positive)
+def test_lemma_1_iii(name, x, y, k_1, k_2):
+    s_M = MAXIMUM_SLOPE[name]
+    change = s(name, k_1 * x + k_2 * y) - s(name, k_2 * y)
+    assert abs(change) <= s_M * k_1 * abs(x) + ROUNDING
+    assert abs(s(name, x) - s(name, x - y)) <= s_M * abs(y) + ROUNDING
+
+
+@both
+@given(x=vectors(numbers, 3), k=positive, psi=vectors(positive, 3))
+def test_lemma_1_iv_to_vi(name, x, k, psi):
+    s_M = MAXIMUM_SLOPE[name]
+    for xi in x:
+        assert abs(s(name, k * xi)) <= s_M * k * abs(xi) * (1 + ROUNDING)
+        assert s(name, xi) ** 2 <= s_M * xi * s(name, xi) * (1 + ROUNDING)
+        assert s(name, xi) ** 2 <= s_M * xi**2 * (1 + ROUNDING)
+    values = np.array(SATURATIONS[name](x)[0])
+    left = np.array(x) @ np.diag(psi) @ values
+    assert left >= min(psi) * (values @ values) * (1 - ROUNDING)
