@@ -1,60 +1,84 @@
 """Ports of AuvPlant."""
 
+from __future__ import annotations
+
+from typing import NamedTuple
+
 from auv_fmu.actuators import Limits
 from auv_fmu.plant import ETA_0, NU_0, Localisation, RollAxis
-from fmus.base.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters
-from fmus.base.vehicle_ports import CONTROL_POINT, VEHICLE
-
-_TAU = {"u": "N", "q": "N.m", "r": "N.m"}
-_TAU_W = {"u": "N", "v": "N", "w": "N", "p": "N.m", "q": "N.m", "r": "N.m"}
-_POSITION = {"x": "m", "y": "m", "z": "m"}
-_EULER = {"phi": "rad", "theta": "rad", "psi": "rad"}
-_NU = {"u": "m/s", "v": "m/s", "w": "m/s", "p": "rad/s", "q": "rad/s", "r": "rad/s"}
+from auv_fmu.types import Vector6
+from auv_fmu.vehicle import Vehicle
+from fmus.ports.groups import ParameterSet
+from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters
+from fmus.ports.quantities import ETA, NU, POSITION, TAU, TAU_W, VELOCITY
+from fmus.ports.vehicle import CONTROL_POINT, VEHICLE
 
 _ROLL, _LIMITS, _LOCALISATION = RollAxis(), Limits(), Localisation()
-_COMMAND = inputs("tau", _TAU, "Commanded force and moments")
+_COMMAND = inputs("tau", TAU, "Commanded force and moments")
 
 
-def _dotted(units: dict[str, str]) -> dict[str, str]:
-    return {f".{member}": unit for member, unit in units.items()}
+class Parameters(NamedTuple):
+    """What the parameters of AuvPlant mean."""
 
+    vehicle: Vehicle
+    roll: RollAxis
+    ell: float
+    limits: Limits
+    eta0: Vector6
+    nu0: Vector6
+    noise: Localisation
+
+
+PARAMETERS = ParameterSet(
+    Parameters,
+    vehicle=VEHICLE,
+    roll=ParameterSet(
+        RollAxis,
+        m44=parameter("m44", _ROLL.m44, "kg.m2", "Roll inertia with added inertia", POSITIVE),
+        d44=parameter("d44", _ROLL.d44, "kg.m2/s", "Linear damping of roll", minimum=0.0),
+        righting_roll=parameter(
+            "righting.roll",
+            _ROLL.righting_roll,
+            "N.m",
+            "Righting moment in roll; the paper gives none, ours is that of pitch",
+        ),
+    ),
+    ell=CONTROL_POINT,
+    limits=ParameterSet(
+        Limits,
+        tau_max=parameters("tau_max", _LIMITS.tau_max, TAU, "Upper limit of (3)", minimum=0.0),
+        tau_min=parameters("tau_min", _LIMITS.tau_min, TAU, "Lower limit of (3)", maximum=0.0),
+    ),
+    eta0=parameters("eta0", ETA_0, ETA, "Initial posture"),
+    nu0=parameters("nu0", NU_0, NU, "Initial velocity in the body frame"),
+    noise=ParameterSet(
+        Localisation,
+        std=parameter(
+            "noise.std",
+            _LOCALISATION.std,
+            "m",
+            "Standard deviation of each measured coordinate; the paper gives none",
+            minimum=0.0,
+        ),
+        seed=Port(
+            "noise.seed",
+            "parameter",
+            "fixed",
+            "Integer",
+            "Seed of the noise",
+            start=_LOCALISATION.seed,
+        ),
+    ),
+)
 
 PORTS: tuple[Port, ...] = (
     *_COMMAND,
-    *inputs("tau_w", _TAU_W, "Disturbance, with the sign of (2)"),
-    *outputs("eta", {**_POSITION, **_EULER}, "Position of the centre of mass and Euler angles"),
-    *outputs("nu", _NU, "Velocity in the body frame"),
-    *outputs("y", _POSITION, "Measured control point, with noise"),
-    *outputs("dy", dict.fromkeys(_POSITION, "m/s"), "True velocity of the control point"),
-    *outputs("tau_applied", _TAU, "Force and moments after the limits of (3)", _COMMAND),
-    *VEHICLE,
-    parameter("m44", _ROLL.m44, "kg.m2", "Roll inertia with added inertia", POSITIVE),
-    parameter("d44", _ROLL.d44, "kg.m2/s", "Linear damping of roll", minimum=0.0),
-    parameter(
-        "righting.roll",
-        _ROLL.righting_roll,
-        "N.m",
-        "Righting moment in roll; the paper gives none, ours is that of pitch",
-    ),
-    CONTROL_POINT,
-    *parameters("tau_max", _LIMITS.tau_max, _dotted(_TAU), "Upper limit of (3)", minimum=0.0),
-    *parameters("tau_min", _LIMITS.tau_min, _dotted(_TAU), "Lower limit of (3)", maximum=0.0),
-    *parameters("eta0", ETA_0, _dotted({**_POSITION, **_EULER}), "Initial posture"),
-    *parameters("nu0", NU_0, _dotted(_NU), "Initial velocity in the body frame"),
-    parameter(
-        "noise.std",
-        _LOCALISATION.std,
-        "m",
-        "Standard deviation of each measured coordinate; the paper gives none",
-        minimum=0.0,
-    ),
-    Port(
-        "noise.seed",
-        "parameter",
-        "fixed",
-        "Integer",
-        "Seed of the noise",
-        start=_LOCALISATION.seed,
-    ),
+    *inputs("tau_w", TAU_W, "Disturbance, with the sign of (2)"),
+    *outputs("eta", ETA, "Position of the centre of mass and Euler angles"),
+    *outputs("nu", NU, "Velocity in the body frame"),
+    *outputs("y", POSITION, "Measured control point, with noise"),
+    *outputs("dy", VELOCITY, "True velocity of the control point"),
+    *outputs("tau_applied", TAU, "Force and moments after the limits of (3)", _COMMAND),
+    *PARAMETERS.ports,
     H_MAX,
 )

@@ -2,71 +2,85 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from random import Random
-from typing import Any
+from typing import Any, NamedTuple, TypedDict
 
 from auv_fmu import plant
 from auv_fmu.actuators import limit_all
-from auv_fmu.plant import PlantState, RollAxis
-from auv_fmu.types import Vector3
-from fmus.auv_plant.ports import PORTS
-from fmus.base.component import Component
-from fmus.base.port import Refusal
-from fmus.base.vehicle_ports import vehicle
+from auv_fmu.plant import PlantState
+from auv_fmu.types import Vector3, Vector6
+from fmus.auv_plant.ports import PARAMETERS, PORTS, Parameters
+from fmus.ports.groups import slices
+from fmus.ports.port import Refusal
+from fmus.slave.component import Component
 
-_OUTPUTS = [port.name for port in PORTS if port.causality == "output"]
 #: The measured control point among the outputs.
-_Y = slice(_OUTPUTS.index("y.x"), _OUTPUTS.index("y.z") + 1)
+_Y = slices([port for port in PORTS if port.causality == "output"])["y"]
 
 
-class AuvPlant(Component):
+class Inputs(NamedTuple):
+    """Commanded force and moments, and the disturbance."""
+
+    tau: Vector3
+    tau_w: Vector6
+
+
+class Outputs(TypedDict):
+    """What is seen of the vehicle; y has no noise yet."""
+
+    eta: Vector6
+    nu: Vector6
+    y: Vector3
+    dy: Vector3
+    tau_applied: Vector3
+
+
+class AuvPlant(Component[PlantState, Inputs, Outputs, Parameters]):
     """Six-degree-of-freedom vehicle of section 4.1 with (3) and noisy localisation."""
 
     description = "Autonomous underwater vehicle with limited actuators and noisy position sensor"
     ports = PORTS
-    state_type = PlantState
+    parameter_set = PARAMETERS
 
-    def configure(self, values: dict[str, Any]) -> None:
-        self._vehicle = vehicle(values)
-        self._roll = RollAxis(values["m44"], values["d44"], values["righting.roll"])
-        self._ell = values["ell"]
-        self._tau_min = values["tau_min.u"], values["tau_min.q"], values["tau_min.r"]
-        self._tau_max = values["tau_max.u"], values["tau_max.q"], values["tau_max.r"]
-        for lower, upper, k in zip(self._tau_min, self._tau_max, "uqr"):
-            if not lower < upper:
-                raise Refusal(f"tau_min.{k} = {lower:g} must be below tau_max.{k} = {upper:g}")
-        self._eta0 = tuple(values[f"eta0.{k}"] for k in ("x", "y", "z", "phi", "theta", "psi"))
-        self._nu0 = tuple(values[f"nu0.{k}"] for k in "uvwpqr")
-        self._noise_std = values["noise.std"]
-        self._seed = values["noise.seed"]
+    def check(self, parameters: Parameters) -> None:
+        lower, upper = parameters.limits.tau_min, parameters.limits.tau_max
+        for k, tau_min, tau_max in zip("uqr", lower, upper):
+            if not tau_min < tau_max:
+                raise Refusal(f"tau_min.{k} = {tau_min:g} must be below tau_max.{k} = {tau_max:g}")
 
-    def begin(self, inputs: Sequence[float], t: float) -> tuple[PlantState, list[float]]:
-        self._random = Random(self._seed)
-        state = plant.initial_state(self._eta0[:3], self._eta0[3:], self._nu0)
-        return state, self._seen(state, self._limited(inputs))
+    def begin(self, inputs: Inputs, t: float) -> tuple[PlantState, Outputs]:
+        self._random = Random(self.parameters.noise.seed)
+        x, y, z, phi, theta, psi = self.parameters.eta0
+        state = plant.initial_state((x, y, z), (phi, theta, psi), self.parameters.nu0)
+        return state, self._seen(state, self._limited(inputs.tau))
 
     def advance(
-        self, state: PlantState, inputs: Sequence[float], t: float, h: float, n: int
-    ) -> tuple[PlantState, list[float]]:
-        tau = self._limited(inputs)
-        tau_w: Any = inputs[3:]
+        self, state: PlantState, inputs: Inputs, t: float, h: float, n: int
+    ) -> tuple[PlantState, Outputs]:
+        vehicle, roll = self.parameters.vehicle, self.parameters.roll
+        tau = self._limited(inputs.tau)
         for _ in range(n):
-            state = plant.step(self._vehicle, self._roll, state, tau, tau_w, h)
+            state = plant.step(vehicle, roll, state, tau, inputs.tau_w, h)
         return state, self._seen(state, tau)
 
-    def _limited(self, inputs: Sequence[float]) -> Vector3:
-        return limit_all((inputs[0], inputs[1], inputs[2]), self._tau_min, self._tau_max)
+    def _limited(self, tau: Vector3) -> Vector3:
+        return limit_all(tau, self.parameters.limits.tau_min, self.parameters.limits.tau_max)
 
-    def _seen(self, state: PlantState, tau: Vector3) -> list[float]:
-        euler, y, dy = plant.outputs(state, self._ell)
-        return [*state.position, *euler, *state.nu, *y, *dy, *tau]
+    def _seen(self, state: PlantState, tau: Vector3) -> Outputs:
+        euler, y, dy = plant.outputs(state, self.parameters.ell)
+        return {
+            "eta": (*state.position, *euler),
+            "nu": state.nu,
+            "y": y,
+            "dy": dy,
+            "tau_applied": tau,
+        }
 
-    def sample(self, outputs: list[float]) -> None:
+    def sample(self, values: list[float]) -> None:
         gauss = self._random.gauss
         n = gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)
-        x, y, z = outputs[_Y]
-        outputs[_Y] = plant.measure((x, y, z), self._noise_std, n)
+        x, y, z = values[_Y]
+        values[_Y] = plant.measure((x, y, z), self.parameters.noise.std, n)
 
     def hidden_state(self) -> Any:
         return self._random.getstate() if self._state is not None else None

@@ -1,24 +1,29 @@
 """Ports of DisturbanceGenerator."""
 
+from __future__ import annotations
+
 from auv_fmu.disturbance import Disturbance
-from fmus.base.port import Port, inputs, outputs, parameter
+from fmus.ports.groups import ParameterSet
+from fmus.ports.port import Port, inputs, outputs, parameter
+from fmus.ports.quantities import NU, TAU_W
 
-_NU = {"u": "m/s", "v": "m/s", "w": "m/s", "p": "rad/s", "q": "rad/s", "r": "rad/s"}
-_TAU_W = {"u": "N", "v": "N", "w": "N", "p": "N.m", "q": "N.m", "r": "N.m"}
+_WAVES = Disturbance()
+_INPUTS = inputs("nu", NU, "Velocity in the body frame")
 
-_DISTURBANCE = Disturbance()
-_INPUTS = inputs("nu", _NU, "Velocity in the body frame")
+PARAMETERS = ParameterSet(
+    Disturbance,
+    A_f=parameter("A_f", _WAVES.A_f, "N", "Friction; in moments, N.m", tunable=True),
+    A_d=parameter("A_d", _WAVES.A_d, "N", "Waves and currents; in moments, N.m", tunable=True),
+    omega_d=parameter("omega_d", _WAVES.omega_d, "rad/s", "Frequency of the waves", tunable=True),
+)
 
 PORTS: tuple[Port, ...] = (
     *_INPUTS,
+    # Each direction depends on the velocity in it alone.
     *(
         port
-        for k, velocity in zip(_TAU_W, _INPUTS)
-        for port in outputs(
-            "tau_w", {k: _TAU_W[k]}, "Disturbance, with the sign of (2)", [velocity]
-        )
+        for (k, unit), velocity in zip(TAU_W.items(), _INPUTS)
+        for port in outputs("tau_w", {k: unit}, "Disturbance, with the sign of (2)", [velocity])
     ),
-    parameter("A_f", _DISTURBANCE.A_f, "N", "Friction; in moments, N.m", tunable=True),
-    parameter("A_d", _DISTURBANCE.A_d, "N", "Waves and currents; in moments, N.m", tunable=True),
-    parameter("omega_d", _DISTURBANCE.omega_d, "rad/s", "Frequency of the waves", tunable=True),
+    *PARAMETERS.ports,
 )

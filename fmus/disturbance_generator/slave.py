@@ -2,36 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypedDict
 
 from auv_fmu.disturbance import Disturbance, disturbance
-from fmus.base.component import Component
-from fmus.disturbance_generator.ports import PORTS
+from auv_fmu.types import Vector6
+from fmus.disturbance_generator.ports import PARAMETERS, PORTS
+from fmus.slave.component import Component, Nothing
 
 
-class NoState(NamedTuple):
-    """(56) has no memory."""
+class Inputs(NamedTuple):
+    """Velocity of the vehicle."""
+
+    nu: Vector6
 
 
-class DisturbanceGenerator(Component):
+class Outputs(TypedDict):
+    """The disturbance."""
+
+    tau_w: Vector6
+
+
+class DisturbanceGenerator(Component[Nothing, Inputs, Outputs, Disturbance]):
     """(56), evaluated at the beginning of the step and held through it."""
 
     description = "Disturbance by friction, waves and ocean currents in six degrees of freedom"
     ports = PORTS
-    state_type = NoState
+    parameter_set = PARAMETERS
 
-    def configure(self, values: dict[str, Any]) -> None:
-        self._disturbance = Disturbance(values["A_f"], values["A_d"], values["omega_d"])
-
-    def begin(self, inputs: Sequence[float], t: float) -> tuple[NoState, list[float]]:
-        return NoState(), self._seen(inputs, t)
+    def begin(self, inputs: Inputs, t: float) -> tuple[Nothing, Outputs]:
+        return self.advance(Nothing(), inputs, t, 0.0, 0)
 
     def advance(
-        self, state: NoState, inputs: Sequence[float], t: float, h: float, n: int
-    ) -> tuple[NoState, list[float]]:
-        return state, self._seen(inputs, t)
-
-    def _seen(self, inputs: Sequence[float], t: float) -> list[float]:
-        u, v, w, p, q, r = inputs
-        return [*disturbance(self._disturbance, (u, v, w, p, q, r), t)]
+        self, state: Nothing, inputs: Inputs, t: float, h: float, n: int
+    ) -> tuple[Nothing, Outputs]:
+        return state, {"tau_w": disturbance(self.parameters, inputs.nu, t)}

@@ -1,21 +1,40 @@
 """Ports of MotionPlanner."""
 
-from auv_fmu.motion_planner import ETA_D0, TAU_D
-from fmus.base.port import H_MAX, Port, outputs, parameters
-from fmus.base.vehicle_ports import CONTROL_POINT, VEHICLE
+from __future__ import annotations
 
-_AXES = ("x", "y", "z")
-_POSITION = dict.fromkeys(_AXES, "m")
-_POSTURE = {**_POSITION, "theta": "rad", "psi": "rad"}
+from typing import NamedTuple
+
+from auv_fmu.motion_planner import ETA_D0, TAU_D
+from auv_fmu.types import Vector3, Vector5
+from auv_fmu.vehicle import Vehicle
+from fmus.ports.groups import ParameterSet
+from fmus.ports.port import H_MAX, Port, outputs, parameters
+from fmus.ports.quantities import ACCELERATION, ETA_WITHOUT_ROLL, POSITION, TAU, VELOCITY
+from fmus.ports.vehicle import CONTROL_POINT, VEHICLE
+
+
+class Parameters(NamedTuple):
+    """What the parameters of MotionPlanner mean."""
+
+    tau_d: Vector3
+    eta0: Vector5
+    vehicle: Vehicle
+    ell: float
+
+
+PARAMETERS = ParameterSet(
+    Parameters,
+    tau_d=parameters("tau_d", TAU_D, TAU, "Driving force and moments"),
+    eta0=parameters("eta0", ETA_D0, ETA_WITHOUT_ROLL, "Initial posture"),
+    vehicle=VEHICLE,
+    ell=CONTROL_POINT,
+)
 
 PORTS: tuple[Port, ...] = (
-    *outputs("y_d", _POSITION, "Desired control point"),
-    *outputs("dy_d", dict.fromkeys(_AXES, "m/s"), "Desired velocity"),
-    *outputs("ddy_d", dict.fromkeys(_AXES, "m/s2"), "Desired acceleration, in closed form"),
-    *outputs("eta_d", _POSTURE, "Posture of the reference vehicle"),
-    *parameters("tau_d", TAU_D, {".u": "N", ".q": "N.m", ".r": "N.m"}, "Driving force and moments"),
-    *parameters("eta0", ETA_D0, {f".{k}": unit for k, unit in _POSTURE.items()}, "Initial posture"),
-    *VEHICLE,
-    CONTROL_POINT,
+    *outputs("y_d", POSITION, "Desired control point"),
+    *outputs("dy_d", VELOCITY, "Desired velocity"),
+    *outputs("ddy_d", ACCELERATION, "Desired acceleration, in closed form"),
+    *outputs("eta_d", ETA_WITHOUT_ROLL, "Posture of the reference vehicle"),
+    *PARAMETERS.ports,
     H_MAX,
 )

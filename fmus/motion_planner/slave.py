@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypedDict
 
 from auv_fmu import motion_planner
 from auv_fmu.motion_planner import Motion, PlannerState
-from fmus.base.component import Component
-from fmus.base.vehicle_ports import vehicle
-from fmus.motion_planner.ports import PORTS
+from auv_fmu.types import Vector3, Vector5
+from fmus.motion_planner.ports import PARAMETERS, PORTS, Parameters
+from fmus.slave.component import Component, Nothing
 
 
 class Planned(NamedTuple):
@@ -19,38 +18,40 @@ class Planned(NamedTuple):
     motion: Motion
 
 
-class MotionPlanner(Component):
+class Outputs(TypedDict):
+    """The reference, and the posture of the vehicle that makes it."""
+
+    y_d: Vector3
+    dy_d: Vector3
+    ddy_d: Vector3
+    eta_d: Vector5
+
+
+class MotionPlanner(Component[Planned, Nothing, Outputs, Parameters]):
     """Open-loop planner of Definition 1: an undisturbed vehicle under constant torques."""
 
     description = "Motion planner: helical reference with velocity and acceleration"
     ports = PORTS
-    state_type = Planned
+    parameter_set = PARAMETERS
 
-    def configure(self, values: dict[str, Any]) -> None:
-        self._vehicle = vehicle(values)
-        self._ell = values["ell"]
-        self._tau_d = values["tau_d.u"], values["tau_d.q"], values["tau_d.r"]
-        self._rest = PlannerState(
-            (values["eta0.x"], values["eta0.y"], values["eta0.z"]),
-            values["eta0.theta"],
-            values["eta0.psi"],
-            (0.0, 0.0, 0.0, 0.0, 0.0),
-        )
-
-    def begin(self, inputs: Sequence[float], t: float) -> tuple[Planned, list[float]]:
-        return self._planned(self._rest)
+    def begin(self, inputs: Nothing, t: float) -> tuple[Planned, Outputs]:
+        x, y, z, theta, psi = self.parameters.eta0
+        return self._planned(PlannerState((x, y, z), theta, psi, (0.0, 0.0, 0.0, 0.0, 0.0)))
 
     def advance(
-        self, state: Planned, inputs: Sequence[float], t: float, h: float, n: int
-    ) -> tuple[Planned, list[float]]:
+        self, state: Planned, inputs: Nothing, t: float, h: float, n: int
+    ) -> tuple[Planned, Outputs]:
         moved, moving = state
         for _ in range(n - 1):
             moved = motion_planner.step(moved, moving, h)
-            moving = motion_planner.motion(self._vehicle, moved, self._tau_d)
+            moving = self._motion(moved)
         return self._planned(motion_planner.step(moved, moving, h))
 
-    def _planned(self, state: PlannerState) -> tuple[Planned, list[float]]:
-        moving = motion_planner.motion(self._vehicle, state, self._tau_d)
-        y_d, dy_d, ddy_d = motion_planner.reference(state, moving, self._ell)
-        seen = [*y_d, *dy_d, *ddy_d, *state.position, state.theta, state.psi]
-        return Planned(state, moving), seen
+    def _motion(self, state: PlannerState) -> Motion:
+        return motion_planner.motion(self.parameters.vehicle, state, self.parameters.tau_d)
+
+    def _planned(self, state: PlannerState) -> tuple[Planned, Outputs]:
+        moving = self._motion(state)
+        y_d, dy_d, ddy_d = motion_planner.reference(state, moving, self.parameters.ell)
+        eta_d = (*state.position, state.theta, state.psi)
+        return Planned(state, moving), {"y_d": y_d, "dy_d": dy_d, "ddy_d": ddy_d, "eta_d": eta_d}

@@ -4,22 +4,55 @@ from __future__ import annotations
 
 from auv_fmu.output_feedback import Gains
 from auv_fmu.saturation import SATURATIONS
-from fmus.base.controller_ports import (
-    ADAPTATION,
+from fmus.ports.controllers import (
+    EPS_T,
+    GAMMA,
     INPUTS,
-    POSITION,
     PRINTED_JACOBIAN,
+    SIGMA,
+    THETA_0,
     THETA_HAT,
     TRACKING_ERROR,
-    VELOCITY,
     Y,
     command,
 )
-from fmus.base.port import H_MAX, POSITIVE, Port, outputs, parameter, parameters
-from fmus.base.vehicle_ports import CONTROL_POINT
+from fmus.ports.groups import ParameterSet
+from fmus.ports.port import H_MAX, POSITIVE, Port, outputs, parameter, parameters
+from fmus.ports.quantities import POSITION, VELOCITY, per_axis
+from fmus.ports.vehicle import CONTROL_POINT
 
 _GAINS = Gains()
-_PER_AXIS = {"[1]": "N", "[2]": "N", "[3]": "N"}
+
+PARAMETERS = ParameterSet(
+    Gains,
+    K1=parameters("K1", _GAINS.K1, per_axis("N"), "Diagonal of K_1", POSITIVE, tunable=True),
+    K2=parameters("K2", _GAINS.K2, per_axis("N"), "Diagonal of K_2", POSITIVE, tunable=True),
+    lambda_=parameter("lambda", _GAINS.lambda_, "m/s", "Lambda = lambda I", POSITIVE, tunable=True),
+    k_d=parameter("k_d", _GAINS.k_d, "1/s", "Gain of the observer", POSITIVE, tunable=True),
+    gamma=GAMMA,
+    sigma=SIGMA,
+    theta_0=THETA_0,
+    eps_t=EPS_T,
+    ell=CONTROL_POINT,
+    s=Port(
+        "saturation",
+        "parameter",
+        "fixed",
+        "String",
+        "Saturation function of Definition 2: tanh or algebraic",
+        start="tanh",
+        choices=SATURATIONS,
+    ),
+    printed_jacobian=PRINTED_JACOBIAN,
+    innovation_gate=parameter(
+        "innovation_gate",
+        _GAINS.innovation_gate,
+        "m",
+        "Restart the observer when |y - y_hat| exceeds this; 0: never. Not in the paper",
+        minimum=0.0,
+        tunable=True,
+    ),
+)
 
 PORTS: tuple[Port, ...] = (
     *INPUTS,
@@ -29,29 +62,6 @@ PORTS: tuple[Port, ...] = (
     *THETA_HAT,
     *TRACKING_ERROR,
     *outputs("z", POSITION, "Estimation error y - y_hat", Y),
-    *parameters("K1", _GAINS.K1, _PER_AXIS, "Diagonal of K_1", POSITIVE, tunable=True),
-    *parameters("K2", _GAINS.K2, _PER_AXIS, "Diagonal of K_2", POSITIVE, tunable=True),
-    parameter("lambda", _GAINS.lambda_, "m/s", "Lambda = lambda I", POSITIVE, tunable=True),
-    parameter("k_d", _GAINS.k_d, "1/s", "Gain of the observer", POSITIVE, tunable=True),
-    *ADAPTATION,
-    CONTROL_POINT,
-    Port(
-        "saturation",
-        "parameter",
-        "fixed",
-        "String",
-        "Saturation function of Definition 2: tanh or algebraic",
-        start="tanh",
-        choices=tuple(SATURATIONS),
-    ),
-    PRINTED_JACOBIAN,
-    parameter(
-        "innovation_gate",
-        _GAINS.innovation_gate,
-        "m",
-        "Restart the observer when |y - y_hat| exceeds this; 0: never. Not in the paper",
-        minimum=0.0,
-        tunable=True,
-    ),
+    *PARAMETERS.ports,
     H_MAX,
 )

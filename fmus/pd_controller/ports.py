@@ -3,31 +3,42 @@
 from __future__ import annotations
 
 from auv_fmu.pd import PdGains
-from fmus.base.controller_ports import (
-    ADAPTATION,
+from fmus.ports.controllers import (
+    EPS_T,
+    GAMMA,
     INPUTS,
     PRINTED_JACOBIAN,
+    SIGMA,
+    THETA_0,
     THETA_HAT,
     TRACKING_ERROR,
-    VELOCITY,
     command,
 )
-from fmus.base.port import H_MAX, POSITIVE, Port, inputs, parameter, parameters
-from fmus.base.vehicle_ports import CONTROL_POINT
+from fmus.ports.groups import ParameterSet
+from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, parameter, parameters
+from fmus.ports.quantities import VELOCITY, per_axis
+from fmus.ports.vehicle import CONTROL_POINT
 
 _GAINS = PdGains()
-_PER_AXIS = {"[1]": "kg/s", "[2]": "kg/s", "[3]": "kg/s"}
 _INPUTS = (*INPUTS, *inputs("dy", VELOCITY, "Measured velocity of the control point"))
+
+PARAMETERS = ParameterSet(
+    PdGains,
+    K1=parameters("K1", _GAINS.K1, per_axis("kg/s"), "Diagonal of K_1", POSITIVE, tunable=True),
+    lambda_=parameter("lambda", _GAINS.lambda_, "1/s", "Lambda = lambda I", POSITIVE, tunable=True),
+    gamma=GAMMA,
+    sigma=SIGMA,
+    theta_0=THETA_0,
+    eps_t=EPS_T,
+    ell=CONTROL_POINT,
+    printed_jacobian=PRINTED_JACOBIAN,
+)
 
 PORTS: tuple[Port, ...] = (
     *_INPUTS,
     *command("(57)", _INPUTS),
     *THETA_HAT,
     *TRACKING_ERROR,
-    *parameters("K1", _GAINS.K1, _PER_AXIS, "Diagonal of K_1", POSITIVE, tunable=True),
-    parameter("lambda", _GAINS.lambda_, "1/s", "Lambda = lambda I", POSITIVE, tunable=True),
-    *ADAPTATION,
-    CONTROL_POINT,
-    PRINTED_JACOBIAN,
+    *PARAMETERS.ports,
     H_MAX,
 )

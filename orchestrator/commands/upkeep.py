@@ -35,6 +35,6 @@ def _reference(options: argparse.Namespace) -> int:
 
 
 def _docs(options: argparse.Namespace) -> int:
-    for path in run_fmus("documentation", options.out):
+    for path in run_fmus("packaging.documentation", options.out):
         print(path)
     return OK

@@ -49,7 +49,7 @@ def build(folder: Path, loader: str | None = None) -> list[Path]:
         InputError: the folder cannot be written, or the FMUs cannot be built.
 
     """
-    written = run_fmus("build", folder, *(("--loader", loader) if loader else ()))
+    written = run_fmus("packaging.build", folder, *(("--loader", loader) if loader else ()))
     archive = folder / ARCHIVE
     try:
         written += _write_if_changed(archive, ssp_bytes(closed_loop(folder)))
@@ -122,7 +122,7 @@ def current_fmus() -> Path:
             "that can be written"
         ) from error
     try:
-        run_fmus("build", partial)
+        run_fmus("packaging.build", partial)
         partial.rename(folder)
     except OSError:
         # Another process was first; its folder holds the same.

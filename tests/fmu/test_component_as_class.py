@@ -8,11 +8,11 @@ from math import inf, nan
 import pytest
 
 from fmus.auv_plant.slave import AuvPlant
-from fmus.base.component import Component
 from fmus.disturbance_generator.slave import DisturbanceGenerator
 from fmus.motion_planner.slave import MotionPlanner
 from fmus.observer_controller.slave import ObserverController
 from fmus.pd_controller.slave import PdController
+from fmus.slave.component import Component
 
 COMPONENTS = [AuvPlant, DisturbanceGenerator, MotionPlanner, ObserverController, PdController]
 WITH_INPUTS = [AuvPlant, DisturbanceGenerator, ObserverController, PdController]
@@ -24,7 +24,7 @@ class Driver:
 
     def __init__(self, component: type[Component], **values: object) -> None:
         self.slave = component(instance_name="under_test")
-        self.ports = (*component.ports, self.slave._ports[-1])
+        self.ports = self.slave._store.ports
         self.slave.setup_experiment(0.0)
         self.set(**values)
         self.slave.enter_initialization_mode()

@@ -10,7 +10,7 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.loader import compiler
+from fmus.packaging.loader import compiler
 from orchestrator.experiments import bundle
 
 NAMES = [

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.discovery import components
+from fmus.packaging.discovery import components
 
 TESTS = Path(__file__).parents[1]
 PAGE = (TESTS.parent / "docs" / "equations.md").read_text(encoding="utf-8")

@@ -7,11 +7,12 @@ documentation and the tests all read these declarations, directly or through the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isfinite
 from typing import Union
 
 from auv_fmu.euler import STEP
+from fmus.ports.quantities import Members, member_name
 
 Value = Union[float, int, bool, str]
 
@@ -32,11 +33,11 @@ class Port:
         causality: `input`, `output` or `parameter`.
         variability: `continuous`, `discrete`, `fixed` or `tunable`.
         kind: FMI type: `Real`, `Integer`, `Boolean` or `String`.
-        unit: of a Real, a key of :data:`fmus.base.units.UNITS`.
+        unit: of a Real, a key of :data:`fmus.ports.units.UNITS`.
         start: value before anything is set. Outputs have none.
         description: one line.
         minimum, maximum: inclusive bounds of a number.
-        choices: values that a String may have.
+        choices: values that a String may have, with what each stands for in the equations.
         feedthrough: of an output, the inputs it depends on without a state between.
 
     """
@@ -50,7 +51,7 @@ class Port:
     start: Value | None = None
     minimum: float | None = None
     maximum: float | None = None
-    choices: tuple[str, ...] = ()
+    choices: Mapping[str, object] = field(default_factory=dict)
     feedthrough: tuple[str, ...] = ()
 
     def checked(self, value: Value) -> Value:
@@ -73,12 +74,16 @@ class Port:
             raise Refusal(f"{self.name} = {number:g}: must be at most {self.maximum:g}")
         return value
 
+    def meaning(self, value: Value) -> object:
+        """What the equations take for a value of this port."""
+        return self.choices[str(value)] if self.choices else value
 
-def inputs(group: str, units: Mapping[str, str], description: str) -> tuple[Port, ...]:
-    """Real inputs `group.member`, one for each member and its unit, starting at zero."""
+
+def inputs(group: str, members: Members, description: str) -> tuple[Port, ...]:
+    """Real inputs, one for each member of a group, starting at zero."""
     return tuple(
         Port(
-            f"{group}.{member}",
+            member_name(group, member),
             "input",
             "continuous",
             "Real",
@@ -86,20 +91,17 @@ def inputs(group: str, units: Mapping[str, str], description: str) -> tuple[Port
             unit=unit,
             start=0.0,
         )
-        for member, unit in units.items()
+        for member, unit in members.items()
     )
 
 
 def outputs(
-    group: str,
-    units: Mapping[str, str],
-    description: str,
-    feedthrough: Sequence[Port] = (),
+    group: str, members: Members, description: str, feedthrough: Sequence[Port] = ()
 ) -> tuple[Port, ...]:
-    """Real outputs `group.member`, each depending directly on the given inputs."""
+    """Real outputs, one for each member of a group, each depending directly on the given inputs."""
     return tuple(
         Port(
-            f"{group}.{member}",
+            member_name(group, member),
             "output",
             "continuous",
             "Real",
@@ -107,7 +109,7 @@ def outputs(
             unit=unit,
             feedthrough=tuple(port.name for port in feedthrough),
         )
-        for member, unit in units.items()
+        for member, unit in members.items()
     )
 
 
@@ -128,19 +130,21 @@ def parameter(
 def parameters(
     group: str,
     starts: Sequence[float],
-    members: Mapping[str, str],
+    members: Members,
     description: str,
     minimum: float | None = None,
     maximum: float | None = None,
     tunable: bool = False,
 ) -> tuple[Port, ...]:
-    """Real parameters `group + member`, with the members' units; a member brings its own dot."""
+    """Real parameters, one for each member of a group."""
+    if len(starts) != len(members):
+        raise TypeError(f"{group}: {len(starts)} start values for {len(members)} members")
     return tuple(
         parameter(
-            f"{group}{member}",
+            member_name(group, member),
             start,
             unit,
-            f"{description}: {member.strip('.[]')}",
+            f"{description}: {member}",
             minimum,
             maximum,
             tunable,

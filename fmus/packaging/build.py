@@ -1,4 +1,4 @@
-"""Build the FMU of every component folder: `python -m fmus.build --out DIR`.
+"""Build the FMU of every component folder: `python -m fmus.packaging.build --out DIR`.
 
 Runs in a process of its own, because PythonFMU imports what it builds. Writes a file only if
 the sources have changed since it was written.
@@ -18,17 +18,17 @@ from pathlib import Path
 
 import pythonfmu
 
-from fmus import documentation
-from fmus.discovery import components, package_folder
-from fmus.loader import compiler, with_loader
-from fmus.sealing import seal
+from fmus.packaging import documentation
+from fmus.packaging.discovery import components, package_folder
+from fmus.packaging.loader import compiler, with_loader
+from fmus.packaging.sealing import seal
 
 _FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
 _PYTHONFMU = package_folder("pythonfmu")
-_ICON = _FOLDERS["fmus"] / "base" / "icon.png"
+_ICON = Path(__file__).with_name("icon.png")
 
 _SCRIPT = """\
-from fmus.base.loading import settle
+from fmus.slave.loading import settle
 from {module} import {component}
 
 settle(globals())
@@ -126,7 +126,7 @@ def _best_loader() -> str:
 
 def main() -> int:
     """Command line of the module."""
-    parser = argparse.ArgumentParser(prog="python -m fmus.build", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m fmus.packaging.build", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("fmus", "dist"), help="folder to write")
     parser.add_argument("--loader", choices=("native", "plain"), help="default: native if it can")
     options = parser.parse_args()

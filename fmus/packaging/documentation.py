@@ -1,7 +1,7 @@
 """Pages of the components, from their `page.md` and their declared ports.
 
-`python -m fmus.documentation --out DIR` writes them as Markdown for the repository; the build puts
-the same text as HTML into each FMU.
+`python -m fmus.packaging.documentation --out DIR` writes them as Markdown for the repository; the
+build puts the same text as HTML into each FMU.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from string import Template
 
 from markdown_it import MarkdownIt
 
-from fmus.base.port import FAULT, Port
-from fmus.discovery import components, folder_of
+from fmus.packaging.discovery import components, folder_of
+from fmus.ports.port import FAULT, Port
 
 _HTML = Path(__file__).with_name("page.html")
 

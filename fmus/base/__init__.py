@@ -1,1 +1,0 @@
-"""What all components share: declarations of ports and the hardened slave."""

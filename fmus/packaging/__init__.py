@@ -1,0 +1,12 @@
+"""From component folders to FMU files.
+
+======================= ============================================================
+module                  what it states
+======================= ============================================================
+:mod:`.discovery`       which components there are
+:mod:`.build`           the command that brings a folder of FMUs up to date
+:mod:`.sealing`         reproducible archives that are alone in their process
+:mod:`.documentation`   the page of each component
+:mod:`.loader`          the library that lets an FMU run where there is no Python
+======================= ============================================================
+"""

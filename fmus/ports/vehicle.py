@@ -1,0 +1,39 @@
+"""Parameters of (2), shared by the components that integrate it."""
+
+from __future__ import annotations
+
+from auv_fmu.control_point import ELL
+from auv_fmu.vehicle import Vehicle
+from fmus.ports.groups import ParameterSet
+from fmus.ports.port import POSITIVE, Port, parameter
+
+_VEHICLE = Vehicle()
+
+
+def _inertia(name: str, unit: str) -> Port:
+    description = f"Mass or inertia with added mass: {name[1:]}"
+    return parameter(name, getattr(_VEHICLE, name), unit, description, POSITIVE)
+
+
+def _damping(name: str, unit: str) -> Port:
+    return parameter(name, getattr(_VEHICLE, name), unit, f"Linear damping: {name[1:]}", 0.0)
+
+
+VEHICLE = ParameterSet(
+    Vehicle,
+    m11=_inertia("m11", "kg"),
+    m22=_inertia("m22", "kg"),
+    m33=_inertia("m33", "kg"),
+    m55=_inertia("m55", "kg.m2"),
+    m66=_inertia("m66", "kg.m2"),
+    d11=_damping("d11", "kg/s"),
+    d22=_damping("d22", "kg/s"),
+    d33=_damping("d33", "kg/s"),
+    d55=_damping("d55", "kg.m2/s"),
+    d66=_damping("d66", "kg.m2/s"),
+    righting_pitch=parameter(
+        "righting.pitch", _VEHICLE.righting_pitch, "N.m", "Righting moment in pitch"
+    ),
+)
+
+CONTROL_POINT = parameter("ell", ELL, "m", "Distance of the control point", POSITIVE)

@@ -1,0 +1,11 @@
+"""The Python kind of component: what PythonFMU leaves to a slave, done once.
+
+==================== ===============================================================
+module               what it states
+==================== ===============================================================
+:mod:`.component`    the base of all components: callbacks and steps
+:mod:`.store`        the values of one instance, by value reference
+:mod:`.state`        the state of an FMU, complete and exact
+:mod:`.loading`      making up for what PythonFMU does to a process
+==================== ===============================================================
+"""

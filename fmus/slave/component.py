@@ -1,0 +1,377 @@
+"""The hardened slave that every component of the bundle extends.
+
+PythonFMU turns a Python class into an FMU. What it leaves to the class is done here, once:
+
+- No exception of the component leaves a callback: PythonFMU would report fmi2Fatal and release
+  its objects twice. A refusal is logged, raises `fault`, and ends the next step with
+  fmi2Discard.
+- A step is a transaction: state and outputs change together, after everything was computed and
+  found finite.
+- Inputs, outputs and parameters reach the component as the groups that equations are written in.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from math import ceil, isfinite
+from typing import Any, Callable, ClassVar, Generic, NamedTuple, TypeVar, get_args, get_origin
+from xml.etree.ElementTree import Element
+
+from pythonfmu import DefaultExperiment, Fmi2Slave
+from pythonfmu.enums import Fmi2Status
+
+from auv_fmu import __version__
+from auv_fmu.euler import STEP
+from fmus.ports.description import complete
+from fmus.ports.groups import ParameterSet, packing, unpacking
+from fmus.ports.port import H_MAX, Port, Refusal, Value
+from fmus.slave.state import Snapshot, checked, from_bytes, to_bytes
+from fmus.slave.store import MISSING, Store
+
+#: A step may exceed `h_max` by this share without being split: hosts round their time.
+ROUNDING = 1e-9
+
+#: Longest step of a component that has no internal steps [s].
+_NO_LIMIT = 1e300
+
+#: More internal steps than this in one communication step are taken for a mistake.
+MOST_INTERNAL_STEPS = 1_000_000
+
+_INSTANTIATED, _INITIALISING, _STEPPING = "instantiated", "initialising", "stepping"
+
+State = TypeVar("State")
+Inputs = TypeVar("Inputs")
+Outputs = TypeVar("Outputs")
+Parameters = TypeVar("Parameters")
+
+
+class Nothing(NamedTuple):
+    """State of a component without memory; inputs of one without inputs."""
+
+
+class Component(Fmi2Slave, Generic[State, Inputs, Outputs, Parameters]):  # type: ignore[misc]
+    """Base of all components.
+
+    A component names its four types: NamedTuples of its state, of its groups of inputs and of its
+    parameters, and a TypedDict of its groups of outputs. It declares its ports and implements
+    :meth:`begin` and :meth:`advance`. These may raise: what they raise becomes a refusal.
+    """
+
+    author = "auv-fmu"
+    license = "MIT"
+    version = __version__
+    default_experiment = DefaultExperiment(0.0, 100.0, STEP)
+
+    #: Ports without `fault`, inputs first, then outputs, then parameters.
+    ports: ClassVar[tuple[Port, ...]]
+    #: What the parameters mean to the equations; `h_max` is not among them.
+    parameter_set: ParameterSet[Parameters]
+    #: Fields of the inputs that bear another name than their group of ports.
+    group_of: ClassVar[Mapping[str, str]] = {}
+    #: The parameters as they are now.
+    parameters: Parameters
+
+    def check(self, parameters: Parameters) -> None:
+        """Raise Refusal if parameters, each of which is good, do not fit together."""
+
+    @abstractmethod
+    def begin(self, inputs: Inputs, t: float) -> tuple[State, Outputs]:
+        """State and outputs at the start time."""
+
+    @abstractmethod
+    def advance(
+        self, state: State, inputs: Inputs, t: float, h: float, n: int
+    ) -> tuple[State, Outputs]:
+        """State and outputs after n internal steps of h seconds with held inputs."""
+
+    def sample(self, values: list[float]) -> None:
+        """Change the outputs in place once a communication point, after the step was accepted."""
+
+    def hidden_state(self) -> Any:
+        """What a component keeps outside its state: JSON-safe, immutable."""
+        return None
+
+    def restore_hidden_state(self, hidden: Any) -> None:
+        """Take back what :meth:`hidden_state` gave."""
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        """Hold the types of the component against its ports."""
+        super().__init_subclass__(**kwargs)
+        [types] = [get_args(b) for b in cls.__orig_bases__ if get_origin(b) is Component]
+        cls._state_type, inputs, outputs, _ = types
+        ports = {
+            causality: [port for port in cls.ports if port.causality == causality]
+            for causality in ("input", "output", "parameter")
+        }
+        cls._unpack = staticmethod(unpacking(inputs, ports["input"], cls.group_of))
+        cls._pack = staticmethod(packing(outputs, ports["output"]))
+        meant = {port.name for port in cls.parameter_set.ports}
+        if {port.name for port in ports["parameter"]} - {H_MAX.name} != meant:
+            raise TypeError(f"{cls.__name__}: not every parameter has a meaning, or a port")
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self._store = Store(self.ports)
+        self._state: State | None = None
+        self._mode = _INSTANTIATED
+        self._stale = False
+        self._start_time = 0.0
+        self._longest_step = 0.0
+        self._said: set[str] = set()
+
+    # Faults and messages
+
+    def _report(self, message: str, key: str | None = None) -> None:
+        """Raise `fault` and log."""
+        self._store.fault = True
+        self.say(message, Fmi2Status.discard, key)
+
+    def say(self, message: str, status: Fmi2Status, key: str | None = None) -> None:
+        """Log a message, the first time only that its key, or else its text, comes up.
+
+        The host adds the name of the instance.
+        """
+        if (key or message) not in self._said:
+            self._said.add(key or message)
+            # FMI defines a log message as a format: a host would take a % for a directive.
+            self.log(message.replace("%", "%%"), status)
+
+    def _guarded(self, action: str, function: Callable[[], None]) -> None:
+        """Run a callback's body; whatever it raises is reported instead."""
+        try:
+            function()
+        except BaseException as error:
+            self._report(f"{action}: {type(error).__name__}: {error}")
+
+    # Experiment
+
+    def setup_experiment(
+        self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
+    ) -> None:
+        if isfinite(start_time):
+            self._start_time = start_time
+        else:
+            self._report(f"start time {start_time}: must be finite")
+
+    def enter_initialization_mode(self) -> None:
+        self._mode = _INITIALISING
+        self._stale = True
+
+    def exit_initialization_mode(self) -> None:
+        self._refresh()
+        self._mode = _STEPPING
+
+    def _refresh(self) -> None:
+        """Compute state and outputs at the start time, if a value they depend on has changed."""
+        if self._stale:
+            self._stale = False
+            self._guarded("initialisation refused", self._begin)
+
+    def _begin(self) -> None:
+        store = self._store
+        store.refused.pop("initialisation", None)
+        try:
+            self._adopt(store.parameters, self._meaning(store.parameters))
+            state, outputs = self.begin(self._unpack(store.inputs), self._start_time)
+            values = self._pack(outputs)
+            if not isfinite(sum(values)):
+                raise Refusal("an output is not finite")
+        except Exception as error:
+            store.refused["initialisation"] = str(error)
+            raise
+        self._state, store.outputs = state, values
+        self.sample(values)
+
+    def _meaning(self, values: dict[str, Value]) -> tuple[Parameters, float]:
+        """What the values of all parameters come to, and the longest step with them [s]."""
+        parameters = self.parameter_set.of(values)
+        self.check(parameters)
+        return parameters, float(values.get(H_MAX.name, _NO_LIMIT)) * (1.0 + ROUNDING)
+
+    def _adopt(self, values: dict[str, Value], meaning: tuple[Parameters, float]) -> None:
+        self._store.parameters = values
+        self.parameters, self._longest_step = meaning
+
+    # Steps
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        """Advance by one communication step.
+
+        A step longer than `h_max` is split evenly, a zero step changes nothing, a negative one
+        is refused. After a refusal everything is as it was before the step.
+        """
+        try:
+            store = self._store
+            if store.refused or self._mode != _STEPPING:
+                raise Refusal("; ".join(store.refused.values()) or "not initialised")
+            if 0.0 < step_size <= self._longest_step and isfinite(current_time):
+                n = 1
+            else:
+                n = self._internal_steps(current_time, step_size)
+                if n == 0:
+                    return True
+            state, outputs = self.advance(
+                self._state,  # type: ignore[arg-type]
+                self._unpack(store.inputs),
+                current_time,
+                step_size / n,
+                n,
+            )
+            values = self._pack(outputs)
+            if not isfinite(sum(values)):
+                raise Refusal("an output is no longer finite")
+            self._state, store.outputs = state, values
+            self.sample(values)
+        except BaseException as error:
+            what = str(error) if isinstance(error, Refusal) else f"{type(error).__name__}: {error}"
+            self._report(f"step refused at t = {current_time:g} s: {what}", key=what)
+            return False
+        return True
+
+    def _internal_steps(self, current_time: float, step_size: float) -> int:
+        if not isfinite(current_time) or not isfinite(step_size):
+            raise Refusal(f"time {current_time} and step {step_size} must be finite")
+        if step_size < 0.0:
+            raise Refusal(f"step {step_size:g} s is negative")
+        n = ceil(step_size / self._longest_step)
+        if n > MOST_INTERNAL_STEPS:
+            raise Refusal(f"step {step_size:g} s needs {n} internal steps; raise h_max")
+        return n
+
+    # Values
+
+    def get_real(self, vrs: list[int]) -> list[float]:
+        if self._stale:
+            self._refresh()
+        store = self._store
+        # PythonFMU reads the list and lets go of it, so it need not be a copy.
+        return store.outputs if vrs == store.output_references else self._get(vrs, "Real")
+
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        return self._get(vrs, "Integer")
+
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        if self._stale:
+            self._refresh()
+        store = self._store
+        return [store.fault] if vrs == store.fault_references else self._get(vrs, "Boolean")
+
+    def get_string(self, vrs: list[int]) -> list[str]:
+        return self._get(vrs, "String")
+
+    def set_real(self, vrs: list[int], values: list[float]) -> None:
+        store = self._store
+        # A sum is finite only if every value is; _set finds out which one was not.
+        if (
+            vrs == store.input_references
+            and self._mode == _STEPPING
+            and not store.refused
+            and isfinite(sum(values))
+        ):
+            store.inputs = values
+        else:
+            self._set(vrs, values, "Real")
+
+    def set_integer(self, vrs: list[int], values: list[int]) -> None:
+        self._set(vrs, values, "Integer")
+
+    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
+        self._set(vrs, values, "Boolean")
+
+    def set_string(self, vrs: list[int], values: list[str]) -> None:
+        self._set(vrs, values, "String")
+
+    def _get(self, vrs: list[int], kind: str) -> list[Any]:
+        values: list[Value] = []
+        for reference in vrs:
+            try:
+                values.append(self._store.get(reference, kind))
+            except Refusal as refusal:
+                self._report(str(refusal))
+                values.append(MISSING[kind])
+        return values
+
+    def _set(self, vrs: list[int], values: Sequence[Value], kind: str) -> None:
+        for reference, value in zip(vrs, values):
+            try:
+                port = self._store.port(reference, kind)
+                if port.causality == "input":
+                    self._store.accept(port, value)
+                    self._store.set_input(reference, float(value))
+                else:
+                    self._set_parameter(port, value)
+                self._stale = self._mode == _INITIALISING
+            except BaseException as error:
+                self._report(str(error))
+
+    def _set_parameter(self, port: Port, value: Value) -> None:
+        if port.causality != "parameter":
+            raise Refusal(f"{port.name} is an output and cannot be set")
+        if port.variability == "fixed" and self._mode == _STEPPING:
+            raise Refusal(f"{port.name} is fixed and cannot be set after the initialisation")
+        store = self._store
+        store.accept(port, value)
+        parameters = {**store.parameters, port.name: value}
+        if self._mode != _STEPPING:
+            store.parameters = parameters
+            return
+        try:
+            self._adopt(parameters, self._meaning(parameters))
+        except Exception as error:
+            store.refused[port.name] = str(error)
+            raise
+
+    # State
+
+    def _identity(self) -> str:
+        """Names class and version: the modules of a built FMU carry a hash of their contents."""
+        return f"{type(self).__module__}.{type(self).__qualname__}"
+
+    def _get_fmu_state(self) -> Snapshot:
+        self._refresh()
+        store = self._store
+        return Snapshot(
+            identity=self._identity(),
+            mode=self._mode,
+            start_time=self._start_time,
+            parameters=dict(store.parameters),
+            inputs=list(store.inputs),
+            outputs=list(store.outputs),
+            state=self._state,
+            hidden=self.hidden_state(),
+            fault=store.fault,
+            refused=dict(store.refused),
+        )
+
+    def _set_fmu_state(self, state: Mapping[str, Any]) -> None:
+        self._guarded("state refused", lambda: self._restore(state))
+
+    def _restore(self, saved: Mapping[str, Any]) -> None:
+        store = self._store
+        wanted = checked(saved, self._identity(), store)
+        if wanted["state"] is None:
+            self._state, store.parameters = None, wanted["parameters"]
+        else:
+            state = self._state_type._make(wanted["state"])
+            meaning = self._meaning(wanted["parameters"])
+            # Nothing of this instance has changed so far, and nothing can fail after this.
+            self.restore_hidden_state(wanted["hidden"])
+            self._adopt(wanted["parameters"], meaning)
+            self._state = state
+        store.inputs, store.outputs = wanted["inputs"], wanted["outputs"]
+        store.fault, store.refused = wanted["fault"], wanted["refused"]
+        self._mode, self._start_time = wanted["mode"], wanted["start_time"]
+        self._stale = False
+
+    _fmu_state_to_bytes = staticmethod(to_bytes)
+    _fmu_state_from_bytes = staticmethod(from_bytes)
+
+    # Description
+
+    def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
+        root: Element = super().to_xml()
+        # Two builds of the same sources must be the same bytes; the time of the build is not in
+        # them.
+        del root.attrib["generationDateAndTime"]
+        return complete(root, self._store.ports)

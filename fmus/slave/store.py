@@ -1,0 +1,97 @@
+"""The values of one instance, by value reference, and what may be done with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fmus.ports.port import FAULT, Port, Refusal, Value
+
+#: What a reference gets that belongs to no port of its type.
+MISSING: dict[str, Value] = {"Real": 0.0, "Integer": 0, "Boolean": False, "String": ""}
+
+
+class Store:
+    """Values of all ports.
+
+    A port's value reference is its place among the ports. All Real inputs and all Real outputs lie
+    in lists of their own, in their order, so that a host that passes them all in one call costs
+    one comparison instead of one look-up a value.
+
+    Attributes:
+        ports: of the component, `fault` last.
+        input_references, output_references: of the Real inputs and outputs.
+        inputs, outputs: their values.
+        parameters: by name.
+        fault: whether anything was refused.
+        refused: why, by what was refused and has not been mended since.
+
+    """
+
+    def __init__(self, ports: Sequence[Port]) -> None:
+        self.ports = (*ports, FAULT)
+        self.input_references = self._references("input")
+        self.output_references = self._references("output")
+        self.fault_references = [len(ports)]
+        self.inputs = [0.0] * len(self.input_references)
+        self.outputs = [0.0] * len(self.output_references)
+        self.parameters: dict[str, Value] = {
+            port.name: port.start
+            for port in ports
+            if port.causality == "parameter" and port.start is not None
+        }
+        self.fault = False
+        self.refused: dict[str, str] = {}
+
+    def _references(self, causality: str) -> list[int]:
+        return [
+            reference
+            for reference, port in enumerate(self.ports)
+            if port.causality == causality and port.kind == "Real"
+        ]
+
+    def port(self, reference: int, kind: str) -> Port:
+        """The port of a type that has a value reference.
+
+        Raises:
+            Refusal: there is none.
+
+        """
+        if not 0 <= reference < len(self.ports) or self.ports[reference].kind != kind:
+            raise Refusal(f"no {kind} has the value reference {reference}")
+        return self.ports[reference]
+
+    def get(self, reference: int, kind: str) -> Value:
+        """The value of a port.
+
+        Raises:
+            Refusal: no port of this type has the reference.
+
+        """
+        port = self.port(reference, kind)
+        if port is FAULT:
+            return self.fault
+        if port.causality == "parameter":
+            return self.parameters[port.name]
+        if port.causality == "input":
+            return self.inputs[self.input_references.index(reference)]
+        return self.outputs[self.output_references.index(reference)]
+
+    def accept(self, port: Port, value: Value) -> None:
+        """Check a value, and remember a refused one until a good one has come.
+
+        Raises:
+            Refusal: the port cannot take it.
+
+        """
+        try:
+            port.checked(value)
+        except Refusal as refusal:
+            self.refused[port.name] = str(refusal)
+            raise
+        self.refused.pop(port.name, None)
+
+    def set_input(self, reference: int, value: float) -> None:
+        """Change one input."""
+        # The list may be the one that the host's call brought.
+        self.inputs = list(self.inputs)
+        self.inputs[self.input_references.index(reference)] = value
