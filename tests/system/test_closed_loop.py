@@ -18,7 +18,7 @@ from orchestrator.experiments.wiring import closed_loop as wired
 from orchestrator.master.table import Table
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from support.runs import run
+from support.runs import final_error, run
 
 STEPS = 5000
 UQR, XYZ = ("u", "q", "r"), ("x", "y", "z")
@@ -27,17 +27,17 @@ QUIET = {PortName("plant", "noise.std"): 0.0}
 
 @pytest.fixture(scope="module")
 def system(dist: Path) -> System:
-    return bundle.closed_loop(dist)
+    return wired(dist)
 
 
 @pytest.fixture(scope="module")
-def noisy(system: System) -> Result:
-    return simulate(system, 100.0, 0.02)
+def noisy(system: System) -> Table:
+    return run(system, 100.0, 0.02)
 
 
 @pytest.fixture(scope="module")
-def quiet(system: System) -> Result:
-    return simulate(system.with_parameters(QUIET), 100.0, 0.02)
+def quiet(system: System) -> Table:
+    return run(system.with_parameters(QUIET), 100.0, 0.02)
 
 
 def row(now: Instant, before: Instant) -> dict[str, float]:
@@ -79,7 +79,7 @@ def row(now: Instant, before: Instant) -> dict[str, float]:
     return values
 
 
-def test_loop_of_fmus_is_the_straight_line_bit_for_bit(noisy: Result):
+def test_loop_of_fmus_is_the_straight_line_bit_for_bit(noisy: Table):
     """Every port, 5,000 steps, with noise and disturbance on."""
     assert noisy.failure is None
     instants = list(closed_loop(STEPS))
@@ -94,7 +94,7 @@ def test_loop_of_fmus_is_the_straight_line_bit_for_bit(noisy: Result):
         assert not noisy[name].any()
 
 
-def test_fig4_without_noise_never_reaches_a_limit(quiet: Result):
+def test_fig4_without_noise_never_reaches_a_limit(quiet: Table):
     """ "The AUV successfully tracks the desired trajectory without the actuator saturation"."""
     commands = quiet.group(*(f"controller.tau.{k}" for k in UQR))
     assert np.abs(commands).max() < 80.0
@@ -102,11 +102,11 @@ def test_fig4_without_noise_never_reaches_a_limit(quiet: Result):
     assert np.array_equal(applied, commands)
 
 
-def test_fig4_without_noise_ends_within_10_cm_on_every_axis(quiet: Result):
+def test_fig4_without_noise_ends_within_10_cm_on_every_axis(quiet: Table):
     assert (final_error(quiet) < 0.1).all()
 
 
-def test_fig4_estimates_stay_within_the_bound_of_their_law(quiet: Result):
+def test_fig4_estimates_stay_within_the_bound_of_their_law(quiet: Table):
     """(22) cannot carry theta_hat beyond G |r| / sigma; ours stay below 25 in 100 s."""
     estimates = quiet.group(*(f"controller.theta_hat[{i}]" for i in range(1, 5)))
     assert np.isfinite(estimates).all()
@@ -129,21 +129,21 @@ def test_no_velocity_of_the_vehicle_reaches_the_controller(system: System):
     assert set(units.values()) == {"m", "rad"}
 
 
-def test_estimated_velocity_is_the_true_one_after_the_transient(quiet: Result):
+def test_estimated_velocity_is_the_true_one_after_the_transient(quiet: Table):
     """The observer lags by about 1 / k_d = 20 ms: 1 cm/s at the accelerations of the helix."""
     true = quiet.group(*(f"plant.dy.{k}" for k in XYZ))[1500:-1]
     estimated = quiet.group(*(f"controller.dy_hat.{k}" for k in XYZ))[1501:]
     assert np.abs(true - estimated).max() < 0.01
 
 
-def test_jacobi_changes_the_efforts_by_less_than_4_percent(system: System, noisy: Result):
-    delayed = simulate(system, 100.0, 0.02, "jacobi")
-    change = np.divide(effort(delayed)["l2_effort"], effort(noisy)["l2_effort"]) - 1.0
+def test_jacobi_changes_the_efforts_by_less_than_4_percent(system: System, noisy: Table):
+    delayed = run(system, 100.0, 0.02, "jacobi")
+    change = np.divide(indices(delayed)["l2_effort"], indices(noisy)["l2_effort"]) - 1.0
     assert np.abs(change).max() < 0.04
     assert np.abs(change).max() > 1e-6, "the order must make a difference"
 
 
-def test_true_control_point_is_the_measured_one_without_noise(quiet: Result, noisy: Result):
+def test_true_control_point_is_the_measured_one_without_noise(quiet: Table, noisy: Table):
     measured = quiet.group(*(f"plant.y.{k}" for k in XYZ))
     np.testing.assert_allclose(true_control_point(quiet), measured, atol=1e-12)
     error = quiet.group(*(f"controller.e.{k}" for k in XYZ))[1:]
@@ -153,11 +153,10 @@ def test_true_control_point_is_the_measured_one_without_noise(quiet: Result, noi
     assert abs(noise.mean()) < 5e-5
 
 
-def test_finer_steps_converge_to_the_same_motion(system: System, quiet: Result):
+def test_finer_steps_converge_to_the_same_motion(system: System, quiet: Table):
     """Halving the step halves the distance of a first-order scheme from its limit."""
     halves = [
-        simulate(system.with_parameters(QUIET), 20.0, 0.02 / 2**n)["plant.eta.x"][-1]
-        for n in range(4)
+        run(system.with_parameters(QUIET), 20.0, 0.02 / 2**n)["plant.eta.x"][-1] for n in range(4)
     ]
     differences = np.abs(np.diff(halves))
     assert quiet["plant.eta.x"][1000] == halves[0]
