@@ -66,7 +66,7 @@ class AuvPlant(Component):
         gauss = self._random.gauss
         n = gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)
         x, y, z = outputs[_Y]
-        outputs[_Y] = plant.measure((x, y, z), self._noise_std, n)
+        outputs[_Y] = plant.measure((x, y, z), n, self._noise_std)
 
     def hidden_state(self) -> Any:
         return self._random.getstate() if self._state is not None else None

@@ -74,7 +74,7 @@ def closed_loop(steps: int, setting: Setting = PAPER) -> Iterator[Instant]:
     planned = motion_planner.initial_state(setting.eta_d0)
     for k in range(steps + 1):
         seen = plant.outputs(state, gains.ell)
-        y = plant.measure(seen.y, std, (gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)))
+        y = plant.measure(seen.y, (gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)), std)
         moving = motion_planner.motion(vehicle, planned, tau_d)
         reference = motion_planner.reference(planned, moving, gains.ell)
         measurement = Measurement(y, seen.euler, *reference)

@@ -13,7 +13,7 @@ STEP = 0.02
 
 
 def advance(x: Vector3, dx: Vector3, h: float) -> Vector3:
-    """X + h dx: one step of a state whose rate is dx."""
+    """x + h dx: one step of a state whose rate is dx."""
     return x[0] + h * dx[0], x[1] + h * dx[1], x[2] + h * dx[2]
 
 

@@ -153,15 +153,15 @@ def estimated_error_sum(
 
 
 def control_force(
-    K1: Vector3, K2: Vector3, s_or: Vector3, s_ez: Vector3, s_z: Vector3, robust: Vector3
+    s_or: Vector3, s_ez: Vector3, s_z: Vector3, robust: Vector3, K1: Vector3, K2: Vector3
 ) -> Vector3:
     """F [N] at the control point, earth frame: the bracket of (21) and (48).
 
     Args:
-        K1, K2: diagonals of K_1 and K_2 [N].
         s_or: s(dy_o - dy_r).
         s_ez, s_z: s(e - z) and s(z).
-        robust: the last term of (21) [N].
+        robust: the last term, :func:`.robust_force` [N].
+        K1, K2: diagonals of K_1 and K_2 [N].
 
     """
     return (
@@ -194,9 +194,10 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement) -> 
     G = regressor(dy_r, ddy_r)  # below (20)
     rho_hat = bound(G, theta_hat)  # below (21)
     s_or, _ = s(difference(dy_o, dy_r))
-    F = control_force(K1, K2, s_or, s_ez, s_z, robust_force(rho_hat, r_hat_sum, eps_t))  # (21)
+    robust = robust_force(rho_hat, r_hat_sum, eps_t)  # (21), last term
+    F = control_force(s_or, s_ez, s_z, robust, K1, K2)  # (21), bracket
     rotation = rotation_from_euler(0.0 if printed_jacobian else phi, theta, psi)  # reading 3
-    tau = actuator_command(rotation, F, ell)  # (21)
+    tau = actuator_command(rotation, F, ell)  # (21): J^T F
     dtheta_hat = theta_hat_rate(G, norm(r_hat_sum), theta_hat, theta_0, gamma, sigma)  # (22)
     ddy_hat_o = observer.ddy_hat_o(ddy_r, s_z, lambda_, k_d)  # (51)
     return Signals(tau, dy_hat, e, z, ddy_hat_o, dtheta_hat)
