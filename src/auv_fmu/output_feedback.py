@@ -1,8 +1,8 @@
 """The proposed controller: saturated output feedback, equations (16) to (24) and (48) to (51).
 
-(16) to (24) are (48) to (51) with s = tanh, so the general form is written and the saturation
-function is a parameter. Matrices of gains are diagonal and s acts component by component:
-everything before the Jacobian is written for one axis of the control point.
+Theorem 2 restates (21) to (24) as (48) to (51) with a general saturation function s in place of
+Tanh, so the general form is written and s is a parameter. All matrices of gains are diagonal.
+:func:`evaluate` is the law, line by line in the order of computation.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class ControllerState(NamedTuple):
     """States of the observer and of the adaptive law."""
 
     y_hat: Vector3  #: estimated control point [m]
-    dy_hat_o: Vector3  #: velocity of (23) and (24) [m/s]
+    dy_hat_o: Vector3  #: velocity of (23) and (24) [m/s]; dy_o of (18) is another (reading 15)
     theta_hat: Vector4  #: estimated parameters [N, kg/s, kg/m, kg]
 
 
@@ -194,12 +194,12 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement) -> 
     G = regressor(dy_r, ddy_r)  # below (20)
     rho_hat = bound(G, theta_hat)  # below (21)
     s_or, _ = s(difference(dy_o, dy_r))
-    robust = robust_force(rho_hat, r_hat_sum, eps_t)  # (21), last term
-    F = control_force(s_or, s_ez, s_z, robust, K1, K2)  # (21), bracket
+    robust = robust_force(rho_hat, r_hat_sum, eps_t)  # last term of (21)
+    F = control_force(s_or, s_ez, s_z, robust, K1, K2)  # bracket of (21)
     rotation = rotation_from_euler(0.0 if printed_jacobian else phi, theta, psi)  # reading 3
-    tau = actuator_command(rotation, F, ell)  # (21): J^T F
+    tau = actuator_command(rotation, F, ell)  # (21), J^T F
     dtheta_hat = theta_hat_rate(G, norm(r_hat_sum), theta_hat, theta_0, gamma, sigma)  # (22)
-    ddy_hat_o = observer.ddy_hat_o(ddy_r, s_z, lambda_, k_d)  # (51)
+    ddy_hat_o = observer.ddy_hat_o(ddy_r, s_z, lambda_, k_d)  # (51), for (24): reading 4
     return Signals(tau, dy_hat, e, z, ddy_hat_o, dtheta_hat)
 
 

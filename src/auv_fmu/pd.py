@@ -87,9 +87,9 @@ def evaluate(gains: PdGains, theta_hat: Vector4, measurement: PdMeasurement) -> 
     r = filtered_error(dy, dy_d, e, lambda_)  # below (57)
     G = regressor(dy_d, ddy_d)  # below (57)
     rho_hat = bound(G, theta_hat)  # below (57)
-    F = control_force(r, robust_force(rho_hat, r, eps_t), K1)  # (57), bracket
+    F = control_force(r, robust_force(rho_hat, r, eps_t), K1)  # bracket of (57)
     rotation = rotation_from_euler(0.0 if printed_jacobian else phi, theta, psi)
-    tau = actuator_command(rotation, F, ell)  # (57): J^T F
+    tau = actuator_command(rotation, F, ell)  # (57), J^T F
     dtheta_hat = theta_hat_rate(G, norm(r), theta_hat, theta_0, gamma, sigma)  # (58)
     return PdSignals(tau, e, dtheta_hat)
 
