@@ -30,8 +30,8 @@ def quoted(cell: str) -> list[str]:
 @cache
 def names_in(module: str) -> set[str]:
     [path] = TESTS.rglob(f"{module}.py")
-    return {node.name for node in ast.parse(path.read_text()).body
-            if isinstance(node, ast.FunctionDef)}  # fmt: skip
+    tree = ast.parse(path.read_text())
+    return {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
 
 
 def test_every_equation_from_1_to_59_is_listed_once():
