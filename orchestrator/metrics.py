@@ -93,7 +93,7 @@ def effort(result: Result) -> dict[str, list[float]]:
 
 
 def true_control_point(result: Result) -> np.ndarray:
-    """Y without measurement noise: (9) on the plant's posture, (rows, 3) [m]."""
+    """y without measurement noise: (9) on the plant's posture, (rows, 3) [m]."""
     ell = result.parameters[PortName("plant", "ell")]
     posture = result.group(*POSTURE)
     return np.array(
@@ -105,7 +105,7 @@ def true_control_point(result: Result) -> np.ndarray:
 
 
 def tracking_error(result: Result) -> np.ndarray:
-    """E = y - y_d with the true control point, (rows, 3) [m]."""
+    """e = y - y_d with the true control point, (rows, 3) [m]."""
     error: np.ndarray = true_control_point(result) - result.group(
         *(f"planner.y_d.{k}" for k in AXES)
     )

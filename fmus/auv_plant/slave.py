@@ -68,7 +68,7 @@ class AuvPlant(Component[PlantState, Inputs, Outputs, Parameters]):
         gauss = self._random.gauss
         n = gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)
         x, y, z = values[_Y]
-        values[_Y] = plant.measure((x, y, z), self.parameters.noise.std, n)
+        values[_Y] = plant.measure((x, y, z), n, self.parameters.noise.std)
 
     def hidden_state(self) -> Any:
         return self._random.getstate() if self._state is not None else None
