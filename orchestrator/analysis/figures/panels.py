@@ -1,25 +1,27 @@
-"""Figures of runs, drawn from their tables of values."""
+"""Panels that several figures have: the path, tracking errors, commands with their limits."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, MaxNLocator
+from matplotlib.transforms import Transform
 
+from orchestrator.analysis.figures.layout import Cell, Panel
+from orchestrator.analysis.figures.signal import draw_signal, mean_window
+from orchestrator.analysis.figures.style import REFERENCE, Drawn, having, plain
 from orchestrator.analysis.signals import (
     ACTUATORS,
     AXES,
     COMMANDED,
-    ELL,
+    CONTROL_POINT,
     LIMITS,
-    NU,
-    POSTURE,
-    THETA_HAT,
+    LOWER_LIMITS,
+    TRACKING,
+    UPPER_LIMITS,
     Y_D,
     parameter,
     tracking_error,
@@ -27,294 +29,189 @@ from orchestrator.analysis.signals import (
 )
 from orchestrator.master.table import Table
 
-#: Okabe and Ito's colours, which stay apart for colour-blind eyes, darkest first; every line
-#: also has a style of its own, for print.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
-STYLES = ("-", "--", "-.", ":")
-_REFERENCE = "#555555"
+_ACTUATOR_UNITS = ("N", "N·m", "N·m")
 
-#: Width of lines that carry measurement noise or chatter.
-_NOISY = 0.6
+#: An axis of a path is at least this share of the longest: a straight line lies in a box.
+_FLATTEST = 0.3
 
-_ACTUATOR_LABELS = (r"$\tau_u$ [N]", r"$\tau_q$ [N·m]", r"$\tau_r$ [N·m]")
+#: Where limits of the actuators are in sight: when a command comes up to this share of them.
+_NEAR = 0.5
 
-SETTINGS: Any = {
-    "axes.grid": True,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlelocation": "left",
-    "axes.titlesize": "medium",
-    "figure.constrained_layout.use": True,
-    "figure.constrained_layout.w_pad": 0.15,
-    "font.size": 10,
-    "grid.alpha": 0.3,
-    "legend.edgecolor": "none",
-    "legend.framealpha": 0.9,
-    "lines.linewidth": 1.5,
-    "savefig.dpi": 150,
-    # Figures of the same run are the same file.
-    "svg.hashsalt": "auv-fmu",
-}
+#: Commands are cut off at this multiple of the limits, with a word.
+_BEYOND = 1.5
+
+#: Zero crossings reach far down in a logarithmic scale, and say nothing below this [m].
+_SMALLEST_ERROR = 1e-5
+
+#: The second of two runs: thin and solid, for dashes of a signal that swings are a smear.
+_THICK, _THIN = 1.4, 0.8
+
+#: Peaks from here on are written with an exponent [N, N.m].
+_MANY = 1e6
 
 
-class Drawn(NamedTuple):
-    """A run in a figure."""
-
-    label: str
-    result: Table
-
-
-def draw(kind: str, title: str, runs: Sequence[Drawn], folder: Path, stem: str) -> list[str]:
-    """Draw the figures of a scenario, as PNG and SVG, as far as the runs have what they show.
-
-    Args:
-        kind: key of :data:`FIGURES`.
-        title: heading.
-        runs: the run of the scenario, and those it is compared with.
-        folder: to write into.
-        stem: of the file names.
-
-    Returns:
-        What was left out, and why.
-
-    """
-    for run in runs:
-        if missing := missing_for(kind, run.result):
-            return [f"no figure: the run has no {missing[0]}"]
-    # A title is text, and no formula.
-    title = title.replace("$", r"\$")
-    with mpl.rc_context(SETTINGS):
-        for suffix, figure in FIGURES[kind](title, runs).items():
-            for ending in ("png", "svg"):
-                save(figure, folder / f"{stem}{suffix}.{ending}")
-    return []
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure without the time and the tool, so that the same run gives the same file."""
-    figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else {"Software": None})
-
-
-def missing_for(kind: str, result: Table) -> list[str]:
-    """Ports and parameters that a run lacks for a figure: a user's own system may have others."""
-    needed = [*POSTURE, *NU, *COMMANDED]
-    if not kind.startswith("open-loop"):
-        needed += [*Y_D, *THETA_HAT]
-    return result.missing(needed, [ELL, *LIMITS]) or ["step"] * (len(result) < 2)
-
-
-def _tracking(title: str, runs: Sequence[Drawn]) -> dict[str, Figure]:
-    """The four panels of Fig. 4, and the estimated velocity."""
-    result = runs[0].result
-    figure = Figure(figsize=(11, 8))
-    figure.suptitle(title)
-    path, errors, controls, estimates = (
-        figure.add_subplot(2, 2, 1, projection="3d"),
-        figure.add_subplot(2, 2, 2),
-        figure.add_subplot(2, 2, 3),
-        figure.add_subplot(2, 2, 4),
-    )
-    draw_path(path, [Drawn("control point $y$", result)])
-    draw_lines(errors, result.time, tracking_error(result), [f"$e_{k}$" for k in AXES])
-    errors.set(title="tracking errors", ylabel="error [m]")
-    _draw_controls(controls, result)
-    controls.set_title("commanded control signals")
-    theta_hat = result.group(*(f"controller.theta_hat[{i}]" for i in range(1, 5)))
-    units = ("N", "kg/s", "kg/m", "kg")
-    labels = [rf"$\hat{{\theta}}_{i}$ [{unit}]" for i, unit in enumerate(units, start=1)]
-    draw_lines(estimates, result.time, theta_hat, labels)
-    estimates.set(title="estimated parameters", ylabel="estimate, units in the legend")
-    figures = {"": figure}
-    if "controller.dy_hat.x" in result:
-        figures["-velocity"] = _velocity(title, result)
-    return figures
-
-
-def draw_path(axes: Any, runs: Sequence[Drawn]) -> None:
+def _path(cell: Cell, runs: Sequence[Drawn]) -> None:
     """Paths of control points and their reference in three dimensions, depth downwards."""
-    reference = runs[0].result
-    if "planner.y_d.x" in reference:
-        y_d = reference.group(*(f"planner.y_d.{k}" for k in AXES))
-        axes.plot(*y_d.T, color=_REFERENCE, linestyle="--", label="reference $y_d$")
-        axes.scatter(*y_d[0], color=_REFERENCE, marker="s", label="its start")
-    for run, colour, style in zip(runs, COLOURS, ("-", "-."), strict=False):
+    axes = cell.axes(projection="3d")
+    paths = []
+    for run, _ in list(having(runs, (Y_D, ())))[:1]:
+        paths.append(run.result.group(*Y_D))
+        axes.plot(*paths[0].T, color=REFERENCE, linestyle="--", linewidth=1, label="reference")
+        axes.scatter(*paths[0][0], color=REFERENCE, marker="s", s=20, label="its start")
+    shown = list(having(runs, CONTROL_POINT))
+    for i, (run, colour) in enumerate(shown):
         y = true_control_point(run.result)
-        axes.plot(*y.T, color=colour, linestyle=style, label=run.label)
-        axes.scatter(*y[0], color=colour, marker="o")
-    axes.set(xlabel="x north [m]", ylabel="y east [m]", zlabel="z down [m]")
-    axes.invert_zaxis()
-    axes.invert_yaxis()
-    for name in "xyz":
-        axes.locator_params(axis=name, nbins=5)
-    axes.legend(loc="lower left", bbox_to_anchor=(-0.15, 0.95), ncols=2, fontsize="small")
+        paths.append(y)
+        label = plain(run.label) if len(shown) > 1 else "control point"
+        axes.plot(*y.T, color=colour, linewidth=_THIN if i else _THICK, label=label)
+        # Rings around each other: vehicles that start together stay to be seen.
+        axes.scatter(
+            *y[0], marker="o", s=20 + 50 * i, edgecolors=colour,
+            facecolors="none" if i else colour, label=None if i else "start",
+        )  # fmt: skip
+    _frame_path(axes, np.vstack(paths))
+    title(axes, "path")
 
 
-def draw_lines(
-    axes: Axes,
-    time: np.ndarray,
-    values: np.ndarray,
-    labels: Sequence[str],
-    width: float | None = None,
+def _frame_path(axes: Any, points: np.ndarray) -> None:
+    lower, upper = np.min(points, axis=0), np.max(points, axis=0)
+    extent = np.maximum(upper - lower, _FLATTEST * max(float((upper - lower).max()), 1e-3))
+    middle = (lower + upper) / 2
+    low, high = (middle - 0.54 * extent).tolist(), (middle + 0.54 * extent).tolist()
+    axes.set(
+        xlim=(low[0], high[0]), ylim=(high[1], low[1]), zlim=(high[2], low[2]),
+        xlabel="x north [m]", ylabel="y east [m]", zlabel="z down [m]",
+    )  # fmt: skip
+    box = np.maximum(extent, 0.5 * extent.max())
+    # A tall box would reach into the panel below.
+    axes.set_box_aspect(box, zoom=min(0.95, 0.68 * float(np.linalg.norm(box) / box[2])))
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(4))
+    axes.tick_params(labelsize="small", pad=0)
+    for axis, pad in ((axes.xaxis, -2), (axes.yaxis, -2), (axes.zaxis, 4)):
+        axis.labelpad = pad
+
+
+def title(axes: Axes, text: str) -> None:
+    """A title above the axes, and below it what the lines are: nothing lies upon the data."""
+    n = len(axes.get_legend_handles_labels()[0])
+    if n < 2:
+        axes.set_title(text)
+        return
+    axes.legend(
+        title=text, alignment="left", ncols=n if n < 4 else -(-n // 2), loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+    )  # fmt: skip
+
+
+def over_time(panels: Sequence[Axes], runs: Sequence[Drawn], has_means: bool = False) -> None:
+    """One axis of time for some panels: all of the runs, named below the last."""
+    start = min(run.result.time[0] for run in runs)
+    end = max(run.result.time[-1] for run in runs)
+    for axes in panels:
+        axes.set_xlim(start, end)
+    means = f", lines: means over {mean_window(runs[0].result.time):.3g} s" if has_means else ""
+    panels[-1].set_xlabel(f"time [s]{means}")
+
+
+def draw_errors(
+    panels: Sequence[Axes],
+    runs: Sequence[Drawn],
+    name: str = "tracking errors",
+    logarithmic: bool = False,
 ) -> None:
-    """One line for each column of values, over time."""
-    for column, label, colour, style in zip(values.T, labels, COLOURS, STYLES, strict=False):
-        axes.plot(time, column, color=colour, linestyle=style, linewidth=width, label=label)
-    axes.set_xlabel("time [s]")
-    axes.margins(x=0)
-    axes.legend(ncols=len(labels), fontsize="small")
-
-
-def _limits(result: Table, k: str) -> tuple[float, float]:
-    lower, upper = (parameter(result, f"plant.{limit}.{k}") for limit in ("tau_min", "tau_max"))
-    return lower, upper
-
-
-def _draw_controls(axes: Axes, result: Table) -> None:
-    commands = result.group(*(f"plant.tau.{k}" for k in ACTUATORS))
-    # A row holds the command of the step that ends there: drawn from where it began.
-    draw_lines(axes, result.time[:-1], commands[1:], _ACTUATOR_LABELS, _NOISY)
-    limits = {limit for k in ACTUATORS for limit in _limits(result, k)}
-    for i, limit in enumerate(sorted(limits)):
-        axes.axhline(limit, color="black", linewidth=1, label=None if i else "limits of (3)")
-    axes.set_ylabel("force [N], moment [N·m]")
-    axes.margins(y=0.12)
-    axes.legend(ncols=4, fontsize="small", loc="lower right", bbox_to_anchor=(1, 0.08))
-
-
-def _velocity(title: str, result: Table) -> Figure:
-    """True and estimated velocity of the control point, and their difference."""
-    # The controller's row holds what it estimated at the beginning of the step.
-    time = result.time[:-1]
-    true = result.group(*(f"plant.dy.{k}" for k in AXES))[:-1]
-    estimated = result.group(*(f"controller.dy_hat.{k}" for k in AXES))[1:]
-    figure = Figure(figsize=(11, 8))
-    figure.suptitle(f"{title}\nVelocity of the control point, true and estimated")
-    panels = figure.subplots(4, 1, sharex=True)
-    for k, axes, truth, estimate in zip(AXES, panels, true.T, estimated.T, strict=False):
-        axes.plot(time, estimate, color=COLOURS[1], linewidth=_NOISY, label="estimated")
-        axes.plot(time, truth, color=COLOURS[0], linestyle="--", label="true, never measured")
-        axes.set_ylabel(rf"$\dot{{y}}_{k}$ [m/s]")
-        axes.margins(x=0)
-    panels[0].legend(ncols=2, fontsize="small")
-    draw_lines(panels[3], time, estimated - true, [f"${k}$" for k in AXES], _NOISY)
-    panels[3].set_ylabel("difference [m/s]")
-    return figure
-
-
-def _acceleration(result: Table, *members: str) -> np.ndarray:
-    """D nu/dt as the plant's Euler scheme has it: the difference over the step."""
-    nu = result.group(*(f"plant.nu.{k}" for k in members))
-    rate: np.ndarray = np.diff(nu, axis=0) / np.diff(result.time)[:, np.newaxis]
-    return rate
-
-
-def _open_loop_surge(title: str, runs: Sequence[Drawn]) -> dict[str, Figure]:
-    """The panels of Fig. 3(a)."""
-    result = runs[0].result
-    figure = Figure(figsize=(13, 4.5))
-    figure.suptitle(title)
-    path = figure.add_subplot(1, 3, 1, projection="3d")
-    draw_path(path, [Drawn("control point $y$", result)])
-    velocity, acceleration = figure.add_subplot(1, 3, 2), figure.add_subplot(1, 3, 3)
-    draw_lines(velocity, result.time, result.group("plant.nu.u"), ["$u$"])
-    velocity.set(title="surge velocity", ylabel="velocity [m/s]")
-    draw_lines(acceleration, result.time[:-1], _acceleration(result, "u"), [r"$\dot{u}$"])
-    acceleration.set(title="surge acceleration", ylabel="acceleration [m/s²]")
-    return {"": figure}
-
-
-def _open_loop_turn(title: str, runs: Sequence[Drawn]) -> dict[str, Figure]:
-    """The panels of Fig. 3(b)."""
-    result = runs[0].result
-    figure = Figure(figsize=(13, 8))
-    figure.suptitle(title)
-    path = figure.add_subplot(2, 3, 1, projection="3d")
-    draw_path(path, [Drawn("control point $y$", result)])
-    plan = figure.add_subplot(2, 3, 4)
-    y = true_control_point(result)
-    plan.plot(y[:, 1], y[:, 0], color=COLOURS[0])
-    plan.set(title="from above", xlabel="y east [m]", ylabel="x north [m]", aspect="equal")
-    for row, (members, unit) in enumerate((("uvw", "m/s"), ("pqr", "rad/s"))):
-        velocity, acceleration = (figure.add_subplot(2, 3, 3 * row + column) for column in (2, 3))
-        nu = result.group(*(f"plant.nu.{k}" for k in members))
-        draw_lines(velocity, result.time, nu, [f"${k}$" for k in members])
-        velocity.set(title="velocities", ylabel=f"velocity [{unit}]")
-        rates = _acceleration(result, *members)
-        labels = [rf"$\dot{{{k}}}$" for k in members]
-        draw_lines(acceleration, result.time[:-1], rates, labels)
-        acceleration.set(title="accelerations", ylabel=f"acceleration [{unit}²]")
-    return {"": figure}
-
-
-def draw_errors(linear: Sequence[Axes], logarithmic: Sequence[Axes], runs: Sequence[Drawn]) -> None:
-    """Tracking errors of some runs, an axis a panel, in linear and logarithmic scale."""
-    linear[0].set_title("tracking errors")
-    logarithmic[0].set_title("tracking errors, logarithmic")
-    for run, colour, style in zip(runs, COLOURS, STYLES, strict=False):
+    """Tracking errors of some runs, an axis a panel."""
+    for i, (run, colour) in enumerate(having(runs, TRACKING)):
         errors = tracking_error(run.result)
-        for k, a, b, error in zip(AXES, linear, logarithmic, errors.T, strict=True):
-            line: Any = {"color": colour, "linestyle": style, "label": run.label, "linewidth": 1.0}
-            a.plot(run.result.time, error, **line)
-            b.semilogy(run.result.time, np.abs(error), **line)
-            a.set_ylabel(f"$e_{k}$ [m]")
-            b.set_ylabel(f"$|e_{k}|$ [m]")
-            # Zero crossings reach far down and say nothing.
-            b.set_ylim(bottom=1e-5)
-    linear[0].legend(fontsize="small")
-    for axes in (*linear, *logarithmic):
-        axes.margins(x=0)
-    for axes in (linear[-1], logarithmic[-1]):
-        axes.set_xlabel("time [s]")
+        for axes, error in zip(panels, (np.abs(errors) if logarithmic else errors).T, strict=True):
+            axes.plot(run.result.time, error, **_line(i, run, colour))
+    for k, axes in zip(AXES, panels, strict=True):
+        axes.set_ylabel(f"$|e_{k}|$ [m]" if logarithmic else f"$e_{k}$ [m]")
+        if logarithmic:
+            axes.set_yscale("log")
+            axes.yaxis.set_major_locator(LogLocator(numticks=5))
+            if axes.get_ylim()[1] > _SMALLEST_ERROR:
+                axes.set_ylim(bottom=max(_SMALLEST_ERROR, axes.get_ylim()[0]))
+    title(panels[0], name)
+    over_time(panels, runs)
 
 
-def draw_commands(panels: Sequence[Axes], runs: Sequence[Drawn]) -> None:
-    """Commands of some runs, an actuator a panel; beyond the limits they are cut off."""
-    panels[0].set_title("commanded control signals")
-    for k, label, axes in zip(ACTUATORS, _ACTUATOR_LABELS, panels, strict=True):
-        lower, upper = _limits(runs[0].result, k)
-        # Drawn last to first, so that the run of the scenario lies on top.
-        for run, colour in reversed(list(zip(runs, COLOURS, strict=False))):
-            command = run.result[f"plant.tau.{k}"][1:]
-            axes.plot(
-                run.result.time[:-1], command, color=colour, linewidth=_NOISY, label=run.label
-            )
-        for limit in (lower, upper):
-            axes.axhline(limit, color="black", linewidth=1)
-        axes.set(ylabel=label, ylim=(1.5 * lower, 1.5 * upper))
-        axes.margins(x=0)
-    panels[0].legend(fontsize="small", ncols=2)
-    panels[-1].set_xlabel("time [s]")
+def _line(i: int, run: Drawn, colour: str) -> dict[str, Any]:
+    """Of the run a figure is about, and, thin upon it, of those it is compared with."""
+    return {"color": colour, "linewidth": _THIN if i else _THICK, "label": plain(run.label)}
 
 
-def _comparison(title: str, runs: Sequence[Drawn]) -> dict[str, Figure]:
-    """The panels of Fig. 5: paths, errors in both scales, control signals."""
-    figure = Figure(figsize=(17, 8))
-    figure.suptitle(title)
-    grid = figure.add_gridspec(3, 4, width_ratios=(1.3, 1, 1, 1))
-    path = figure.add_subplot(grid[:, 0], projection="3d")
-    draw_path(path, runs)
-    linear, logarithmic, controls = (
-        [figure.add_subplot(grid[row, column]) for row in range(3)] for column in (1, 2, 3)
+def draw_commands(
+    panels: Sequence[Axes], runs: Sequence[Drawn], name: str = "commanded control signals"
+) -> None:
+    """Commands of some runs and the limits of (3), an actuator a panel."""
+    shown = list(having(runs, (COMMANDED, ())))
+    limited = [run.result for run, _ in having(runs, ((), LIMITS))]
+    has_means = False
+    for k, axes, unit in zip(range(3), panels, _ACTUATOR_UNITS, strict=True):
+        for i, (run, colour) in enumerate(shown):
+            command = run.result.step_values(COMMANDED[k])[:, 0]
+            # A command is held until the next one, the last until the end of the run.
+            time = np.append(run.result.step_start, run.result.time[-1])
+            command = np.append(command, command[-1])
+            has_means |= draw_signal(axes, time, command, **_line(i, run, colour))
+        axes.set_ylabel(rf"$\tau_{ACTUATORS[k]}$ [{unit}]")
+        if limited:
+            _show_limits(axes, k, [run for run, _ in shown], limited[0], unit)
+    title(panels[0], name)
+    over_time(panels, runs, has_means)
+
+
+def _show_limits(axes: Axes, k: int, runs: Sequence[Drawn], limited: Table, unit: str) -> None:
+    """Limits of an actuator, and how far commands go that are cut off."""
+    lower, upper = parameter(limited, LOWER_LIMITS[k]), parameter(limited, UPPER_LIMITS[k])
+    words = (
+        f"limits ±{upper:g} {unit}" if lower == -upper else f"limits {lower:g}, {upper:g} {unit}"
     )
-    draw_errors(linear, logarithmic, runs)
-    draw_commands(controls, runs)
-    return {"": figure}
+    peaks = {run.label: _peak(run.result[COMMANDED[k]]) for run in runs}
+    if max(peaks.values()) < _NEAR * min(upper, -lower):
+        bottom, top = axes.get_ylim()
+        axes.set_ylim(bottom, top + 0.2 * (top - bottom))
+        _say(axes, f"{words}: far away", 0.98, axes.transAxes, "top")
+        return
+    for limit in (lower, upper):
+        axes.axhline(limit, color="black", linewidth=0.8)
+    bottom, _ = axes.get_ylim()
+    axes.set_ylim(max(min(bottom, 1.2 * lower), _BEYOND * lower), _BEYOND * upper)
+    for label, peak in peaks.items():
+        if peak > _BEYOND * max(upper, -lower):
+            who = f"peak of {plain(label)}" if len(runs) > 1 else "peak"
+            number = f"{peak:,.0f}" if peak < _MANY else f"{peak:.2g}"
+            words += f", {who} {number} {unit}"
+    _say(axes, words, upper, axes.get_yaxis_transform(), "bottom")
 
 
-def _comparison_errors(title: str, runs: Sequence[Drawn]) -> dict[str, Figure]:
-    """Fig. 6: errors in both scales; the paper leaves out the control signals."""
-    figure = Figure(figsize=(11, 8))
-    figure.suptitle(title)
-    panels = figure.subplots(3, 2, sharex=True)
-    draw_errors(panels[:, 0], panels[:, 1], runs)
-    return {"": figure}
+def _say(axes: Axes, words: str, y: float, transform: Transform, va: str) -> None:
+    """A word at the right of a panel, legible upon lines."""
+    axes.annotate(
+        words, (1, y), xycoords=transform, xytext=(0, 2 if va == "bottom" else 0),
+        textcoords="offset points", ha="right", va=va, fontsize="small",
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
+    )  # fmt: skip
 
 
-#: Figures by the name that scenarios select them with.
-FIGURES: dict[str, Callable[[str, Sequence[Drawn]], dict[str, Figure]]] = {
-    "tracking": _tracking,
-    "open-loop-surge": _open_loop_surge,
-    "open-loop-turn": _open_loop_turn,
-    "comparison": _comparison,
-    "comparison-errors": _comparison_errors,
-}
+def _peak(values: np.ndarray) -> float:
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+
+
+def _errors(cell: Cell, runs: Sequence[Drawn]) -> None:
+    draw_errors(cell.stack(3), runs)
+
+
+def _logarithmic_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
+    draw_errors(cell.stack(3), runs, "tracking errors, logarithmic", logarithmic=True)
+
+
+def _commands(cell: Cell, runs: Sequence[Drawn]) -> None:
+    draw_commands(cell.stack(3), runs)
+
+
+PATH = Panel("path", CONTROL_POINT, _path, 3.4)
+ERRORS = Panel("tracking errors", TRACKING, _errors, 4.0)
+LOGARITHMIC_ERRORS = Panel("logarithmic tracking errors", TRACKING, _logarithmic_errors, 4.0)
+COMMANDS = Panel("commands", (COMMANDED, ()), _commands, 4.0)
