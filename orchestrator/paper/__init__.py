@@ -1,1 +1,18 @@
-"""The paper's section 4: printed numbers, claims, effects, report."""
+"""The paper's section 4: printed numbers, claims, effects, report.
+
+======================  ==============================================================
+module                  what it holds
+======================  ==============================================================
+:mod:`.published`       what the paper prints
+:mod:`.readings`        the points where it is silent or contradicts itself, in short
+:mod:`.formatting`      numbers, tables and pictures in Markdown
+:mod:`.workers`         processes on the cores that end when the user says so
+:mod:`.runs`            a scenario with changes
+:mod:`.outcomes`        what is kept of runs, each made once
+:mod:`.claims`          each claim of the paper, judged by the runs named beside it
+:mod:`.effects`         what runs show when they are compared
+:mod:`.sections`        a section for each scenario
+:mod:`.page`            Markdown as one HTML page
+:mod:`.report`          all of it put together
+======================  ==============================================================
+"""
