@@ -24,7 +24,9 @@ def actuator_values(values: Sequence[float], times: str = "") -> str:
 
 def plain(text: str) -> str:
     """A text of one line in which Markdown sees no mark."""
-    return re.sub(r"([\\`*_{}\[\]<>#|&])", r"\\\1", " ".join(text.split()))
+    # An underscore within a name is none.
+    marks = r"[\\`*{}\[\]<>#|&]|(?<!\w)_|_(?!\w)"
+    return re.sub(marks, r"\\\g<0>", " ".join(text.split()))
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -77,7 +77,8 @@ READINGS: dict[int, tuple[str, str]] = {
     ),
 }
 
-_MENTION = re.compile(r"\b[Rr]eadings? \d+(?:(?:, | to | and )\d+)*")
+#: Mentions outside headings.
+_MENTION = re.compile(r"(?<!# )\b[Rr]eadings? \d+(?:(?:, | to | and )\d+)*")
 
 
 def linked(text: str) -> str:
@@ -93,6 +94,6 @@ def linked(text: str) -> str:
 def section() -> str:
     """The readings in Markdown, a heading each."""
     return "\n\n".join(
-        f"### Reading {number}\n\n**{heading}** {decision}"
+        f"#### Reading {number}\n\n**{heading}** {decision}"
         for number, (heading, decision) in READINGS.items()
     )
