@@ -39,7 +39,7 @@ SHARP = Run("fig5", {"controller.eps_t": 1.0})
 TURNING = Run("fig3b", {"plant.tau.u": 80.0, "plant.tau.q": 0.0, "plant.tau.r": 80.0})
 
 #: A signal that is squared and integrated.
-_SQUARED = "·s^½"
+_SQUARED = "·√s"
 
 
 class Finding(NamedTuple):

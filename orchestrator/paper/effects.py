@@ -182,7 +182,7 @@ def noise(*runs: Outcome) -> Shown:
 @effect("effect-saturation", "tanh against algebraic saturation", QUIET, _ALGEBRAIC)
 def saturation(tanh: Outcome, algebraic: Outcome) -> Shown:
     """Theorem 2 with another saturation function."""
-    efforts = [actuator_values(run.metrics["l2_effort"], "·s^½") for run in (tanh, algebraic)]
+    efforts = [actuator_values(run.metrics["l2_effort"], "·√s") for run in (tanh, algebraic)]
     errors = [numbers(run.metrics["final_error"]) for run in (tanh, algebraic)]
     return Shown(
         f"Fig. 4 without noise. L2 effort {' against '.join(efforts)}; "

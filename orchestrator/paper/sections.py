@@ -21,7 +21,7 @@ _NOISE = "plant.noise.std"
 
 #: Rows of the table of indices: keys of metrics.json, what they are, and how they are written.
 _INDICES: Sequence[tuple[str, str, Callable[[Sequence[float]], str]]] = (
-    ("l2_effort", "L2 effort (u; q, r)", lambda values: actuator_values(values, "·s^½")),
+    ("l2_effort", "L2 effort (u; q, r)", lambda values: actuator_values(values, "·√s")),
     ("rms_effort", "RMS effort (59) (u; q, r)", actuator_values),
     ("peak_command", "peak command (u; q, r)", actuator_values),
     ("saturated_fraction", "share of saturated steps (u, q, r)", numbers),

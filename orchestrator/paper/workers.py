@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from itertools import islice
 from multiprocessing import active_children, get_context
 from typing import Any, TypeVar
 
 from tqdm import tqdm
 
+from orchestrator.errors import InputError
 from orchestrator.master.interrupts import Interrupts, held_interrupts
 
 #: How long the loop waits before it asks whether it shall stop [s].
@@ -21,11 +25,11 @@ _Key = TypeVar("_Key", bound=Hashable)
 
 
 class Workers:
-    """A pool of processes, as :func:`workers` gives it."""
+    """Some processes, as :func:`workers` gives them."""
 
-    def __init__(self, pool: ProcessPoolExecutor, interrupts: Interrupts) -> None:
-        """Use a pool."""
-        self._pool, self._interrupts = pool, interrupts
+    def __init__(self, pool: ProcessPoolExecutor, n: int, interrupts: Interrupts) -> None:
+        """Use a pool of n processes."""
+        self._pool, self._n, self._interrupts = pool, n, interrupts
 
     def results(
         self, tasks: Mapping[_Key, Callable[[], Any]], unit: str
@@ -33,19 +37,35 @@ class Workers:
         """Keys and results of tasks, which are begun in their order, as they are done.
 
         Raises:
+            InputError: a process has died.
             KeyboardInterrupt: there was a signal to stop.
 
         """
-        with _blocked_interrupt():
-            keys = {self._pool.submit(task): key for key, task in tasks.items()}
-        waiting: set[Future[Any]] = set(keys)
-        with tqdm(total=len(keys), unit=unit, disable=None) as bar:
-            while waiting:
-                done, waiting = wait(waiting, _PATIENCE, FIRST_COMPLETED)
+        left = iter(tasks.items())
+        keys: dict[Future[Any], _Key] = {}
+        with tqdm(total=len(tasks), unit=unit, disable=None) as bar:
+            while True:
+                # No more than can be begun: what a process has been given it cannot give back.
+                with _without_interrupt():
+                    for key, task in islice(left, self._n - len(keys)):
+                        keys[self._pool.submit(task)] = key
+                if not keys:
+                    return
+                done, _ = wait(keys, _PATIENCE, FIRST_COMPLETED)
                 if self._interrupts:
                     raise KeyboardInterrupt
-                bar.update(len(done))
-                yield from ((keys[future], future.result()) for future in done)
+                for future in done:
+                    bar.update()
+                    yield keys.pop(future), _result(future, unit)
+
+
+def _result(future: Future[Any], unit: str) -> Any:
+    try:
+        return future.result()
+    except BrokenProcessPool as error:
+        raise InputError(
+            f"a process has died while it made a {unit}: an FMU has crashed, or memory was short"
+        ) from error
 
 
 @contextmanager
@@ -55,21 +75,21 @@ def workers() -> Iterator[Workers]:
     FMUs are libraries that a process loads, so the processes are fresh ones, not copies of this.
     """
     others = set(active_children())
+    n = os.cpu_count() or 1
     with held_interrupts() as interrupts:
-        pool = ProcessPoolExecutor(mp_context=get_context("spawn"), initializer=_begin)
+        pool = ProcessPoolExecutor(n, get_context("spawn"), _begin)
         try:
-            yield Workers(pool, interrupts)
+            yield Workers(pool, n, interrupts)
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
             for process in set(active_children()) - others:
                 process.terminate()
             raise
         finally:
-            pool.shutdown()
+            pool.shutdown(cancel_futures=True)
 
 
 @contextmanager
-def _blocked_interrupt() -> Iterator[None]:
+def _without_interrupt() -> Iterator[None]:
     """Processes that are started here never see Ctrl-C, which is for this one to answer."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
@@ -83,4 +103,10 @@ def _blocked_interrupt() -> Iterator[None]:
 
 def _begin() -> None:
     """In a new process: leave by SIGTERM as by any other exit, without temporary folders."""
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+    signal.signal(signal.SIGTERM, _leave)
+
+
+def _leave(*_: Any) -> None:
+    # Once: the way out is not to be cut short.
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    sys.exit()
