@@ -15,7 +15,6 @@ from orchestrator.analysis import gains
 from orchestrator.experiments.bundle import current_fmus
 from orchestrator.experiments.folder import replaced
 from orchestrator.experiments.record import PACKAGES, write_files
-from orchestrator.experiments.scenario import names
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.paper import readings
 from orchestrator.paper.claims import CLAIMS
@@ -50,16 +49,16 @@ millimetres, up to a centimetre, for the same reason."""
 
 def write_report(
     folder: Path,
+    scenarios: Sequence[str],
     command: Sequence[str],
-    further: Sequence[str] = (),
     stop_time: float | None = None,
 ) -> tuple[Path, Path]:
     """Run what was not run before, and write `report.html`, `report.md` and their figures.
 
     Args:
         folder: to write into.
+        scenarios: that have a section: names, or paths of files.
         command: for the record.
-        further: scenario files beside the scenarios of the bundle.
         stop_time: of all runs [s]; None: their own. For a look at the report, not at the paper.
 
     Returns:
@@ -71,7 +70,7 @@ def write_report(
 
     """
     started = datetime.now(UTC)
-    chapters = sections([*names(), *further])
+    chapters = sections(scenarios)
     current_fmus()
     outcomes = Outcomes(folder / _RUNS, stop_time)
     with replaced(folder) as unfinished:

@@ -9,7 +9,22 @@ from pkgutil import iter_modules
 import pytest
 
 #: Packages with a table in which each module or subpackage has a line :mod:`.name`.
-PACKAGES = ("auv_fmu", "auv_fmu.proof")
+PACKAGES = (
+    "auv_fmu",
+    "auv_fmu.proof",
+    "fmus.ports",
+    "fmus.slave",
+    "fmus.packaging",
+    "orchestrator",
+    "orchestrator.system",
+    "orchestrator.system.ssp",
+    "orchestrator.master",
+    "orchestrator.analysis",
+    "orchestrator.experiments",
+    "orchestrator.exchange",
+    "orchestrator.paper",
+    "orchestrator.commands",
+)
 
 
 @pytest.mark.parametrize("name", PACKAGES)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi2 import FMU2Slave
 
 from auv_fmu.closed_loop import Instant, closed_loop
 from orchestrator.analysis.metrics import indices
@@ -18,6 +17,7 @@ from orchestrator.experiments.wiring import closed_loop as wired
 from orchestrator.master.table import Table
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+from support.instances import unpacked
 from support.runs import final_error, run
 
 STEPS = 5000
@@ -176,52 +176,40 @@ def simple_jacobi_host(
     system: System, initial_exchange: bool, innovation_gate: float = 1.0
 ) -> np.ndarray:
     """Position of the vehicle after 100 s in a host that knows no more than it must."""
-    with TemporaryDirectory(prefix="auvfmu") as folder:
-        fmus = {}
-        for name, component in system.components.items():
-            unpacked = Path(folder, name)
-            fmpy.extract(component.fmu, unzipdir=unpacked)
-            fmus[name] = FMU2Slave(
-                instanceName=name,
-                guid=component.description.guid,
-                modelIdentifier=component.description.coSimulation.modelIdentifier,
-                unzipDirectory=str(unpacked),
-            )
-            fmus[name].instantiate()
-        gate = system.components["controller"].variables["innovation_gate"].valueReference
-        fmus["controller"].setReal([gate], [innovation_gate])
+    wires: dict[tuple[str, str], tuple[list[int], list[int]]] = {}
+    for connection in system.connections:
+        source, target = connection.source, connection.target
+        outs, ins = wires.setdefault((source.component, target.component), ([], []))
+        outs.append(system.components[source.component].variables[source.port].valueReference)
+        ins.append(system.components[target.component].variables[target.port].valueReference)
 
-        wires: dict[tuple[str, str], tuple[list[int], list[int]]] = {}
-        for connection in system.connections:
-            source, target = connection.source, connection.target
-            outs, ins = wires.setdefault((source.component, target.component), ([], []))
-            outs.append(system.components[source.component].variables[source.port].valueReference)
-            ins.append(system.components[target.component].variables[target.port].valueReference)
+    with TemporaryDirectory(prefix="auvfmu") as folder, ExitStack() as stack:
+        instances = {
+            name: stack.enter_context(unpacked(component.fmu, Path(folder, name), name))
+            for name, component in system.components.items()
+        }
 
         def read() -> list[list[float]]:
-            return [fmus[source].getReal(outs) for (source, _), (outs, _) in wires.items()]
+            return [
+                instances[source].read("Real", outs) for (source, _), (outs, _) in wires.items()
+            ]
 
         def write(values: list[list[float]]) -> None:
             for ((_, target), (_, ins)), numbers in zip(wires.items(), values, strict=True):
-                fmus[target].setReal(ins, numbers)
+                instances[target].write("Real", ins, numbers)
 
-        for fmu in fmus.values():
-            fmu.setupExperiment(startTime=0.0)
-            fmu.enterInitializationMode()
+        instances["controller"].set(innovation_gate=innovation_gate)
+        for instance in instances.values():
+            instance.fmu.setupExperiment(startTime=0.0)
+            instance.fmu.enterInitializationMode()
         for _ in range(3 if initial_exchange else 0):
             write(read())
-        for fmu in fmus.values():
-            fmu.exitInitializationMode()
-        values = [[0.0] * len(outs) for outs, _ in wires.values()]
-        if initial_exchange:
-            values = read()
-        for k in range(STEPS):
+        for instance in instances.values():
+            instance.fmu.exitInitializationMode()
+        values = read() if initial_exchange else [[0.0] * len(outs) for outs, _ in wires.values()]
+        for _ in range(STEPS):
             write(values)
-            for fmu in fmus.values():
-                fmu.doStep(k * 0.02, 0.02)
+            for instance in instances.values():
+                instance.step()
             values = read()
-        position = [system.components["plant"].variables[f"eta.{k}"].valueReference for k in XYZ]
-        final = np.array(fmus["plant"].getReal(position))
-        for fmu in fmus.values():
-            fmu.freeInstance()
-        return final
+        return np.array([instances["plant"].get(f"eta.{k}") for k in XYZ])
