@@ -9,6 +9,7 @@ module                  what it holds
 :mod:`.workers`         processes on the cores that end when the user says so
 :mod:`.runs`            a scenario with changes
 :mod:`.outcomes`        what is kept of runs, each made once
+:mod:`.measures`        numbers of a run that claims speak of
 :mod:`.claims`          each claim of the paper, judged by the runs named beside it
 :mod:`.effects`         what runs show when they are compared
 :mod:`.sections`        a section for each scenario

@@ -17,9 +17,13 @@ from auv_fmu.output_feedback import Gains
 from auv_fmu.proof.gain_conditions import bounds, conditions
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from auv_fmu.vehicle import Vehicle
-from orchestrator.analysis.signals import APPLIED, THETA_HAT, tracking_error
-from orchestrator.master.table import Table
 from orchestrator.paper.formatting import actuator_values, numbers
+from orchestrator.paper.measures import (
+    largest_error_after,
+    largest_estimate,
+    total_variation_until,
+    turning_radius,
+)
 from orchestrator.paper.outcomes import Outcome
 from orchestrator.paper.published import (
     EFFORT_PD,
@@ -354,25 +358,3 @@ def gains_meet_the_condition() -> Finding:
         f"{condition.left:g}, needed: above {condition.right:g}",
         f"{said(condition.margin > 0.0)}: {condition.verdict} (reading 10); `auv-fmu gains`",
     )
-
-
-def turning_radius(table: Table) -> float:
-    """Radius of the level circle that the centre of mass ends on [m]."""
-    u, v, r = (table[f"plant.nu.{k}"][-1] for k in "uvr")
-    return float(np.hypot(u, v) / abs(r))
-
-
-def total_variation_until(table: Table, stop_time: float) -> float:
-    """Sum of |difference| of the three applied signals up to a time."""
-    applied = table.group(*APPLIED)[table.time <= stop_time]
-    return float(np.abs(np.diff(applied[1:], axis=0)).sum())
-
-
-def largest_error_after(table: Table, start: float) -> float:
-    """Largest tracking error of any axis after a time [m]; zero for a shorter run."""
-    return float(np.abs(tracking_error(table)[table.time > start]).max(initial=0.0))
-
-
-def largest_estimate(table: Table) -> float:
-    """Largest component of theta_hat in a run."""
-    return float(table.group(*THETA_HAT).max())
