@@ -25,7 +25,7 @@ def actuator_values(values: Sequence[float], times: str = "") -> str:
 def plain(text: str) -> str:
     """A text of one line in which Markdown sees no mark."""
     # An underscore within a name is none.
-    marks = r"[\\`*{}\[\]<>#|&]|(?<!\w)_|_(?!\w)"
+    marks = r"[\\`*{}\[\]<>#|&]|(?<![^\W_])_|_(?![^\W_])"
     return re.sub(marks, r"\\\g<0>", " ".join(text.split()))
 
 

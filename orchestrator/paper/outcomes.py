@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
+import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
@@ -12,6 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -95,7 +97,7 @@ class Outcomes:
             try:
                 prepared = shortened.prepared()
             except InputError as error:
-                self._keys[run] = key = run.label
+                self._keys[run] = self._labels[run.label] = key = run.label
                 self._outcomes[key] = Outcome({"failure": str(error)}, Table())
                 continue
             self._keys[run] = key = key_of(prepared)
@@ -192,7 +194,8 @@ def _read(file: Path) -> Outcome | None:
             Experiment(**text["experiment"]),
             {port_name(name): value for name, value in text["parameters"].items()},
         )
-    except (OSError, ValueError, KeyError):
+    except (OSError, ValueError, KeyError, BadZipFile, zlib.error):
+        # Not there, or not whole.
         return None
     ending = Ending(messages=tuple(text["messages"]))
     return Outcome(text["metrics"], Table.of(header, rows, ending))
