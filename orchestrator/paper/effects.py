@@ -18,9 +18,10 @@ from orchestrator.analysis.figures import (
     STYLES,
     Drawn,
     draw_commands,
-    draw_errors,
+    overlay,
     save,
 )
+from orchestrator.analysis.figures.style import WIDTH
 from orchestrator.analysis.signals import ACTUATORS, limits
 from orchestrator.paper.claims import FIVE, FIVE_PD, QUIET, SEVEN
 from orchestrator.paper.formatting import actuator_values, numbers, picture, plain
@@ -106,7 +107,7 @@ def disturbance(*sevens: Outcome) -> Shown:
     return Shown(
         "Errors and commands of (a), (b) and (c) in the same scale. The largest e_f grows as "
         f"{numbers(errors)} m; the largest command is {numbers(peaks)} N, at the start.",
-        _compared(runs),
+        overlay("", runs),
     )
 
 
@@ -120,7 +121,7 @@ def jacobian(full: Outcome, printed: Outcome) -> Shown:
         f"{numbers(full.metrics['final_error'])} m (reading 3). The vehicle tumbles on its way "
         "with (11) as printed; the large errors on the way drive theta_hat up, and with it the "
         "accuracy at the end, as a smaller eps_t would.",
-        _compared([Drawn("full attitude", full.table), Drawn("(11) as printed", printed.table)]),
+        overlay("", [Drawn("full attitude", full.table), Drawn("(11) as printed", printed.table)]),
     )
 
 
@@ -128,8 +129,8 @@ def jacobian(full: Outcome, printed: Outcome) -> Shown:
 def order(full: Outcome, jacobi: Outcome, pd: Outcome, jacobi_pd: Outcome) -> Shown:
     """What a delay of one step does to the two controllers."""
     variation = [sum(run.metrics["total_variation"]) for run in (full, jacobi, pd, jacobi_pd)]
-    figure = Figure(figsize=(13, 8))
-    panels = figure.subplots(3, 2)
+    figure = Figure(figsize=(WIDTH, 4.5))
+    panels = figure.subplots(3, 2, sharex=True)
     for column, (title, runs) in enumerate(
         (
             ("proposed controller, Fig. 5", (full, jacobi)),
@@ -138,8 +139,7 @@ def order(full: Outcome, jacobi: Outcome, pd: Outcome, jacobi_pd: Outcome) -> Sh
     ):
         labels = ("Gauss-Seidel", "Jacobi")
         drawn = [Drawn(label, run.table) for label, run in zip(labels, runs, strict=True)]
-        draw_commands(panels[:, column], drawn)
-        panels[0, column].set_title(title)
+        draw_commands(panels[:, column], drawn, title)
     return Shown(
         "A Jacobi master adds a delay of 20 ms to the loop (reading 5). Total variation of the "
         f"three signals of Fig. 5 (N, N·m): proposed {variation[0]:.4g} in Gauss-Seidel order and "
@@ -152,7 +152,7 @@ def order(full: Outcome, jacobi: Outcome, pd: Outcome, jacobi_pd: Outcome) -> Sh
 def noise(*runs: Outcome) -> Shown:
     """Why the level of the noise, which is not given, matters."""
     one_mm, one_cm = (runs[NOISE_LEVELS.index(level)].metrics for level in (1e-3, 1e-2))
-    figure = Figure(figsize=(11, 4.5))
+    figure = Figure(figsize=(WIDTH, 3.2))
     effort, peak = figure.subplots(1, 2)
     # A logarithmic axis that begins at zero: the first level is none at all.
     levels = np.array(NOISE_LEVELS) * 1e3
@@ -169,7 +169,7 @@ def noise(*runs: Outcome) -> Shown:
     peak.set_ylabel("peak command [N, N·m]")
     _, upper = limits(runs[0].table)
     peak.axhline(upper[0], color="black", linewidth=1, label="limit of (3)")
-    peak.legend(fontsize="small")
+    peak.legend()
     return Shown(
         "The observer multiplies the noise by k_d = 50 (reading 7). White noise of 1 mm leaves "
         f"the peaks of Fig. 4 at {actuator_values(one_mm['peak_command'])}; 1 cm drives them to "
@@ -187,7 +187,7 @@ def saturation(tanh: Outcome, algebraic: Outcome) -> Shown:
     return Shown(
         f"Fig. 4 without noise. L2 effort {' against '.join(efforts)}; "
         f"e_f {errors[0]} m against {errors[1]} m.",
-        _compared([Drawn("tanh", tanh.table), Drawn("algebraic", algebraic.table)]),
+        overlay("", [Drawn("tanh", tanh.table), Drawn("algebraic", algebraic.table)]),
     )
 
 
@@ -195,7 +195,7 @@ def saturation(tanh: Outcome, algebraic: Outcome) -> Shown:
 def certificates_along_a_run(quiet: Outcome) -> Shown:
     """What the proof speaks of, along Fig. 4."""
     column = dict(zip(COLUMNS, certificates(quiet.table).T, strict=True))
-    figure = Figure(figsize=(11, 8))
+    figure = Figure(figsize=(WIDTH, 5.5))
     panels = figure.subplots(3, 1, sharex=True)
     panels[0].semilogy(column["time"], column["V_without_theta"], color=COLOURS[0])
     panels[0].set_ylabel("V of (34) [J],\nwithout its term in θ")
@@ -203,7 +203,7 @@ def certificates_along_a_run(quiet: Outcome) -> Shown:
         norm = np.linalg.norm([column[f"{name}.{k}"] for k in "xyz"], axis=0)
         panels[1].semilogy(column["time"], norm, linestyle=style, color=colour, label=f"|{name}|")
     panels[1].set_ylabel("composite errors\n(17), (19) [m/s]")
-    panels[1].legend(fontsize="small")
+    panels[1].legend()
     for k, colour, style in zip(ACTUATORS, COLOURS, STYLES, strict=False):
         margin = column[f"saturation_margin.{k}"]
         panels[2].plot(column["time"], margin, color=colour, linestyle=style, label=rf"$\tau_{k}$")
@@ -220,12 +220,3 @@ def certificates_along_a_run(quiet: Outcome) -> Shown:
         "`certificates.csv`.",
         figure,
     )
-
-
-def _compared(runs: Sequence[Drawn]) -> Figure:
-    """Errors and commands of some runs over each other."""
-    figure = Figure(figsize=(13, 8))
-    panels = figure.subplots(3, 3)
-    draw_errors(panels[:, 0], panels[:, 1], runs)
-    draw_commands(panels[:, 2], runs)
-    return figure
