@@ -208,7 +208,7 @@ def certificates_along_a_run(quiet: Outcome) -> Shown:
         margin = column[f"saturation_margin.{k}"]
         panels[2].plot(column["time"], margin, color=colour, linestyle=style, label=rf"$\tau_{k}$")
     panels[2].set(ylabel="distance from the\nnearer limit [N, N·m]", xlabel="time [s]")
-    panels[2].legend(fontsize="small", ncols=3)
+    panels[2].legend(ncols=3)
     for axes in panels:
         axes.margins(x=0)
     return Shown(
