@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
 
 from orchestrator.analysis.certificates import COLUMNS, certificates
 from orchestrator.analysis.figures import (
@@ -130,7 +131,7 @@ def order(full: Outcome, jacobi: Outcome, pd: Outcome, jacobi_pd: Outcome) -> Sh
     """What a delay of one step does to the two controllers."""
     variation = [sum(run.metrics["total_variation"]) for run in (full, jacobi, pd, jacobi_pd)]
     figure = Figure(figsize=(WIDTH, 4.5))
-    panels = figure.subplots(3, 2, sharex=True)
+    panels = figure.subplots(3, 2, sharex=True, width_ratios=(2, 3))
     for column, (title, runs) in enumerate(
         (
             ("proposed controller, Fig. 5", (full, jacobi)),
@@ -161,12 +162,18 @@ def noise(*runs: Outcome) -> Shown:
             line: Any = {"color": colour, "linestyle": style, "marker": "o"}
             values = [run.metrics[key][i] for run in runs]
             axes.plot(levels, values, label=rf"$\tau_{k}$", **line)
-    for axes in (effort, peak):
-        axes.set_xlabel("standard deviation of the position [mm]")
+    for axes, title, unit in (
+        (effort, "L2 norm of the applied signals", "N·√s, N·m·√s"),
+        (peak, "peak commands", "N, N·m"),
+    ):
+        axes.set_title(title)
+        axes.set(xlabel="standard deviation of the position [mm]", ylabel=f"[{unit}]")
         axes.set_xscale("symlog", linthresh=0.1)
+        axes.set_xticks(levels, [f"{level:g}" for level in levels])
         axes.set_yscale("log")
-    effort.set_ylabel("L2 norm of the applied signal [N·s$^{1/2}$, N·m·s$^{1/2}$]")
-    peak.set_ylabel("peak command [N, N·m]")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_locator(NullLocator())
     _, upper = limits(runs[0].table)
     peak.axhline(upper[0], color="black", linewidth=1, label="limit of (3)")
     peak.legend()

@@ -131,9 +131,9 @@ def written(
     """
     scenario, own = section.scenario, outcomes[next(iter(section.runs.values()))]
     yield f"### {section.title}"
-    for file in sorted(Path(folder, "figures", section.name).glob("*.png")):
+    for file in sorted(Path(folder, "figures", section.name).glob("*.png"), key=_stem):
         yield picture(section.title, file.relative_to(folder).as_posix())
-    yield from (plain(note[0].upper() + note[1:]) + "." for note in notes)
+    yield from (f"Note: {plain(note)}." for note in notes)
     if scenario.remark:
         yield scenario.remark
     made = {label: outcomes[run] for label, run in section.runs.items()}
@@ -154,6 +154,11 @@ def written(
     if scenario.ours:
         yield "Ours, not the paper's:"
         yield "\n".join(_ours(scenario))
+
+
+def _stem(file: Path) -> str:
+    """What figures are put in order by: `fig4` comes before `fig4-velocity`."""
+    return file.stem
 
 
 def _indices(metrics: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
