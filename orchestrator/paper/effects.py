@@ -131,7 +131,7 @@ def order(full: Outcome, jacobi: Outcome, pd: Outcome, jacobi_pd: Outcome) -> Sh
     """What a delay of one step does to the two controllers."""
     variation = [sum(run.metrics["total_variation"]) for run in (full, jacobi, pd, jacobi_pd)]
     figure = Figure(figsize=(WIDTH, 4.5))
-    panels = figure.subplots(3, 2, sharex=True, width_ratios=(2, 3))
+    panels = figure.subplots(3, 2, sharex=True, width_ratios=(1, 2))
     for column, (title, runs) in enumerate(
         (
             ("proposed controller, Fig. 5", (full, jacobi)),
