@@ -80,12 +80,13 @@ def _runs(reference: str, scenario: Scenario) -> dict[str, Run]:
     run = Run(reference)
     try:
         system = run.prepared().system
-        if scenario.compare:
-            [companion] = run.companions()
-            return {scenario.legend: run, read_scenario(scenario.compare).legend: companion}
     except InputError:
         # Whoever makes the run says why it cannot be made.
         return {scenario.legend: run}
+    if scenario.compare:
+        [companion] = run.companions()
+        label = read_scenario(scenario.compare).legend
+        return {scenario.legend: run, label + " (2)" * (label == scenario.legend): companion}
     noise = port_name(_NOISE)
     if scenario.figure == "tracking" and system.has(noise) and system.value(noise):
         quiet = replace(run, parameters={_NOISE: 0.0})
