@@ -70,8 +70,8 @@ def write_report(
 
     """
     started = datetime.now(UTC)
-    chapters = sections(scenarios)
     current_fmus()
+    chapters = sections(scenarios)
     outcomes = Outcomes(folder / _RUNS, stop_time)
     with replaced(folder) as unfinished:
         with workers() as crew:

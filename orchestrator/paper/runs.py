@@ -16,7 +16,7 @@ from orchestrator.experiments.experiment import (
 )
 from orchestrator.master.experiment import ORDERS
 from orchestrator.system.names import port_name
-from orchestrator.system.values import literal
+from orchestrator.system.values import Value, literal
 
 
 @dataclass(frozen=True)
@@ -41,13 +41,12 @@ class Run:
     def label(self) -> str:
         """What a user types behind `auv-fmu run`."""
         options = [
-            *(("--stop-time", f"{self.stop_time:g}") if self.stop_time is not None else ()),
-            *(("--step", f"{self.step:g}") if self.step is not None else ()),
+            *(("--stop-time", _text(self.stop_time)) if self.stop_time is not None else ()),
+            *(("--step", _text(self.step)) if self.step is not None else ()),
             *(("--order", self.order) if self.order != ORDERS[0] else ()),
         ]
         for name, value in self.parameters.items():
-            text = f"{value:g}" if isinstance(value, float) else literal(value)
-            options += ["--set", f"{name}={text}"]
+            options += ["--set", f"{name}={_text(value)}"]
         return shlex.join((self.scenario, *options))
 
     @property
@@ -77,6 +76,11 @@ class Run:
             _as_run(prepared.scenario.compare, companion)
             for companion in with_companion(prepared, self.request)[1:]
         ]
+
+
+def _text(value: Value) -> str:
+    """A value that is read back as the same, and no longer than it must be."""
+    return literal(value).removesuffix(".0") if isinstance(value, float) else literal(value)
 
 
 def _as_run(scenario: str, prepared: Prepared) -> Run:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -132,7 +133,9 @@ def written(
     """
     scenario, own = section.scenario, outcomes[next(iter(section.runs.values()))]
     yield f"### {section.title}"
-    for file in sorted(Path(folder, "figures", section.name).glob("*.png"), key=_stem):
+    # By their stems: `fig4` comes before `fig4-velocity`.
+    files = Path(folder, "figures", section.name).glob("*.png")
+    for file in sorted(files, key=attrgetter("stem")):
         yield picture(section.title, file.relative_to(folder).as_posix())
     yield from (f"Note: {plain(note)}." for note in notes)
     if scenario.remark:
@@ -157,11 +160,6 @@ def written(
         yield "\n".join(_ours(scenario))
 
 
-def _stem(file: Path) -> str:
-    """What figures are put in order by: `fig4` comes before `fig4-velocity`."""
-    return file.stem
-
-
 def _indices(metrics: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
     for key, name, write in _INDICES:
         if any(key in values for values in metrics):
@@ -172,6 +170,7 @@ def _ours(scenario: Scenario) -> Iterator[str]:
     """The values that are not the paper's, and why."""
     values = {str(name): value for name, value in scenario.parameters.items()}
     for name, why in scenario.ours.items():
-        value = values.get(name, getattr(scenario, name, None))
-        stated = name if value is None else f"{name} = {json.dumps(value)}"
+        value = values.get(name, vars(scenario).get(name))
+        is_short = value is not None and not isinstance(value, Mapping)
+        stated = f"{name} = {json.dumps(value, default=str)}" if is_short else name
         yield f"- `{stated}`: {plain(why)}"

@@ -36,6 +36,8 @@ QUIET = Run("fig4", {"plant.noise.std": 0.0})
         (QUIET, "fig4 --set plant.noise.std=0"),
         (Run("fig5", {"controller.printed_jacobian": True}),
          "fig5 --set controller.printed_jacobian=true"),
+        (Run("fig4", {"plant.noise.std": 1.23456789e-05}),
+         "fig4 --set plant.noise.std=1.23456789e-05"),
         (Run("my file.toml", order="jacobi", stop_time=2.5, step=0.01),
          "'my file.toml' --stop-time 2.5 --step 0.01 --order jacobi"),
     ],

@@ -83,6 +83,14 @@ def test_a_section_has_its_numbers_with_units_and_its_command(tmp_path):
     assert "- `controller.eps_t = 1.0`: as in Fig. 4; the paper names none" in text
 
 
+def test_what_is_ours_may_be_anything(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('[wires]\n"a.b" = "c.d"\n[ours]\nwires = "w"\nlegend = "l"\nx.y = "z"\n')
+    [section] = sections([str(file)])
+    text = "\n\n".join(written(section, Known({"failure": "no"}), [], tmp_path))
+    assert text.endswith("- `wires`: w\n- `legend`: l\n- `x.y`: z")
+
+
 def test_a_failure_is_said(tmp_path):
     [section] = sections(["fig3a"])
     text = "\n\n".join(written(section, Known({"failure": "the <sea> is dry"}), [], tmp_path))
