@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.commands import paper
+from orchestrator.commands.main import main
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
 from orchestrator.paper.report import write_report
@@ -104,3 +106,21 @@ def test_runs_are_kept_for_the_next_report(folder):
     # Fig. 4 with 1 mm of noise is Fig. 4 itself; Fig. 3(a) and the stranger are further runs.
     assert len(list((folder / "runs").glob("*.npz"))) == len(runs) + 2
     assert not list(folder.glob(".unfinished*"))
+
+
+def test_files_on_the_command_line_come_after_the_scenarios(tmp_path, monkeypatch, capsys):
+    asked = []
+    monkeypatch.setattr(
+        paper, "write_report", lambda *arguments: asked.append(arguments) or (Path("a"), Path("b"))
+    )
+    assert main(["report", "mine.toml", "--out", str(tmp_path)]) == 0
+    [(folder, scenarios, command)] = asked
+    assert (folder, scenarios[-2:]) == (tmp_path, ["fig7c", "mine.toml"])
+    assert command == ["auv-fmu", "report", "mine.toml", "--out", str(tmp_path)]
+    assert capsys.readouterr().out == "a\nb\n"
+
+
+def test_a_file_that_is_not_there_is_said_in_a_line(tmp_path, capsys):
+    assert main(["report", str(tmp_path / "gone.toml"), "--out", str(tmp_path / "out")]) == 2
+    assert "gone.toml" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
