@@ -107,7 +107,7 @@ def disturbance(*sevens: Outcome) -> Shown:
     peaks = [max(run.metrics["peak_command"]) for run in sevens]
     return Shown(
         "Errors and commands of (a), (b) and (c) in the same scale. The largest e_f grows as "
-        f"{numbers(errors)} m; the largest command is {numbers(peaks)} N, at the start.",
+        f"{numbers(errors)} m; the largest command is {numbers(peaks)} N, soon after the start.",
         overlay("", runs),
     )
 
