@@ -7,6 +7,7 @@ module              commands
 :mod:`.options`     options that several commands have
 :mod:`.build`       build, list, gains
 :mod:`.run`         run, animate
+:mod:`.new`         new: a controller of one's own
 :mod:`.exchange`    export, hosts, verify
 :mod:`.upkeep`      reference, docs: files of this repository
 :mod:`.paper`       report

@@ -85,7 +85,10 @@ def _wire(components: Mapping[str, Component], target: str, source: str) -> list
         if variable.name.startswith(f"{group}.")
     ]
     if not inputs:
-        raise InputError(f"wire {source} -> {target}: {to} has no inputs {group}.*")
+        raise InputError(
+            f"wire {source} -> {target}: {to} has no inputs {group}.*; a scenario removes a wire "
+            f'with "{target}" = false under [wires]'
+        )
     return [
         Connection(PortName(start, source_group + name.removeprefix(group)), PortName(to, name))
         for name in inputs
