@@ -31,7 +31,7 @@ _SCRIPT = """\
 from fmus.slave.loading import settle
 from {module} import {component}
 
-settle(globals())
+settle({component}, globals(), locals())
 """
 
 #: What a folder of built FMUs was built from.

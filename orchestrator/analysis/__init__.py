@@ -10,6 +10,7 @@ module                  what it holds
 :mod:`.gains`           the conditions of Theorems 1 and 2 for a set of parameters
 :mod:`.visible`         of a long run, the rows that can be seen
 :mod:`.figures`         the paper's figures
+:mod:`.plot`            any signals of any results over time
 :mod:`.animation`       a film of a run
 ======================  ==============================================================
 """

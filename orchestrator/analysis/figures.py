@@ -202,7 +202,7 @@ def _velocity(title: str, result: Table) -> Figure:
 
 
 def _acceleration(result: Table, *members: str) -> np.ndarray:
-    """D nu/dt as the plant's Euler scheme has it: the difference over the step."""
+    """dnu/dt as the plant's Euler scheme has it: the difference over the step."""
     nu = result.group(*(f"plant.nu.{k}" for k in members))
     rate: np.ndarray = np.diff(nu, axis=0) / np.diff(result.time)[:, np.newaxis]
     return rate

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import copy
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from fmpy.fmi2 import (
     fmi2Warning,
 )
 from fmpy.logging import addLoggerProxy
-from fmpy.model_description import ModelVariable
+from fmpy.model_description import ModelDescription, ModelVariable
 
 from orchestrator.errors import InputError, reason
 from orchestrator.system.component import Component
@@ -114,7 +115,9 @@ def running(component: Component, log: Log) -> Iterator[Instance]:
         InputError: the FMU cannot be loaded.
 
     """
-    fmu = _loaded(component, unpacked(component.fmu))
+    # The functions of the library serve all instances; what differs is theirs alone.
+    fmu = copy(_library(component.fmu, component.description, unpacked(component.fmu)))
+    fmu.instanceName = component.name
     try:
         fmu.instantiate(callbacks=log.callbacks, loggingOn=True)
     except Exception as error:
@@ -126,19 +129,24 @@ def running(component: Component, log: Log) -> Iterator[Instance]:
         fmu.fmi2FreeInstance(fmu.component)
 
 
-def _loaded(component: Component, folder: Path) -> FMU2Slave:
-    if "%" in folder.as_uri().replace("%20", ""):
-        # PythonFMU 0.7 does not decode the URI and crashes its host.
-        raise InputError(
-            f"temporary folder {str(folder)!r}: FMUs need a path of plain ASCII characters; "
-            "set TMPDIR to one"
-        )
-    try:
-        return FMU2Slave(
-            instanceName=component.name,
-            guid=component.description.guid,
-            modelIdentifier=component.description.coSimulation.modelIdentifier,
-            unzipDirectory=str(folder),
-        )
-    except Exception as error:
-        raise InputError(f"{component.fmu}: cannot be loaded: {reason(error)}") from error
+_libraries: dict[Path, FMU2Slave] = {}
+
+
+def _library(fmu: Path, description: ModelDescription, folder: Path) -> FMU2Slave:
+    """The library of an unpacked FMU, loaded once a process."""
+    if folder not in _libraries:
+        if "%" in folder.as_uri().replace("%20", ""):
+            # PythonFMU 0.7 does not decode the URI and crashes its host.
+            raise InputError(
+                f"temporary folder {str(folder)!r}: FMUs need a path of plain ASCII characters; "
+                "set TMPDIR to one"
+            )
+        try:
+            _libraries[folder] = FMU2Slave(
+                guid=description.guid,
+                modelIdentifier=description.coSimulation.modelIdentifier,
+                unzipDirectory=str(folder),
+            )
+        except Exception as error:
+            raise InputError(f"{fmu}: cannot be loaded: {reason(error)}") from error
+    return _libraries[folder]

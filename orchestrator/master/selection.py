@@ -83,7 +83,7 @@ class Selection:
 
 
 def matching(names: Sequence[str], patterns: Sequence[str]) -> list[str]:
-    """The names that match one of some patterns such as `plant.y.*`, in their own order.
+    """The names that match one of some patterns such as `a.b.*`, in their own order.
 
     Raises:
         InputError: a pattern matches none.
@@ -97,6 +97,6 @@ def matching(names: Sequence[str], patterns: Sequence[str]) -> list[str]:
 
 def matches(name: str, pattern: str) -> bool:
     """Whether a name is the pattern, belongs to the group it names, or fits its wildcards."""
-    # Brackets belong to names such as theta_hat[1], and are no sets of letters here.
+    # Brackets belong to names of arrays, and are no sets of letters here.
     escaped = pattern.replace("[", "[[]")
     return name == pattern or name.startswith(f"{pattern}.") or fnmatchcase(name, escaped)
