@@ -8,6 +8,7 @@ module                  what it holds
 :mod:`.certificates`    Lyapunov function, composite errors and margins along a run
 :mod:`.sensors`         which velocities reach a controller
 :mod:`.gains`           the conditions of Theorems 1 and 2 for a set of parameters
+:mod:`.cautions`        gains that the step cannot follow
 :mod:`.visible`         of a long run, the rows that can be seen
 :mod:`.figures`         the paper's figures
 :mod:`.plot`            any signals of any results over time

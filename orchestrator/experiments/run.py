@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from orchestrator.analysis.cautions import cautions, cautions_after
 from orchestrator.analysis.certificates import CertificatesFile
 from orchestrator.analysis.figures import Drawn, draw
 from orchestrator.analysis.metrics import Metrics
@@ -83,9 +84,13 @@ def run_into(
     ):
         done: list[tuple[Path, Prepared, Finished, VisibleRows]] = []
         for prepared, columns in zip(runs, tables, strict=True):
+            for caution in cautions(prepared.system, prepared.experiment):
+                say(f"warning: {prepared.scenario.name}: {caution}")
             target = unfinished / prepared.scenario.name if done else unfinished
             target.mkdir(exist_ok=True)
             done.append((target, prepared, *_run(target, prepared, files, columns)))
+            for caution in cautions_after(done[-1][-1]):
+                say(f"warning: {prepared.scenario.name}: {caution}")
             if interrupts:
                 break
         if files.figures and not interrupts.urgent:

@@ -209,7 +209,7 @@ def step(state: ControllerState, signals: Signals, h: float) -> ControllerState:
     Args:
         state: at the beginning of the step.
         signals: evaluated there.
-        h: step [s]; stable only while k_d h stays below 2, without ringing below 1.
+        h: step [s]; :func:`auv_fmu.proof.sampling.observer_rate` tells which k_d it can follow.
 
     """
     y_hat, dy_hat_o, theta_hat = state
