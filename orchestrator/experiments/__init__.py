@@ -4,6 +4,7 @@
 module                    what it holds
 ========================  ============================================================
 :mod:`.scenario`          scenario files
+:mod:`.scenario_page`     their reference page
 :mod:`.wiring`            which FMUs there are, and which ports feed which
 :mod:`.bundle`            the FMUs and auv.ssp, built when missing or stale
 :mod:`.bill_of_materials` checksums and packages of the bundle
