@@ -46,7 +46,7 @@ class Prepared:
 
 
 def load(name: str | Path) -> System:
-    """The system of a scenario, or of an SSP.
+    """The system of a scenario, or of an SSP, with its experiment.
 
     Args:
         name: of a scenario of the bundle, or path of a .toml or .ssp file.
@@ -55,7 +55,13 @@ def load(name: str | Path) -> System:
         InputError: there is no such scenario, or its system cannot be put together.
 
     """
-    return loaded(str(name))[1]
+    scenario, system = loaded(str(name))
+    return replace(
+        system,
+        name=scenario.name,
+        stop_time=_first_given(scenario.stop_time, system.stop_time),
+        step=_first_given(scenario.step, system.step),
+    )
 
 
 def loaded(name: str) -> tuple[Scenario, System]:
