@@ -65,7 +65,7 @@ class Selection:
 
     def take(self, rows: np.ndarray) -> None:
         """Hand on what is kept."""
-        if len(self._places) < rows.shape[1]:
+        if self._columns is not None:
             rows = rows[:, self._places]
         if self._every is None:
             self._observer.take(rows)

@@ -12,6 +12,9 @@ import pytest
 PACKAGES = (
     "auv_fmu",
     "auv_fmu.proof",
+    "fmus.ports",
+    "fmus.slave",
+    "fmus.packaging",
     "orchestrator",
     "orchestrator.system",
     "orchestrator.system.ssp",

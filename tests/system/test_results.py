@@ -153,3 +153,20 @@ def test_simulate_again_and_again_in_one_process_in_flat_memory():
     for _ in range(300):
         simulate("fig4", stop_time=0.1)
     assert resident() - before < 3e6
+
+
+def test_gains_that_the_step_cannot_follow_are_told(capsys: pytest.CaptureFixture[str]):
+    """h p = 0.02 s * 501 1/s is far beyond 2; with steps of 2 ms it is 1."""
+    fast = ["run", "fig4", "--no-figures", "--set", "controller.k_d=500", "--stop-time", "0.1"]
+    assert main(fast) == 0
+    assert "warning: fig4: controller.k_d = 500 1/s is unstable" in capsys.readouterr().err
+    assert main([*fast, "--step", "0.002"]) == 0
+    assert "warning" not in capsys.readouterr().err
+
+
+def test_chatter_of_the_robust_term_is_told(capsys: pytest.CaptureFixture[str]):
+    quiet = ["run", "fig4", "--no-figures", "--stop-time", "60", "--set", "plant.noise.std=0"]
+    assert main(quiet) == 0
+    assert "warning" not in capsys.readouterr().err
+    assert main([*quiet, "--set", "controller.eps_t=0.01"]) == 0
+    assert "warning: fig4: the robust term chatters" in capsys.readouterr().err
