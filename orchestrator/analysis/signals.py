@@ -64,6 +64,27 @@ TRACKING = ((*POSTURE, *Y_D), (ELL,))
 CONTROLLER = "controller"
 
 
+#: Units of the members of groups, by the group's name at whichever component.
+_UNITS = {
+    **dict.fromkeys(("y", "y_d", "y_hat", "e", "z"), dict.fromkeys(AXES, "m")),
+    **dict.fromkeys(("dy", "dy_d", "dy_hat"), dict.fromkeys(AXES, "m/s")),
+    "ddy_d": dict.fromkeys(AXES, "m/s²"),
+    **dict.fromkeys(("eta", "eta_d"), dict.fromkeys(AXES, "m") | dict.fromkeys(EULER, "rad")),
+    "nu": dict.fromkeys(DIRECTIONS[:3], "m/s") | dict.fromkeys(DIRECTIONS[3:], "rad/s"),
+    **dict.fromkeys(
+        ("tau", "tau_applied", "tau_w"),
+        dict.fromkeys(DIRECTIONS[:3], "N") | dict.fromkeys(DIRECTIONS[3:], "N·m"),
+    ),
+}
+
+
+def unit_of(column: str) -> str:
+    """The unit of a signal of the loop; empty for others."""
+    _, _, port = column.partition(".")
+    group, _, member = port.rpartition(".")
+    return _UNITS.get(group, {}).get(member, "")
+
+
 def parameter(table: Table, name: str) -> float:
     """The value of a Real parameter `component.name` in a run."""
     component, port = name.split(".", 1)

@@ -6,7 +6,8 @@ module              commands
 :mod:`.main`        the parser and the exit status
 :mod:`.options`     options that several commands have
 :mod:`.build`       build, list, gains
-:mod:`.run`         run, animate
+:mod:`.run`         run
+:mod:`.look`        plot, view, animate
 :mod:`.new`         new: a controller of one's own
 :mod:`.exchange`    export, hosts, verify
 :mod:`.upkeep`      reference, docs: files of this repository

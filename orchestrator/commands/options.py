@@ -8,7 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from orchestrator.errors import InputError
+from orchestrator.experiments.experiment import Request
 from orchestrator.master.experiment import ORDERS
+from orchestrator.master.observer import Ending
 from orchestrator.system.names import PortName, port_name
 
 #: Exit status: done, a simulation failed, bad usage or input, ended by the user.
@@ -71,6 +73,21 @@ def add_out(parser: argparse.ArgumentParser, default: Path | None, otherwise: st
         metavar="DIR",
         help=f"folder to write into; default: {default or otherwise}",
     )
+
+
+def request(options: argparse.Namespace) -> Request:
+    """What the user asks for beyond the scenario."""
+    return Request(options.stop_time, options.step, options.order, assignments(options))
+
+
+def status(name: str, ending: Ending) -> int:
+    """Exit status of a run, after saying what went wrong in it."""
+    for message in ending.messages:
+        say(message)
+    if ending.failure is None:
+        return OK
+    say(f"{name} {ending.failure}")
+    return FAILED
 
 
 def assignments(options: argparse.Namespace) -> dict[PortName, object]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from orchestrator.analysis.figures import check_figure
 from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import current_fmus
 from orchestrator.experiments.scenario import Scenario, read_scenario
@@ -77,6 +78,7 @@ def loaded(name: str) -> tuple[Scenario, System]:
     if name.endswith(".ssp"):
         return Scenario(Path(name).stem, title=Path(name).name), read_ssp(Path(name))
     scenario = read_scenario(name)
+    check_figure(scenario.figure)
     return scenario, closed_loop(current_fmus(), scenario)
 
 

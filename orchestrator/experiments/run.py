@@ -98,7 +98,14 @@ def run_into(
         if files.figures and not interrupts.urgent:
             scenario = runs[0].scenario
             drawn = [Drawn(run.scenario.legend, seen) for _, run, _, seen in done]
-            for note in draw(scenario.figure, scenario.title, drawn, unfinished, scenario.name):
+            for note in draw(
+                scenario.figure,
+                scenario.title,
+                drawn,
+                unfinished,
+                scenario.name,
+                stop=lambda: interrupts.urgent,
+            ):
                 say(note)
         # The record of the first names the files of all, so it comes last.
         for target, prepared, finished, seen in reversed(done):

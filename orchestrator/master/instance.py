@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from functools import partial
@@ -11,13 +11,18 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
     FMU2Slave,
+    fmi2Boolean,
     fmi2CallbackAllocateMemoryTYPE,
     fmi2CallbackFreeMemoryTYPE,
     fmi2CallbackFunctions,
     fmi2CallbackLoggerTYPE,
+    fmi2Component,
     fmi2Discard,
+    fmi2Real,
+    fmi2Status,
     fmi2Warning,
 )
 from fmpy.logging import addLoggerProxy
@@ -75,7 +80,22 @@ class Instance:
         self._variables = component.variables
         self.set_inputs: list[Callable[[], Any]] = []
         self.get_outputs: list[Callable[[], Any]] = []
-        self.do_step = partial(fmu.fmi2DoStep, fmu.component)
+        self.do_step = self.function("DoStep", (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean))
+
+    def function(self, name: str, types: Sequence[Any] | None = None) -> Callable[..., Any]:
+        """One of the FMU's functions, for calls of every step.
+
+        fmpy's own methods look the function up and convert its arguments in every call, which
+        costs as much as the call.
+
+        Args:
+            name: of the function, without fmi2.
+            types: of its arguments; None: they come as values of ctypes.
+
+        """
+        called = self.fmu.dll[f"fmi2{name}"]
+        called.argtypes, called.restype, called.errcheck = types, fmi2Status, _refuse_failures
+        return partial(called, fmi2Component(self.fmu.component))
 
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
@@ -105,6 +125,12 @@ class Instance:
 
 def _fmi_type(variable: ModelVariable) -> str:
     return "Integer" if variable.type == "Enumeration" else str(variable.type)
+
+
+def _refuse_failures(status: int, called: Any, _: Any) -> int:
+    if status > fmi2Warning:
+        raise FMICallException(function=called.__name__, status=status)
+    return status
 
 
 @contextmanager

@@ -99,4 +99,5 @@ def matches(name: str, pattern: str) -> bool:
     """Whether a name is the pattern, belongs to the group it names, or fits its wildcards."""
     # Brackets belong to names of arrays, and are no sets of letters here.
     escaped = pattern.replace("[", "[[]")
-    return name == pattern or name.startswith(f"{pattern}.") or fnmatchcase(name, escaped)
+    is_member = name.startswith((f"{pattern}.", f"{pattern}["))
+    return name == pattern or is_member or fnmatchcase(name, escaped)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from orchestrator.analysis.figures import (
     STYLES,
     Drawn,
     draw_commands,
-    draw_errors,
+    overlay,
     save,
 )
 from orchestrator.analysis.signals import ACTUATORS
@@ -41,14 +41,14 @@ def draw_effects(
     limit = float(results["fig4-quiet"].parameters[PortName("plant", "tau_max.u")])
     with mpl.rc_context(SETTINGS):
         for name, figure in (
-            ("effect-jacobian", _pair(
+            ("effect-jacobian", overlay(
                 "The Jacobian with the full attitude, and (11) as printed (reading 3)",
                 [Drawn("full attitude", results["fig5"]),
                  Drawn("(11) as printed", results["fig5-printed"])],
             )),
             ("effect-order", _orders(results)),
             ("effect-noise", _noise(metrics, limit)),
-            ("effect-saturation", _pair(
+            ("effect-saturation", overlay(
                 "tanh and algebraic saturation, Fig. 4 without noise",
                 [Drawn("tanh", results["fig4-quiet"]),
                  Drawn("algebraic", results["fig4-algebraic"])],
@@ -56,15 +56,6 @@ def draw_effects(
             ("certificates", _certificates(runs / "fig4-quiet" / "certificates.csv")),
         ):  # fmt: skip
             save(figure, folder / f"{name}.png")
-
-
-def _pair(title: str, runs: Sequence[Drawn]) -> Figure:
-    figure = Figure(figsize=(13, 8))
-    figure.suptitle(title)
-    panels = figure.subplots(3, 3)
-    draw_errors(panels[:, 0], panels[:, 1], runs)
-    draw_commands(panels[:, 2], runs)
-    return figure
 
 
 def _orders(results: Mapping[str, Table]) -> Figure:
@@ -81,8 +72,7 @@ def _orders(results: Mapping[str, Table]) -> Figure:
             Drawn(label, results[name])
             for label, name in zip(("Gauss-Seidel", "Jacobi"), runs, strict=True)
         ]
-        draw_commands(panels[:, column], labelled)
-        panels[0, column].set_title(title)
+        draw_commands(panels[:, column], labelled, title)
     return figure
 
 

@@ -1,0 +1,74 @@
+"""Figures by the names that scenarios select them with, drawn into files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from orchestrator.analysis.figures.comparison import COMPARISON, COMPARISON_ERRORS, OVERLAY
+from orchestrator.analysis.figures.layout import Rows, compose
+from orchestrator.analysis.figures.open_loop import SURGE, TURN
+from orchestrator.analysis.figures.style import Drawn, save
+from orchestrator.analysis.figures.tracking import TRACKING
+from orchestrator.errors import InputError, did_you_mean
+
+#: Rows of panels by what the names of their files end with, for each name.
+FIGURES: Mapping[str, Mapping[str, Rows]] = {
+    "tracking": TRACKING,
+    "comparison": COMPARISON,
+    "comparison-errors": COMPARISON_ERRORS,
+    "overlay": OVERLAY,
+    "open-loop-surge": SURGE,
+    "open-loop-turn": TURN,
+}
+
+_FORMATS = ("png", "svg")
+
+
+def check_figure(kind: str) -> None:
+    """Check before a run that its figure is known.
+
+    Raises:
+        InputError: it is not.
+
+    """
+    if kind not in FIGURES:
+        hint = did_you_mean(kind, FIGURES) or f"; there are {', '.join(FIGURES)}"
+        raise InputError(f"no figure {kind!r}{hint}")
+
+
+def draw(
+    kind: str,
+    title: str,
+    runs: Sequence[Drawn],
+    folder: Path,
+    stem: str,
+    stop: Callable[[], bool] = lambda: False,
+) -> list[str]:
+    """Draw the figures of a scenario, as PNG and SVG, as far as the runs have what they show.
+
+    Args:
+        kind: key of :data:`FIGURES`.
+        title: heading; empty where there is one beside the figure.
+        runs: the run of the scenario, and those it is compared with.
+        folder: to write into.
+        stem: of the file names.
+        stop: asked before each figure whether to leave it out.
+
+    Returns:
+        What was left out, and why.
+
+    """
+    notes: list[str] = []
+    for suffix, rows in FIGURES[kind].items():
+        if stop():
+            break
+        figure, left_out = compose(title, rows, runs)
+        if figure is not None:
+            save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in _FORMATS))
+            notes += left_out
+        elif not suffix:
+            return [f"no figure: the run has no {left_out[0]}"]
+        else:
+            notes.append(f"{stem}{suffix} left out: no {left_out[0]}")
+    return notes

@@ -1,0 +1,121 @@
+"""`auv-fmu plot`, `view` and `animate`: looking at runs."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from orchestrator.analysis.animation import FRAMES_PER_SECOND, animate, check_film
+from orchestrator.analysis.figures import save
+from orchestrator.analysis.plot import plot, wanted
+from orchestrator.analysis.signals import CONTROL_POINT
+from orchestrator.analysis.view import page
+from orchestrator.analysis.visible import VisibleRows
+from orchestrator.commands.options import OK, add_experiment, add_set, add_system, request, status
+from orchestrator.errors import InputError, reason
+from orchestrator.experiments.experiment import loaded, prepare
+from orchestrator.experiments.stored import read_record, read_result, table_in
+from orchestrator.master.progress import Progress
+from orchestrator.master.simulation import simulate
+
+#: What a plot can be written as.
+_PLOTS = (".png", ".svg", ".pdf")
+
+
+def add_to(commands: Any) -> None:
+    """Add these commands to the parser."""
+    signals = commands.add_parser("plot", help="draw any signals of stored results")
+    signals.add_argument(
+        "what",
+        nargs="+",
+        metavar="RESULT|PATTERN",
+        help="folders or tables of runs, drawn over each other, and patterns such as plant.y.*; "
+        "default: errors, commands and estimates",
+    )
+    _add_file(signals, "a .png, .svg or .pdf; default: plot.png", Path("plot.png"))
+    signals.set_defaults(action=_plot)
+
+    view = commands.add_parser("view", help="write a page to turn a stored result and play it")
+    view.add_argument("result", type=Path, metavar="RESULT", help="folder or table of a run")
+    _add_file(view, "a .html; default: view.html beside the table")
+    view.set_defaults(action=_view)
+
+    film = commands.add_parser("animate", help="write a film of a scenario")
+    add_system(film)
+    add_experiment(film)
+    add_set(film)
+    film.add_argument(
+        "--fps",
+        type=int,
+        default=FRAMES_PER_SECOND,
+        metavar="N",
+        help=f"frames per second; default: {FRAMES_PER_SECOND}",
+    )
+    _add_file(film, "a .gif or .mp4; default: results/SCENARIO.gif")
+    film.set_defaults(action=_animate)
+
+
+def _add_file(parser: argparse.ArgumentParser, text: str, default: Path | None = None) -> None:
+    parser.add_argument("--out", type=Path, metavar="FILE", default=default, help=text)
+
+
+def _plot(options: argparse.Namespace) -> int:
+    if options.out.suffix not in _PLOTS:
+        raise InputError(f"{options.out}: write a {', '.join(_PLOTS)}")
+    paths = [Path(text) for text in options.what if Path(text).exists()]
+    patterns = [text for text in options.what if not Path(text).exists()]
+    if not paths:
+        raise InputError(f"{patterns[0]}: no such result; give the folder or the table of a run")
+    runs = [read_result(path, lambda columns: wanted(columns, patterns)) for path in paths]
+    names = [name for name, _ in runs]
+    labels = names if len(set(names)) == len(names) else list(map(str, paths))
+    figure = plot(list(zip(labels, (table for _, table in runs), strict=True)), patterns)
+    _write(options.out, lambda unfinished: save(figure, unfinished))
+    return OK
+
+
+def _view(options: argparse.Namespace) -> int:
+    file = table_in(options.result)
+    out = options.out or file.with_name("view.html")
+    if out.suffix != ".html":
+        raise InputError(f"{out}: write a .html")
+    name, table = read_result(file)
+    title = read_record(file.parent).get("title") or name
+    try:
+        text = page(title, table)
+    except InputError as error:
+        raise InputError(f"{options.result}: {error}") from error
+    _write(out, lambda unfinished: unfinished.write_text(text, encoding="utf-8"))
+    return OK
+
+
+def _animate(options: argparse.Namespace) -> int:
+    scenario, system = loaded(options.scenario)
+    out = options.out or Path("results", f"{scenario.name}.gif")
+    check_film(out, options.fps)
+    prepared = prepare(scenario, system, request(options))
+    seen = VisibleRows()
+    ending = simulate(prepared.system, prepared.experiment, [seen, Progress(scenario.name)])
+    if missing := seen.missing(*CONTROL_POINT):
+        raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
+    title = scenario.title or scenario.name
+    _write(out, lambda unfinished: animate(title, seen, unfinished, options.fps))
+    return status(scenario.name, ending)
+
+
+def _write(path: Path, write: Callable[[Path], object]) -> None:
+    """Write a file whole or not at all, and say where it is."""
+    unfinished = path.with_name(f".unfinished-{os.getpid()}{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write(unfinished)
+        unfinished.replace(path)
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {reason(error)}; choose --out FILE") from error
+    finally:
+        if unfinished.exists():
+            unfinished.unlink()
+    print(path)
