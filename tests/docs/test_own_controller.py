@@ -52,6 +52,12 @@ def test_law_of_the_guide_follows_the_reference(followed: Path):
     assert max(final_error(followed / "my_law/soft")) > 0.2
 
 
+def test_runs_of_the_guide_are_drawn(followed: Path):
+    assert (followed / "my_law/results/scenario.png").is_file()
+    assert (followed / "hardened/results/scenario.svg").is_file()
+    assert (followed / "compared.png").is_file()
+
+
 def test_both_bases_give_the_same_motion(followed: Path):
     """All signals but the plain slave's outputs before its first step, which are zero."""
     plain, hardened = (
