@@ -94,7 +94,9 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     stop_time = _first_given(request.stop_time, scenario.stop_time, system.stop_time)
     if stop_time is None:
         raise InputError(f"{scenario.name}: names no stop time; give one with --stop-time")
-    step = _first_given(request.step, scenario.step, system.step) or DEFAULT_STEP
+    step = _first_given(request.step, scenario.step, system.step)
+    if step is None:
+        step = DEFAULT_STEP
     return Prepared(scenario, system, Experiment(stop_time, step, request.order))
 
 

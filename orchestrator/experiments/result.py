@@ -114,7 +114,11 @@ class Result(Table):
         return pd.DataFrame(self.rows[:, 1:], index=index, columns=list(self.columns), copy=True)
 
     def plot(self, *patterns: str) -> Figure:
-        """Draw the columns that match patterns such as `plant.y.*` over time.
+        """Draw columns over time, a group such as `plant.y` a panel.
+
+        Args:
+            patterns: names of groups or columns, or patterns such as `plant.eta.*`; none: errors,
+                commands and estimates of the loop.
 
         Raises:
             ValueError: a pattern matches no column.
