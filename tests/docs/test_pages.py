@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from auv_fmu import __version__
-from orchestrator.commands.main import parser
+from orchestrator.commands.main import main, parser
 from support.markdown import DOCS, blocks
 
 ROOT = DOCS.parent
@@ -33,6 +33,13 @@ def test_readme_names_every_option_of_run():
     described = README.split("auv-fmu run SCENARIO|FILE.toml", 1)[1].split("    auv-fmu ", 1)[0]
     options = {o for action in commands()["run"]._actions for o in action.option_strings}
     assert options - {"-h", "--help"} == set(re.findall(r"--[\w-]+", described))
+
+
+def test_readme_names_every_file_of_a_run(tmp_path):
+    assert main(["run", "fig5", "--stop-time", "0.1", "--out", str(tmp_path)]) == 0
+    for file in tmp_path.rglob("*.*"):
+        kind = "SCENARIO.png`, `.svg`" if file.suffix in (".png", ".svg") else file.name
+        assert f"| `{kind}" in README, file.name
 
 
 def test_python_on_the_first_screen_runs(capsys):
