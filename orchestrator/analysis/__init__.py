@@ -10,6 +10,9 @@ module                  what it holds
 :mod:`.gains`           the conditions of Theorems 1 and 2 for a set of parameters
 :mod:`.visible`         of a long run, the rows that can be seen
 :mod:`.figures`         the paper's figures
+:mod:`.plot`            any signals of any results
+:mod:`.body`            a hull with fins, so that the attitude can be seen
+:mod:`.view`            a page to turn a run around and play it
 :mod:`.animation`       a film of a run
 ======================  ==============================================================
 """
