@@ -43,6 +43,7 @@ def imports(package) -> Iterator[tuple[Path, str]]:
                 "markdown_it",
                 "matplotlib",
                 "numpy",
+                "PIL",
                 "tqdm",
             },
         ),
