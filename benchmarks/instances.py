@@ -1,12 +1,16 @@
 """Size of the FMUs, and the cost of instances after the first: `python benchmarks/instances.py`.
 
 The time of an instance is set against that of a plain Python object of the same class, in the same
-repetition: what is above it is FMI, PythonFMU and the loader.
+repetition: what is above it is FMI, PythonFMU and the loader. What stays is the growth of resident
+memory over many instances that came and went, and over as many resets of one.
 """
 
 from __future__ import annotations
 
+import gc
+import resource
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -19,20 +23,48 @@ from orchestrator.experiments import bundle
 
 REPETITIONS = 200
 
+#: Instances or resets before memory is first read, and between the two readings.
+WARM_UP, MANY = 2000, 5000
+
+
+def growth(function: Callable[[], object]) -> float:
+    """Bytes that one call leaves behind."""
+    for _ in range(WARM_UP):
+        function()
+    before = resident()
+    for _ in range(MANY):
+        function()
+    return (resident() - before) / MANY
+
+
+def resident() -> int:
+    """Resident memory of this process [bytes]."""
+    gc.collect()
+    pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[1]
+    return int(pages) * resource.getpagesize()
+
 
 def main() -> None:
     """Measure and print."""
-    print(f"{'FMU':22} {'size':>9} {'instance':>12} {'/ Python object':>16}")
+    print(
+        f"{'FMU':24} {'size':>6} {'instance':>11} {'/ Python object':>16} "
+        f"{'stays of an instance':>21} {'of a reset':>11}"
+    )
     with TemporaryDirectory(prefix="auvfmu") as folder:
         bundle.build(Path(folder))
         for path in sorted(Path(folder).glob("*.fmu")):
             unpacked = fmpy.extract(path, unzipdir=Path(folder, path.stem))
             guid = fmpy.read_model_description(path).guid
 
-            def instance(unpacked: str = unpacked, guid: str = guid, name: str = path.stem) -> None:
+            def made(
+                unpacked: str = unpacked, guid: str = guid, name: str = path.stem
+            ) -> FMU2Slave:
                 fmu = FMU2Slave(guid=guid, modelIdentifier=name, unzipDirectory=str(unpacked))
                 fmu.instantiate()
-                fmu.freeInstance()
+                return fmu
+
+            def instance(made: Callable[[], FMU2Slave] = made) -> None:
+                made().freeInstance()
 
             instance()
             script = Path(unpacked, "resources", "slavemodule.txt").read_text(encoding="utf-8")
@@ -46,10 +78,13 @@ def main() -> None:
                 end = perf_counter()
                 times.append(middle - start)
                 ratios.append((middle - start) / (end - middle))
+            kept = made()
             print(
-                f"{path.name:22} {path.stat().st_size / 1000:6.0f} kB "
-                f"{1e3 * median(times):9.2f} ms {median(ratios):16.1f}"
+                f"{path.name:24} {path.stat().st_size / 1000:3.0f} kB "
+                f"{1e3 * median(times):8.2f} ms {median(ratios):16.1f} "
+                f"{growth(instance):19.0f} B {growth(kept.reset):9.0f} B"
             )
+            kept.freeInstance()
 
 
 if __name__ == "__main__":

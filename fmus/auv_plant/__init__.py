@@ -1,0 +1,9 @@
+"""The simulated vehicle, its actuators and its localisation system.
+
+============== ==============================================================
+module         what it states
+============== ==============================================================
+:mod:`.ports`  its ports, and what its parameters mean to the equations
+:mod:`.slave`  how the equations run in it
+============== ==============================================================
+"""

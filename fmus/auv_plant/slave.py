@@ -49,38 +49,26 @@ class AuvPlant(Component[PlantState, Inputs, Outputs, Parameters]):
                 raise Refusal(f"tau_min.{k} = {tau_min:g} must be below tau_max.{k} = {tau_max:g}")
 
     def begin(self, inputs: Inputs, t: float) -> tuple[PlantState, Outputs]:
-        self._random = Random(self.parameters.noise.seed)
-        x, y, z, phi, theta, psi = self.parameters.eta0
-        state = plant.initial_state((x, y, z), (phi, theta, psi), self.parameters.nu0)
-        return state, self._seen(state, self._limited(inputs.tau))
+        chosen = self.parameters
+        self._random = Random(chosen.noise.seed)
+        x, y, z, phi, theta, psi = chosen.eta0
+        state = plant.initial_state((x, y, z), (phi, theta, psi), chosen.nu0)
+        return state, _seen(chosen, state, _limited(chosen, inputs.tau))
 
     def advance(
         self, state: PlantState, inputs: Inputs, t: float, h: float, n: int
     ) -> tuple[PlantState, Outputs]:
-        vehicle, roll = self.parameters.vehicle, self.parameters.roll
-        tau = self._limited(inputs.tau)
+        chosen = self.parameters
+        tau = _limited(chosen, inputs.tau)
         for _ in range(n):
-            state = plant.step(vehicle, roll, state, tau, inputs.tau_w, h)
-        return state, self._seen(state, tau)
-
-    def _limited(self, tau: Vector3) -> Vector3:
-        return limit_all(tau, self.parameters.limits.tau_min, self.parameters.limits.tau_max)
-
-    def _seen(self, state: PlantState, tau: Vector3) -> Outputs:
-        euler, y, dy = plant.outputs(state, self.parameters.ell)
-        return {
-            "eta": (*state.position, *euler),
-            "nu": state.nu,
-            "y": y,
-            "dy": dy,
-            "tau_applied": tau,
-        }
+            state = plant.step(chosen.vehicle, chosen.roll, state, tau, inputs.tau_w, h)
+        return state, _seen(chosen, state, tau)
 
     def sample(self, values: list[float]) -> None:
         gauss = self._random.gauss
         n = gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)
         x, y, z = values[_Y]
-        values[_Y] = plant.measure((x, y, z), self.parameters.noise.std, n)
+        values[_Y] = plant.measure((x, y, z), n, self.parameters.noise.std)
 
     def hidden_state(self) -> Any:
         return self._random.getstate() if self._state is not None else None
@@ -90,3 +78,18 @@ class AuvPlant(Component[PlantState, Inputs, Outputs, Parameters]):
             restored = Random()
             restored.setstate(hidden)
             self._random = restored
+
+
+def _limited(chosen: Parameters, tau: Vector3) -> Vector3:
+    return limit_all(tau, chosen.limits.tau_min, chosen.limits.tau_max)
+
+
+def _seen(chosen: Parameters, state: PlantState, tau: Vector3) -> Outputs:
+    euler, y, dy = plant.outputs(state, chosen.ell)
+    return {
+        "eta": (*state.position, *euler),
+        "nu": state.nu,
+        "y": y,
+        "dy": dy,
+        "tau_applied": tau,
+    }

@@ -1,0 +1,9 @@
+"""The proposed velocity-free saturated controller.
+
+============== ==============================================================
+module         what it states
+============== ==============================================================
+:mod:`.ports`  its ports, and what its parameters mean to the equations
+:mod:`.slave`  how the equations run in it
+============== ==============================================================
+"""

@@ -13,6 +13,7 @@ import shutil
 import sys
 import tempfile
 import zipfile
+from importlib.metadata import version
 from modulefinder import ModuleFinder
 from pathlib import Path
 
@@ -31,7 +32,7 @@ _SCRIPT = """\
 from fmus.slave.loading import settle
 from {module} import {component}
 
-settle(globals())
+settle({component}, globals(), locals())
 """
 
 #: What a folder of built FMUs was built from.
@@ -46,6 +47,8 @@ def fingerprint() -> str:
             if path.suffix in (".py", ".md", ".html", ".png", ".c", ".so", ".dll"):
                 digest.update(f"{path.relative_to(root)}\0".encode())
                 digest.update(path.read_bytes())
+    for text in (documentation.licences(), version("markdown-it-py")):
+        digest.update(text.encode())
     return digest.hexdigest()
 
 

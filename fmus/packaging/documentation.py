@@ -33,7 +33,10 @@ In Python:
     result = fmpy.simulate_fmu("{name}.fmu", stop_time=10.0, output_interval=0.02)
 
 A step longer than `h_max`, where there is such a parameter, is split evenly with held inputs.
-`fault` tells that an input, a parameter or a step was refused, and the log says why."""
+`fault` tells that an input, a parameter or a step was refused, and the log says why.
+
+**A refused parameter does not show in a bare `fmpy.simulate_fmu`: the result has two rows, with
+`fault` true, and there is no text. Add `debug_logging=True` to read the reason.**"""
 
 
 def page(name: str) -> str:

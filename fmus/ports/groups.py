@@ -61,9 +61,13 @@ def unpacking(
         TypeError: `made` has other groups than the ports.
 
     """
+    places = _hold(made, ports, groups).values()
+    if not places:
+        nothing = made()
+        return lambda values: nothing
     text = "".join(
         f"({''.join(f'values[{i}], ' for i in range(place.start, place.stop))}), "
-        for place in _hold(made, ports, groups).values()
+        for place in places
     )
     return _compiled(f"lambda values: make(made, ({text}))", made)
 

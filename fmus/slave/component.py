@@ -1,33 +1,30 @@
-"""The hardened slave that every component of the bundle extends.
+"""The base of all components: what one implements, and its steps.
 
 PythonFMU turns a Python class into an FMU. What it leaves to the class is done here, once:
 
-- No exception of the component leaves a callback: PythonFMU would report fmi2Fatal and release
-  its objects twice. A refusal is logged, raises `fault`, and ends the next step with
-  fmi2Discard.
+- Inputs, outputs and parameters reach the component as the groups that equations are written in.
 - A step is a transaction: state and outputs change together, after everything was computed and
   found finite.
-- Inputs, outputs and parameters reach the component as the groups that equations are written in.
+- The state of the FMU is complete and exact, in memory and serialised.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import ceil, isfinite
-from typing import Any, Callable, ClassVar, Generic, NamedTuple, TypeVar, get_args, get_origin
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar, get_args, get_origin
 from xml.etree.ElementTree import Element
 
-from pythonfmu import DefaultExperiment, Fmi2Slave
-from pythonfmu.enums import Fmi2Status
+from pythonfmu import DefaultExperiment
 
 from auv_fmu import __version__
 from auv_fmu.euler import STEP
 from fmus.ports.description import complete
 from fmus.ports.groups import ParameterSet, packing, unpacking
-from fmus.ports.port import H_MAX, Port, Refusal, Value
+from fmus.ports.port import H_MAX, Refusal, Value
+from fmus.slave.callbacks import INITIALISING, STEPPING, Callbacks
 from fmus.slave.state import Snapshot, checked, from_bytes, to_bytes
-from fmus.slave.store import MISSING, Store
 
 #: A step may exceed `h_max` by this share without being split: hosts round their time.
 ROUNDING = 1e-9
@@ -37,8 +34,6 @@ _NO_LIMIT = 1e300
 
 #: More internal steps than this in one communication step are taken for a mistake.
 MOST_INTERNAL_STEPS = 1_000_000
-
-_INSTANTIATED, _INITIALISING, _STEPPING = "instantiated", "initialising", "stepping"
 
 State = TypeVar("State")
 Inputs = TypeVar("Inputs")
@@ -50,7 +45,7 @@ class Nothing(NamedTuple):
     """State of a component without memory; inputs of one without inputs."""
 
 
-class Component(Fmi2Slave, Generic[State, Inputs, Outputs, Parameters]):  # type: ignore[misc]
+class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
     """Base of all components.
 
     A component names its four types: NamedTuples of its state, of its groups of inputs and of its
@@ -63,8 +58,6 @@ class Component(Fmi2Slave, Generic[State, Inputs, Outputs, Parameters]):  # type
     version = __version__
     default_experiment = DefaultExperiment(0.0, 100.0, STEP)
 
-    #: Ports without `fault`, inputs first, then outputs, then parameters.
-    ports: ClassVar[tuple[Port, ...]]
     #: What the parameters mean to the equations; `h_max` is not among them.
     parameter_set: ParameterSet[Parameters]
     #: Fields of the inputs that bear another name than their group of ports.
@@ -112,37 +105,9 @@ class Component(Fmi2Slave, Generic[State, Inputs, Outputs, Parameters]):  # type
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        self._store = Store(self.ports)
         self._state: State | None = None
-        self._mode = _INSTANTIATED
-        self._stale = False
         self._start_time = 0.0
         self._longest_step = 0.0
-        self._said: set[str] = set()
-
-    # Faults and messages
-
-    def _report(self, message: str, key: str | None = None) -> None:
-        """Raise `fault` and log."""
-        self._store.fault = True
-        self.say(message, Fmi2Status.discard, key)
-
-    def say(self, message: str, status: Fmi2Status, key: str | None = None) -> None:
-        """Log a message, the first time only that its key, or else its text, comes up.
-
-        The host adds the name of the instance.
-        """
-        if (key or message) not in self._said:
-            self._said.add(key or message)
-            # FMI defines a log message as a format: a host would take a % for a directive.
-            self.log(message.replace("%", "%%"), status)
-
-    def _guarded(self, action: str, function: Callable[[], None]) -> None:
-        """Run a callback's body; whatever it raises is reported instead."""
-        try:
-            function()
-        except BaseException as error:
-            self._report(f"{action}: {type(error).__name__}: {error}")
 
     # Experiment
 
@@ -155,15 +120,14 @@ class Component(Fmi2Slave, Generic[State, Inputs, Outputs, Parameters]):  # type
             self._report(f"start time {start_time}: must be finite")
 
     def enter_initialization_mode(self) -> None:
-        self._mode = _INITIALISING
+        self._mode = INITIALISING
         self._stale = True
 
     def exit_initialization_mode(self) -> None:
         self._refresh()
-        self._mode = _STEPPING
+        self._mode = STEPPING
 
     def _refresh(self) -> None:
-        """Compute state and outputs at the start time, if a value they depend on has changed."""
         if self._stale:
             self._stale = False
             self._guarded("initialisation refused", self._begin)
@@ -189,6 +153,9 @@ class Component(Fmi2Slave, Generic[State, Inputs, Outputs, Parameters]):  # type
         self.check(parameters)
         return parameters, float(values.get(H_MAX.name, _NO_LIMIT)) * (1.0 + ROUNDING)
 
+    def _retune(self, parameters: dict[str, Value]) -> None:
+        self._adopt(parameters, self._meaning(parameters))
+
     def _adopt(self, values: dict[str, Value], meaning: tuple[Parameters, float]) -> None:
         self._store.parameters = values
         self.parameters, self._longest_step = meaning
@@ -203,7 +170,7 @@ class Component(Fmi2Slave, Generic[State, Inputs, Outputs, Parameters]):  # type
         """
         try:
             store = self._store
-            if store.refused or self._mode != _STEPPING:
+            if store.refused or self._mode != STEPPING:
                 raise Refusal("; ".join(store.refused.values()) or "not initialised")
             if 0.0 < step_size <= self._longest_step and isfinite(current_time):
                 n = 1
@@ -238,89 +205,6 @@ class Component(Fmi2Slave, Generic[State, Inputs, Outputs, Parameters]):  # type
         if n > MOST_INTERNAL_STEPS:
             raise Refusal(f"step {step_size:g} s needs {n} internal steps; raise h_max")
         return n
-
-    # Values
-
-    def get_real(self, vrs: list[int]) -> list[float]:
-        if self._stale:
-            self._refresh()
-        store = self._store
-        # PythonFMU reads the list and lets go of it, so it need not be a copy.
-        return store.outputs if vrs == store.output_references else self._get(vrs, "Real")
-
-    def get_integer(self, vrs: list[int]) -> list[int]:
-        return self._get(vrs, "Integer")
-
-    def get_boolean(self, vrs: list[int]) -> list[bool]:
-        if self._stale:
-            self._refresh()
-        store = self._store
-        return [store.fault] if vrs == store.fault_references else self._get(vrs, "Boolean")
-
-    def get_string(self, vrs: list[int]) -> list[str]:
-        return self._get(vrs, "String")
-
-    def set_real(self, vrs: list[int], values: list[float]) -> None:
-        store = self._store
-        # A sum is finite only if every value is; _set finds out which one was not.
-        if (
-            vrs == store.input_references
-            and self._mode == _STEPPING
-            and not store.refused
-            and isfinite(sum(values))
-        ):
-            store.inputs = values
-        else:
-            self._set(vrs, values, "Real")
-
-    def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        self._set(vrs, values, "Integer")
-
-    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
-        self._set(vrs, values, "Boolean")
-
-    def set_string(self, vrs: list[int], values: list[str]) -> None:
-        self._set(vrs, values, "String")
-
-    def _get(self, vrs: list[int], kind: str) -> list[Any]:
-        values: list[Value] = []
-        for reference in vrs:
-            try:
-                values.append(self._store.get(reference, kind))
-            except Refusal as refusal:
-                self._report(str(refusal))
-                values.append(MISSING[kind])
-        return values
-
-    def _set(self, vrs: list[int], values: Sequence[Value], kind: str) -> None:
-        for reference, value in zip(vrs, values):
-            try:
-                port = self._store.port(reference, kind)
-                if port.causality == "input":
-                    self._store.accept(port, value)
-                    self._store.set_input(reference, float(value))
-                else:
-                    self._set_parameter(port, value)
-                self._stale = self._mode == _INITIALISING
-            except BaseException as error:
-                self._report(str(error))
-
-    def _set_parameter(self, port: Port, value: Value) -> None:
-        if port.causality != "parameter":
-            raise Refusal(f"{port.name} is an output and cannot be set")
-        if port.variability == "fixed" and self._mode == _STEPPING:
-            raise Refusal(f"{port.name} is fixed and cannot be set after the initialisation")
-        store = self._store
-        store.accept(port, value)
-        parameters = {**store.parameters, port.name: value}
-        if self._mode != _STEPPING:
-            store.parameters = parameters
-            return
-        try:
-            self._adopt(parameters, self._meaning(parameters))
-        except Exception as error:
-            store.refused[port.name] = str(error)
-            raise
 
     # State
 

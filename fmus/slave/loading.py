@@ -1,9 +1,13 @@
 """Make up for what PythonFMU 0.7 does to the process each time it creates an instance.
 
-- It imports the slave's script, then runs its source once more in the module's namespace, and
-  then lets go of a reference to that namespace that it does not own. After some dozens of
+It imports the slave's script, then runs its source once more, with the module's namespace as the
+globals and a new one as the locals, and searches the locals for the class.
+
+- It lets go of a reference to the module's namespace that it does not own. After some dozens of
   instances the namespace would be freed under the running process.
-- It puts the resources folder on sys.path and never takes it off.
+- The search never frees what it makes of each base of each class it meets: more than a kilobyte
+  an instance.
+- It puts the resources folder on sys.path and never takes it off; it never frees the path either.
 - Its library frees the object that watches over the interpreter twice when the process ends,
   which now and then ends in "corrupted double-linked list" and an exit status of 134.
 """
@@ -17,14 +21,28 @@ from pathlib import Path
 from typing import Any
 
 
-def settle(namespace: dict[str, Any]) -> None:
-    """To be called by the script of a slave, as its last statement, with its `globals()`.
+def settle(slave: type, module: dict[str, Any], found: dict[str, Any]) -> None:
+    """To be called by the script of a slave, as its last statement, when all is imported.
 
-    Everything the slave needs has been imported by now.
+    Args:
+        slave: the class that PythonFMU shall find.
+        module: `globals()` of the script.
+        found: its `locals()`.
+
     """
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(namespace))
-    if sys.path and _resources_of(sys.path[0], namespace["__name__"]):
-        _release_interpreter(Path(sys.path.pop(0)))
+    # A search that finds no class ends in the module's attribute with the empty name.
+    module[""] = slave
+    if found is module:
+        return
+    found.clear()
+    # What is one reference short is given back, what has one too many is relieved of it.
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(module))
+    if sys.path and _resources_of(sys.path[0], module["__name__"]):
+        path = sys.path.pop(0)
+        _release_interpreter(Path(path))
+        same_but_ours = f"{path}/"
+        if sys.getrefcount(path) == sys.getrefcount(same_but_ours) + 1:
+            ctypes.pythonapi.Py_DecRef(ctypes.py_object(path))
 
 
 def _resources_of(folder: str, script: str) -> bool:

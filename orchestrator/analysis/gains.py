@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from auv_fmu.proof.gain_conditions import Bounds, Condition, bounds, conditions
+from auv_fmu.proof.sampling import observer_rate
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from orchestrator.analysis.signals import ELL, vehicle
 from orchestrator.errors import InputError
@@ -70,7 +71,21 @@ def check(system: System) -> str:
             f"{condition.number}  {condition.statement}",
             f"  {condition.left:.6g} > {condition.right:.6g}{rest}: {condition.verdict}",
         ]
-    lines += ["", _NOTE]
+    lines += ["", _NOTE, "", *_sampling(system)]
     if not system.parameters:
         lines += ["", _PAPER]
     return "\n".join(lines)
+
+
+def _sampling(system: System) -> list[str]:
+    """What the step asks of k_d."""
+    lambda_, k_d, h = (
+        float(system.value(port_name(f"controller.{name}")) or 0.0)
+        for name in ("lambda", "k_d", "h_max")
+    )
+    rate = observer_rate(lambda_, k_d)
+    return [
+        f"Euler's scheme with internal steps of {h:g} s: the observer's fastest mode has the rate "
+        f"{rate:.4g} 1/s,",
+        f"h p = {h * rate:.3g}: it changes its sign in every step above 1, and grows above 2.",
+    ]

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from orchestrator.analysis.metrics import LAST_SECONDS
 from orchestrator.commands.options import (
     add_experiment,
@@ -75,4 +77,11 @@ def _print_summary(values: Mapping[str, Any]) -> None:
     print(values["scenario"])
     for key, label in rows.items():
         if key in values:
-            print(f"  {label:44}" + "".join(f"{value:11.4g}" for value in values[key]))
+            print(f"  {label:44}" + "".join(f"{_number(value):>11}" for value in values[key]))
+
+
+def _number(value: float) -> str:
+    """Four digits; an exponent only where zeros would be all that is seen."""
+    if value and not 1e-4 <= abs(value) < 1e7:
+        return f"{value:.3e}"
+    return np.format_float_positional(value, precision=4, unique=False, fractional=False, trim="-")

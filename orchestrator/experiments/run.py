@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from orchestrator.analysis.cautions import cautions, cautions_after
 from orchestrator.analysis.certificates import CertificatesFile
 from orchestrator.analysis.figures import Drawn, draw
 from orchestrator.analysis.metrics import Metrics
@@ -78,14 +81,18 @@ def run_into(
     tables = [selected_columns(prepared.system, files.columns) for prepared in runs]
     started = datetime.now(UTC)
     with (
-        held_interrupts(lambda interrupts: say(_answer(interrupts))) as interrupts,
+        held_interrupts(_answer) as interrupts,
         replaced(folder) as unfinished,
     ):
         done: list[tuple[Path, Prepared, Finished, VisibleRows]] = []
         for prepared, columns in zip(runs, tables, strict=True):
+            for caution in cautions(prepared.system, prepared.experiment):
+                say(f"warning: {prepared.scenario.name}: {caution}")
             target = unfinished / prepared.scenario.name if done else unfinished
             target.mkdir(exist_ok=True)
             done.append((target, prepared, *_run(target, prepared, files, columns)))
+            for caution in cautions_after(done[-1][-1]):
+                say(f"warning: {prepared.scenario.name}: {caution}")
             if interrupts:
                 break
         if files.figures and not interrupts.urgent:
@@ -106,10 +113,14 @@ def run_into(
         return [finished for _, _, finished, _ in done]
 
 
-def _answer(interrupts: Interrupts) -> str:
+def _answer(interrupts: Interrupts) -> None:
+    """Tell the user at once what happens now, from within the handler of the signal."""
+    text = "stopping: writing what was computed and drawing it; once more leaves the figures out"
     if interrupts.urgent:
-        return "stopping at once: what was computed is kept, figures are left out"
-    return "stopping: writing what was computed and drawing it; once more leaves the figures out"
+        text = "stopping at once: what was computed is kept, figures are left out"
+    # print could have been interrupted itself, and must not be entered a second time.
+    with suppress(OSError):
+        os.write(2, f"auv-fmu: {text}\n".encode())
 
 
 def _run(

@@ -172,8 +172,8 @@ def read_scenario(name: str) -> Scenario:
         content = tomllib.loads(text)
     except FileNotFoundError:
         raise InputError(
-            f"no scenario {name!r}{did_you_mean(name, names())}; there are {', '.join(names())}, "
-            "or give a .toml or .ssp file"
+            f"no scenario {name!r}; there are {', '.join(names())}, or give a .toml or .ssp file"
+            f"{did_you_mean(name, names())}"
         ) from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{path}: {reason(error)}") from error

@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from copy import copy
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import fmpy
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
     FMU2Slave,
+    fmi2Boolean,
     fmi2CallbackAllocateMemoryTYPE,
     fmi2CallbackFreeMemoryTYPE,
     fmi2CallbackFunctions,
     fmi2CallbackLoggerTYPE,
+    fmi2Component,
     fmi2Discard,
+    fmi2Real,
+    fmi2Status,
     fmi2Warning,
 )
 from fmpy.logging import addLoggerProxy
-from fmpy.model_description import ModelVariable
+from fmpy.model_description import ModelDescription, ModelVariable
 
 from orchestrator.errors import InputError, reason
 from orchestrator.system.component import Component
@@ -74,7 +80,22 @@ class Instance:
         self._variables = component.variables
         self.set_inputs: list[Callable[[], Any]] = []
         self.get_outputs: list[Callable[[], Any]] = []
-        self.do_step = partial(fmu.fmi2DoStep, fmu.component)
+        self.do_step = self.function("DoStep", (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean))
+
+    def function(self, name: str, types: Sequence[Any] | None = None) -> Callable[..., Any]:
+        """One of the FMU's functions, for calls of every step.
+
+        fmpy's own methods look the function up and convert its arguments in every call, which
+        costs as much as the call.
+
+        Args:
+            name: of the function, without fmi2.
+            types: of its arguments; None: they come as values of ctypes.
+
+        """
+        called = self.fmu.dll[f"fmi2{name}"]
+        called.argtypes, called.restype, called.errcheck = types, fmi2Status, _refuse_failures
+        return partial(called, fmi2Component(self.fmu.component))
 
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
@@ -106,6 +127,12 @@ def _fmi_type(variable: ModelVariable) -> str:
     return "Integer" if variable.type == "Enumeration" else str(variable.type)
 
 
+def _refuse_failures(status: int, called: Any, _: Any) -> int:
+    if status > fmi2Warning:
+        raise FMICallException(function=called.__name__, status=status)
+    return status
+
+
 @contextmanager
 def running(component: Component, log: Log) -> Iterator[Instance]:
     """An instance of a component, freed at the end; its FMU stays loaded.
@@ -114,7 +141,9 @@ def running(component: Component, log: Log) -> Iterator[Instance]:
         InputError: the FMU cannot be loaded.
 
     """
-    fmu = _loaded(component, unpacked(component.fmu))
+    # The functions of the library serve all instances; what differs is theirs alone.
+    fmu = copy(_library(component.fmu, component.description, unpacked(component.fmu)))
+    fmu.instanceName = component.name
     try:
         fmu.instantiate(callbacks=log.callbacks, loggingOn=True)
     except Exception as error:
@@ -126,19 +155,24 @@ def running(component: Component, log: Log) -> Iterator[Instance]:
         fmu.fmi2FreeInstance(fmu.component)
 
 
-def _loaded(component: Component, folder: Path) -> FMU2Slave:
-    if "%" in folder.as_uri().replace("%20", ""):
-        # PythonFMU 0.7 does not decode the URI and crashes its host.
-        raise InputError(
-            f"temporary folder {str(folder)!r}: FMUs need a path of plain ASCII characters; "
-            "set TMPDIR to one"
-        )
-    try:
-        return FMU2Slave(
-            instanceName=component.name,
-            guid=component.description.guid,
-            modelIdentifier=component.description.coSimulation.modelIdentifier,
-            unzipDirectory=str(folder),
-        )
-    except Exception as error:
-        raise InputError(f"{component.fmu}: cannot be loaded: {reason(error)}") from error
+_libraries: dict[Path, FMU2Slave] = {}
+
+
+def _library(fmu: Path, description: ModelDescription, folder: Path) -> FMU2Slave:
+    """The library of an unpacked FMU, loaded once a process."""
+    if folder not in _libraries:
+        if "%" in folder.as_uri().replace("%20", ""):
+            # PythonFMU 0.7 does not decode the URI and crashes its host.
+            raise InputError(
+                f"temporary folder {str(folder)!r}: FMUs need a path of plain ASCII characters; "
+                "set TMPDIR to one"
+            )
+        try:
+            _libraries[folder] = FMU2Slave(
+                guid=description.guid,
+                modelIdentifier=description.coSimulation.modelIdentifier,
+                unzipDirectory=str(folder),
+            )
+        except Exception as error:
+            raise InputError(f"{fmu}: cannot be loaded: {reason(error)}") from error
+    return _libraries[folder]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from ctypes import c_size_t
 from functools import partial
 from typing import Any
 
 import numpy as np
-from fmpy.fmi2 import FMU2Slave, fmi2Boolean, fmi2Integer, fmi2Real, fmi2ValueReference
+from fmpy.fmi2 import fmi2Boolean, fmi2Integer, fmi2Real, fmi2ValueReference
 from fmpy.model_description import ModelVariable
 
 from orchestrator.master.instance import Instance
@@ -47,9 +48,9 @@ class Row:
             part = self.values[first : first + len(ports)]
             block = _Block(kind, [port.valueReference for port in ports], part)
             if causality == "input":
-                instance.set_inputs.append(block.setter(instance.fmu))
+                instance.set_inputs.append(block.setter(instance))
             else:
-                instance.get_outputs.append(block.getter(instance.fmu))
+                instance.get_outputs.append(block.getter(instance))
             for i, port in enumerate(ports, start=first):
                 self.columns[PortName(instance.name, port.name)] = i
         for target, value in system.parameters.items():
@@ -82,27 +83,23 @@ class _Block:
         """
         self._kind = kind
         self._row = row
-        self._n = len(references)
-        self._references = (fmi2ValueReference * self._n)(*references)
+        self._n = c_size_t(len(references))
+        self._references = (fmi2ValueReference * len(references))(*references)
         c_type = _KINDS[kind]
         if kind == "Real":
-            self._values = (c_type * self._n).from_buffer(row)
+            self._values = (c_type * len(references)).from_buffer(row)
         else:
-            self._values = (c_type * self._n)()
+            self._values = (c_type * len(references))()
             self._integers = np.frombuffer(self._values, dtype=np.intc)
 
-    def _call(self, fmu: FMU2Slave, action: str) -> Callable[[], Any]:
+    def _call(self, instance: Instance, action: str) -> Callable[[], Any]:
         return partial(
-            getattr(fmu, f"fmi2{action}{self._kind}"),
-            fmu.component,
-            self._references,
-            self._n,
-            self._values,
+            instance.function(f"{action}{self._kind}"), self._references, self._n, self._values
         )
 
-    def setter(self, fmu: FMU2Slave) -> Callable[[], Any]:
+    def setter(self, instance: Instance) -> Callable[[], Any]:
         """A call that hands the values to the FMU."""
-        call = self._call(fmu, "Set")
+        call = self._call(instance, "Set")
         if self._kind == "Real":
             return call
 
@@ -112,9 +109,9 @@ class _Block:
 
         return set_converted
 
-    def getter(self, fmu: FMU2Slave) -> Callable[[], Any]:
+    def getter(self, instance: Instance) -> Callable[[], Any]:
         """A call that takes the values from the FMU."""
-        call = self._call(fmu, "Get")
+        call = self._call(instance, "Get")
         if self._kind == "Real":
             return call
 

@@ -65,7 +65,7 @@ class Selection:
 
     def take(self, rows: np.ndarray) -> None:
         """Hand on what is kept."""
-        if len(self._places) < rows.shape[1]:
+        if self._columns is not None:
             rows = rows[:, self._places]
         if self._every is None:
             self._observer.take(rows)
@@ -83,7 +83,7 @@ class Selection:
 
 
 def matching(names: Sequence[str], patterns: Sequence[str]) -> list[str]:
-    """The names that match one of some patterns such as `plant.y.*`, in their own order.
+    """The names that match one of some patterns such as `a.b.*`, in their own order.
 
     Raises:
         InputError: a pattern matches none.
@@ -97,7 +97,7 @@ def matching(names: Sequence[str], patterns: Sequence[str]) -> list[str]:
 
 def matches(name: str, pattern: str) -> bool:
     """Whether a name is the pattern, belongs to the group it names, or fits its wildcards."""
-    # Brackets belong to names such as theta_hat[1], and are no sets of letters here.
+    # Brackets belong to names of arrays, and are no sets of letters here.
     escaped = pattern.replace("[", "[[]")
     is_member = name.startswith((f"{pattern}.", f"{pattern}["))
     return name == pattern or is_member or fnmatchcase(name, escaped)

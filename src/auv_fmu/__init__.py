@@ -15,15 +15,26 @@ module                      what it states
 :mod:`.disturbance`         (56): friction, waves and currents
 :mod:`.saturation`          Definition 2: saturation functions, Lemma 1
 :mod:`.observer`            (18), (23), (24), (50), (51): the velocity observer
-:mod:`.adaptation`          (22), (49): bounding function, its adaptation, Lemma 2
+:mod:`.adaptation`          (22), (49), (58): bounding function, its adaptation, Lemma 2
 :mod:`.output_feedback`     (16) to (24), (48) to (51): the proposed controller
+:mod:`.pd`                  (57), (58): the PD controller it is compared with
+:mod:`.closed_loop`         Fig. 2: all of it as one straight line
+:mod:`.euler`               section 4.1: Euler approximation and its time step
 :mod:`.proof`               what only the proof needs; never runs inside an FMU
+:mod:`.types`               names for the tuples
+:mod:`.vectors`             difference and norm
 ==========================  ==========================================================
 
 The functions take and return Python floats and tuples and import nothing but the standard
 library, because they run inside FMUs in hosts that may have no numpy. `docs/architecture.md`
 says why that form was chosen, with the measurements. Only `proof.control_point_model`,
 which never runs inside an FMU, uses numpy.
+
+Symbols are the paper's: dx and ddx are the first and second time derivative of x, x_hat is its
+estimate, s_z is s(z). lambda_ is lambda, which Python keeps for itself.
+
+Arguments come in one order: sets of parameters, states and signals, single parameters such as
+ell and lambda, the step h.
 
 Conventions: SI units; north-east-down earth frame E; body frame B with x forward, y to
 starboard, z down; tuples are in the order of the paper's vectors.

@@ -67,6 +67,7 @@ def closed_loop(steps: int, setting: Setting = PAPER) -> Iterator[Instant]:
 
     """
     vehicle, gains, tau_d, h = setting.vehicle, setting.gains, setting.tau_d, setting.h
+    roll, waves = setting.roll, setting.disturbance
     tau_min, tau_max = setting.limits
     std, seed = setting.localisation
     gauss = Random(seed).gauss
@@ -74,7 +75,7 @@ def closed_loop(steps: int, setting: Setting = PAPER) -> Iterator[Instant]:
     planned = motion_planner.initial_state(setting.eta_d0)
     for k in range(steps + 1):
         seen = plant.outputs(state, gains.ell)
-        y = plant.measure(seen.y, std, (gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)))
+        y = plant.measure(seen.y, (gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)), std)
         moving = motion_planner.motion(vehicle, planned, tau_d)
         reference = motion_planner.reference(planned, moving, gains.ell)
         measurement = Measurement(y, seen.euler, *reference)
@@ -83,10 +84,10 @@ def closed_loop(steps: int, setting: Setting = PAPER) -> Iterator[Instant]:
         control = output_feedback.gated(gains, control, y)
         signals = output_feedback.evaluate(gains, control, measurement)
         tau = limit_all(signals.tau, tau_min, tau_max)
-        tau_w = disturbance(setting.disturbance, state.nu, k * h)
+        tau_w = disturbance(waves, state.nu, k * h)
         yield Instant(
             k * h, state, seen, planned, reference, measurement, control, signals, tau, tau_w
         )
         control = output_feedback.step(control, signals, h)
-        state = plant.step(vehicle, setting.roll, state, tau, tau_w, h)
+        state = plant.step(vehicle, roll, state, tau, tau_w, h)
         planned = motion_planner.step(planned, moving, h)

@@ -13,10 +13,14 @@ STEP = 0.02
 
 
 def advance(x: Vector3, dx: Vector3, h: float) -> Vector3:
-    """X + h dx: one step of a state whose rate is dx."""
-    return x[0] + h * dx[0], x[1] + h * dx[1], x[2] + h * dx[2]
+    """x + h dx: one step of a state whose rate is dx."""
+    x_1, x_2, x_3 = x
+    dx_1, dx_2, dx_3 = dx
+    return x_1 + h * dx_1, x_2 + h * dx_2, x_3 + h * dx_3
 
 
 def advance_4(x: Vector4, dx: Vector4, h: float) -> Vector4:
     """The same for a state of four components."""
-    return x[0] + h * dx[0], x[1] + h * dx[1], x[2] + h * dx[2], x[3] + h * dx[3]
+    x_1, x_2, x_3, x_4 = x
+    dx_1, dx_2, dx_3, dx_4 = dx
+    return x_1 + h * dx_1, x_2 + h * dx_2, x_3 + h * dx_3, x_4 + h * dx_4

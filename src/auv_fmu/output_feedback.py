@@ -1,8 +1,8 @@
 """The proposed controller: saturated output feedback, equations (16) to (24) and (48) to (51).
 
-(16) to (24) are (48) to (51) with s = tanh, so the general form is written and the saturation
-function is a parameter. Matrices of gains are diagonal and s acts component by component:
-everything before the Jacobian is written for one axis of the control point.
+Theorem 2 restates (21) to (24) as (48) to (51) with a general saturation function s in place of
+Tanh, so the general form is written and s is a parameter. All matrices of gains are diagonal.
+:func:`evaluate` is the law, line by line in the order of computation.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class ControllerState(NamedTuple):
     """States of the observer and of the adaptive law."""
 
     y_hat: Vector3  #: estimated control point [m]
-    dy_hat_o: Vector3  #: velocity of (23) and (24) [m/s]
+    dy_hat_o: Vector3  #: velocity of (23) and (24) [m/s]; dy_o of (18) is another (reading 15)
     theta_hat: Vector4  #: estimated parameters [N, kg/s, kg/m, kg]
 
 
@@ -153,21 +153,21 @@ def estimated_error_sum(
 
 
 def control_force(
-    K1: Vector3, K2: Vector3, s_or: Vector3, s_ez: Vector3, s_z: Vector3, robust: Vector3
+    s_dy: Vector3, s_ez: Vector3, s_z: Vector3, robust: Vector3, K1: Vector3, K2: Vector3
 ) -> Vector3:
     """F [N] at the control point, earth frame: the bracket of (21) and (48).
 
     Args:
-        K1, K2: diagonals of K_1 and K_2 [N].
-        s_or: s(dy_o - dy_r).
+        s_dy: s(dy_o - dy_r).
         s_ez, s_z: s(e - z) and s(z).
-        robust: the last term of (21) [N].
+        robust: the last term, :func:`.robust_force` [N].
+        K1, K2: diagonals of K_1 and K_2 [N].
 
     """
     return (
-        -K1[0] * s_or[0] - K2[0] * s_ez[0] - K2[0] * s_z[0] - robust[0],
-        -K1[1] * s_or[1] - K2[1] * s_ez[1] - K2[1] * s_z[1] - robust[1],
-        -K1[2] * s_or[2] - K2[2] * s_ez[2] - K2[2] * s_z[2] - robust[2],
+        -K1[0] * s_dy[0] - K2[0] * s_ez[0] - K2[0] * s_z[0] - robust[0],
+        -K1[1] * s_dy[1] - K2[1] * s_ez[1] - K2[1] * s_z[1] - robust[1],
+        -K1[2] * s_dy[2] - K2[2] * s_ez[2] - K2[2] * s_z[2] - robust[2],
     )
 
 
@@ -193,12 +193,13 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement) -> 
     r_hat_sum = estimated_error_sum(dy_hat, dy_d, s_ez, s_z, lambda_)  # below (21)
     G = regressor(dy_r, ddy_r)  # below (20)
     rho_hat = bound(G, theta_hat)  # below (21)
-    s_or, _ = s(difference(dy_o, dy_r))
-    F = control_force(K1, K2, s_or, s_ez, s_z, robust_force(rho_hat, r_hat_sum, eps_t))  # (21)
+    s_dy, _ = s(difference(dy_o, dy_r))
+    robust = robust_force(rho_hat, r_hat_sum, eps_t)  # last term of (21)
+    F = control_force(s_dy, s_ez, s_z, robust, K1, K2)  # bracket of (21)
     rotation = rotation_from_euler(0.0 if printed_jacobian else phi, theta, psi)  # reading 3
-    tau = actuator_command(rotation, F, ell)  # (21)
+    tau = actuator_command(rotation, F, ell)  # (21), J^T F
     dtheta_hat = theta_hat_rate(G, norm(r_hat_sum), theta_hat, theta_0, gamma, sigma)  # (22)
-    ddy_hat_o = observer.ddy_hat_o(ddy_r, s_z, lambda_, k_d)  # (51)
+    ddy_hat_o = observer.ddy_hat_o(ddy_r, s_z, lambda_, k_d)  # (51), for (24): reading 4
     return Signals(tau, dy_hat, e, z, ddy_hat_o, dtheta_hat)
 
 
@@ -208,7 +209,7 @@ def step(state: ControllerState, signals: Signals, h: float) -> ControllerState:
     Args:
         state: at the beginning of the step.
         signals: evaluated there.
-        h: step [s]; stable only while k_d h stays below 2, without ringing below 1.
+        h: step [s]; :func:`auv_fmu.proof.sampling.observer_rate` tells which k_d it can follow.
 
     """
     y_hat, dy_hat_o, theta_hat = state

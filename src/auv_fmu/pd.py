@@ -60,13 +60,13 @@ def filtered_error(dy: Vector3, dy_d: Vector3, e: Vector3, lambda_: float) -> Ve
     )
 
 
-def control_force(K1: Vector3, r: Vector3, robust: Vector3) -> Vector3:
+def control_force(r: Vector3, robust: Vector3, K1: Vector3) -> Vector3:
     """F [N] at the control point, earth frame: the bracket of (57).
 
     Args:
-        K1: diagonal of K_1 [kg/s].
         r: filtered error [m/s].
-        robust: the last term of (57) [N].
+        robust: the last term, :func:`.robust_force` [N].
+        K1: diagonal of K_1 [kg/s].
 
     """
     return -K1[0] * r[0] - robust[0], -K1[1] * r[1] - robust[1], -K1[2] * r[2] - robust[2]
@@ -87,9 +87,9 @@ def evaluate(gains: PdGains, theta_hat: Vector4, measurement: PdMeasurement) -> 
     r = filtered_error(dy, dy_d, e, lambda_)  # below (57)
     G = regressor(dy_d, ddy_d)  # below (57)
     rho_hat = bound(G, theta_hat)  # below (57)
-    F = control_force(K1, r, robust_force(rho_hat, r, eps_t))  # (57)
+    F = control_force(r, robust_force(rho_hat, r, eps_t), K1)  # bracket of (57)
     rotation = rotation_from_euler(0.0 if printed_jacobian else phi, theta, psi)
-    tau = actuator_command(rotation, F, ell)  # (57)
+    tau = actuator_command(rotation, F, ell)  # (57), J^T F
     dtheta_hat = theta_hat_rate(G, norm(r), theta_hat, theta_0, gamma, sigma)  # (58)
     return PdSignals(tau, e, dtheta_hat)
 

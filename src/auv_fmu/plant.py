@@ -153,13 +153,13 @@ def outputs(state: PlantState, ell: float) -> PlantOutputs:
     )
 
 
-def measure(y: Vector3, std: float, n: Vector3) -> Vector3:
+def measure(y: Vector3, n: Vector3, std: float) -> Vector3:
     """The localisation system: y with white noise.
 
     Args:
         y: control point [m], earth frame.
-        std: standard deviation of each axis [m]; not in the paper (reading 7).
         n: three independent standard normal numbers.
+        std: standard deviation of each axis [m]; not in the paper (reading 7).
 
     """
     return y[0] + std * n[0], y[1] + std * n[1], y[2] + std * n[2]

@@ -12,7 +12,7 @@ from typing import Callable
 from auv_fmu.types import Vector3
 
 #: xi -> (s(xi), diagonal of S'(xi))
-Saturation = Callable[[Vector3], "tuple[Vector3, Vector3]"]
+Saturation = Callable[[Vector3], tuple[Vector3, Vector3]]
 
 
 def hyperbolic_tangent(xi: Vector3) -> tuple[Vector3, Vector3]:

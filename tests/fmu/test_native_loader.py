@@ -12,10 +12,8 @@ import pytest
 
 from fmus.packaging.loader import compiler
 from orchestrator.experiments import bundle
+from support.instances import NAMES
 
-NAMES = [
-    "AuvPlant", "DisturbanceGenerator", "MotionPlanner", "ObserverController", "PdController",
-]  # fmt: skip
 LIBPYTHON = Path(
     str(sysconfig.get_config_var("LIBDIR")), str(sysconfig.get_config_var("INSTSONAME"))
 )

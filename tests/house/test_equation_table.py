@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import auv_fmu
 from fmus.packaging.discovery import components
 
 TESTS = Path(__file__).parents[1]
@@ -29,8 +30,8 @@ def quoted(cell: str) -> list[str]:
 @cache
 def names_in(module: str) -> set[str]:
     [path] = TESTS.rglob(f"{module}.py")
-    return {node.name for node in ast.parse(path.read_text()).body
-            if isinstance(node, ast.FunctionDef)}  # fmt: skip
+    tree = ast.parse(path.read_text())
+    return {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
 
 
 def test_every_equation_from_1_to_59_is_listed_once():
@@ -62,10 +63,24 @@ def mentions(text: str, number: int) -> bool:
     return any(int(first) <= number <= int(last) for first, last in ranges)
 
 
+@cache
+def variables() -> set[str]:
+    """Every parameter, field and variable of the equations."""
+    found = set()
+    for path in Path(*auv_fmu.__path__).rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.arg):
+                found.add(node.arg)
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                found.add(node.id)
+    return found
+
+
 @pytest.mark.parametrize("row", table("Symbols"), ids=lambda row: row[0])
-def test_symbol_is_the_port_and_unit_that_the_table_says(row):
+def test_symbol_is_the_name_port_and_unit_that_the_table_says(row):
     _, code, port, unit = row
     assert quoted(code)
+    assert set(quoted(code)) <= variables()
     for name in quoted(port):
         component, variable = name.split(".", 1)
         module = import_module(components()[component].replace(".slave", ".ports"))

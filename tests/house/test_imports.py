@@ -1,56 +1,133 @@
-"""Imports run one way: orchestrator -> (built FMUs), fmus -> auv_fmu."""
+"""The laws of the house: imports run one way, and the general half knows no vehicle."""
 
 from __future__ import annotations
 
 import ast
+import re
 import sys
 from collections.abc import Iterator
+from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
-import auv_fmu
-import fmus
-import orchestrator
+from fmus.packaging.discovery import components
 
-#: Modules of auv_fmu that never run inside an FMU.
-WITH_NUMPY = {"control_point_model.py"}
+ROOT = Path(__file__).parents[2]
+
+#: Rooms, each of which may import those before it.
+FLOORS = {
+    "orchestrator": (
+        "errors", "system", "master", "analysis", "experiments", "exchange", "paper", "commands",
+    ),
+    "fmus": ("ports", "slave", "components", "packaging"),
+}  # fmt: skip
+
+#: What a package may import besides itself and the standard library.
+ALLOWED = {
+    "auv_fmu": set(),
+    "fmus": {"auv_fmu", "markdown_it", "pythonfmu"},
+    "orchestrator": {
+        "auv_fmu", "fmpy", "libcosimpy", "markdown_it", "matplotlib", "numpy", "pandas", "PIL",
+        "platformdirs", "tqdm",
+    },
+}  # fmt: skip
+
+#: Rooms that run any system.
+GENERAL = ("errors", "system", "master")
 
 
-def imports(package) -> Iterator[tuple[Path, str]]:
-    [folder] = package.__path__
-    for path in Path(folder).rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Import):
-                yield from ((path, alias.name.split(".")[0]) for alias in node.names)
-            elif isinstance(node, ast.ImportFrom):
-                assert node.level == 0, f"{path}: relative import"
-                yield path, str(node.module).split(".")[0]
+def folder_of(package: str) -> Path:
+    [folder] = import_module(package).__path__
+    return Path(folder)
 
 
-@pytest.mark.parametrize(
-    ("package", "allowed"),
-    [
-        (auv_fmu, {"auv_fmu"}),
-        (fmus, {"auv_fmu", "fmus", "markdown_it", "pythonfmu"}),
-        (
-            orchestrator,
-            {
-                "auv_fmu",
-                "orchestrator",
-                "fmpy",
-                "libcosimpy",
-                "markdown_it",
-                "matplotlib",
-                "numpy",
-                "PIL",
-                "tqdm",
-            },
-        ),
-    ],
-)
-def test_imports_run_one_way(package, allowed):
-    for path, module in imports(package):
-        if path.name in WITH_NUMPY and module == "numpy":
+def modules(package: str) -> Iterator[tuple[Path, tuple[str, ...]]]:
+    """Every module of a package, and its name from the package on."""
+    folder = folder_of(package)
+    for path in sorted(folder.rglob("*.py")):
+        parts = path.relative_to(folder).with_suffix("").parts
+        yield path, tuple(part for part in parts if part != "__init__")
+
+
+def imports(path: Path) -> Iterator[tuple[str, ...]]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (tuple(alias.name.split(".")) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            base = tuple(str(node.module).split("."))
+            yield from ((*base, alias.name) for alias in node.names)
+
+
+@cache
+def component_folders() -> set[str]:
+    return {module.split(".")[1] for module in components().values()}
+
+
+def room(package: str, name: tuple[str, ...]) -> str:
+    """The room of a module; a component of `fmus` is in the room of components."""
+    first = name[0] if name else ""
+    return "components" if package == "fmus" and first in component_folders() else first
+
+
+@pytest.mark.parametrize("package", ALLOWED)
+def test_packages_import_what_they_may(package):
+    for path, name in modules(package):
+        allowed = ALLOWED[package] | {package} | sys.stdlib_module_names
+        # What only the proof needs never runs inside an FMU.
+        if package == "auv_fmu" and name[:1] == ("proof",):
+            allowed = allowed | {"numpy"}
+        for imported in imports(path):
+            assert imported[0] in allowed, f"{path} imports {imported[0]}"
+
+
+@pytest.mark.parametrize("package", FLOORS)
+def test_imports_run_downwards(package):
+    floors = FLOORS[package]
+    for path, name in modules(package):
+        # The package's own face hands on names of every floor.
+        if not name or name == ("__main__",):
             continue
-        assert module in allowed | sys.stdlib_module_names, f"{path} imports {module}"
+        own = floors.index(room(package, name))
+        for imported in imports(path):
+            if imported[0] == package and len(imported) > 1:
+                other = floors.index(room(package, imported[1:]))
+                assert other <= own, f"{path} imports {'.'.join(imported)}, which is above it"
+
+
+def test_the_general_half_does_not_import_the_mathematics():
+    for path, name in modules("orchestrator"):
+        if name and name[0] in GENERAL:
+            assert not any(imported[0] == "auv_fmu" for imported in imports(path)), path
+
+
+def ports() -> set[str]:
+    """Names of all ports and of their groups."""
+    found = {
+        port.name
+        for module in components().values()
+        for port in import_module(module.replace(".slave", ".ports")).PORTS
+    }
+    return found | {re.split(r"[.\[]", name)[0] for name in found}
+
+
+def test_the_general_half_names_no_component_and_no_port_of_this_vehicle():
+    wiring = (folder_of("orchestrator") / "experiments/closed_loop.toml").read_text()
+    instances = set(re.findall(r"^(\w+) = \"\w+\"$", wiring.split("[wires]")[0], re.MULTILINE))
+    assert "plant" in instances
+    words = instances - {"name"} | set(components())
+    word = re.compile(rf"\b({'|'.join(words)})\b")
+    dotted = "|".join(re.escape(name) for name in ports() if "." in name or "[" in name)
+    port = re.compile(rf"(?<![\w.])({dotted})(?!\w)")
+    # Short names such as e, y or step are words of any program; in quotes they would be ports.
+    quoted = {name for name in ports() if len(name) > 1} - {"step"}
+    for path, name in modules("orchestrator"):
+        if not name or name[0] not in GENERAL:
+            continue
+        text = path.read_text(encoding="utf-8")
+        assert (word.findall(text), port.findall(text)) == ([], []), path
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                assert node.value not in quoted, f"{path} names {node.value}"

@@ -35,7 +35,7 @@ def loop_table(n: int = 400, without: Collection[str] = (), seed: int = 1) -> Ta
     parameters = {ELL: 0.35}
     parameters |= dict.fromkeys(LOWER_LIMITS, -80.0) | dict.fromkeys(UPPER_LIMITS, 80.0)
     known = {port_name(name): value for name, value in parameters.items() if name not in without}
-    return Table.of(Header(columns, Experiment((n - 1) * STEP, STEP), known), rows)
+    return Table.of(Header(columns, Experiment(max(n - 1, 1) * STEP, STEP), known), rows)
 
 
 def table_of(**columns: np.ndarray) -> Table:

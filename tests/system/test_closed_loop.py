@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi2 import FMU2Slave
 
 from auv_fmu.closed_loop import Instant, closed_loop
 from orchestrator.analysis.metrics import indices
@@ -18,7 +17,8 @@ from orchestrator.experiments.wiring import closed_loop as wired
 from orchestrator.master.table import Table
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from support.runs import run
+from support.instances import unpacked
+from support.runs import final_error, run
 
 STEPS = 5000
 UQR, XYZ = ("u", "q", "r"), ("x", "y", "z")
@@ -27,17 +27,17 @@ QUIET = {PortName("plant", "noise.std"): 0.0}
 
 @pytest.fixture(scope="module")
 def system(dist: Path) -> System:
-    return bundle.closed_loop(dist)
+    return wired(dist)
 
 
 @pytest.fixture(scope="module")
-def noisy(system: System) -> Result:
-    return simulate(system, 100.0, 0.02)
+def noisy(system: System) -> Table:
+    return run(system, 100.0, 0.02)
 
 
 @pytest.fixture(scope="module")
-def quiet(system: System) -> Result:
-    return simulate(system.with_parameters(QUIET), 100.0, 0.02)
+def quiet(system: System) -> Table:
+    return run(system.with_parameters(QUIET), 100.0, 0.02)
 
 
 def row(now: Instant, before: Instant) -> dict[str, float]:
@@ -79,7 +79,7 @@ def row(now: Instant, before: Instant) -> dict[str, float]:
     return values
 
 
-def test_loop_of_fmus_is_the_straight_line_bit_for_bit(noisy: Result):
+def test_loop_of_fmus_is_the_straight_line_bit_for_bit(noisy: Table):
     """Every port, 5,000 steps, with noise and disturbance on."""
     assert noisy.failure is None
     instants = list(closed_loop(STEPS))
@@ -94,7 +94,7 @@ def test_loop_of_fmus_is_the_straight_line_bit_for_bit(noisy: Result):
         assert not noisy[name].any()
 
 
-def test_fig4_without_noise_never_reaches_a_limit(quiet: Result):
+def test_fig4_without_noise_never_reaches_a_limit(quiet: Table):
     """ "The AUV successfully tracks the desired trajectory without the actuator saturation"."""
     commands = quiet.group(*(f"controller.tau.{k}" for k in UQR))
     assert np.abs(commands).max() < 80.0
@@ -102,11 +102,11 @@ def test_fig4_without_noise_never_reaches_a_limit(quiet: Result):
     assert np.array_equal(applied, commands)
 
 
-def test_fig4_without_noise_ends_within_10_cm_on_every_axis(quiet: Result):
+def test_fig4_without_noise_ends_within_10_cm_on_every_axis(quiet: Table):
     assert (final_error(quiet) < 0.1).all()
 
 
-def test_fig4_estimates_stay_within_the_bound_of_their_law(quiet: Result):
+def test_fig4_estimates_stay_within_the_bound_of_their_law(quiet: Table):
     """(22) cannot carry theta_hat beyond G |r| / sigma; ours stay below 25 in 100 s."""
     estimates = quiet.group(*(f"controller.theta_hat[{i}]" for i in range(1, 5)))
     assert np.isfinite(estimates).all()
@@ -129,21 +129,21 @@ def test_no_velocity_of_the_vehicle_reaches_the_controller(system: System):
     assert set(units.values()) == {"m", "rad"}
 
 
-def test_estimated_velocity_is_the_true_one_after_the_transient(quiet: Result):
+def test_estimated_velocity_is_the_true_one_after_the_transient(quiet: Table):
     """The observer lags by about 1 / k_d = 20 ms: 1 cm/s at the accelerations of the helix."""
     true = quiet.group(*(f"plant.dy.{k}" for k in XYZ))[1500:-1]
     estimated = quiet.group(*(f"controller.dy_hat.{k}" for k in XYZ))[1501:]
     assert np.abs(true - estimated).max() < 0.01
 
 
-def test_jacobi_changes_the_efforts_by_less_than_4_percent(system: System, noisy: Result):
-    delayed = simulate(system, 100.0, 0.02, "jacobi")
-    change = np.divide(effort(delayed)["l2_effort"], effort(noisy)["l2_effort"]) - 1.0
+def test_jacobi_changes_the_efforts_by_less_than_4_percent(system: System, noisy: Table):
+    delayed = run(system, 100.0, 0.02, "jacobi")
+    change = np.divide(indices(delayed)["l2_effort"], indices(noisy)["l2_effort"]) - 1.0
     assert np.abs(change).max() < 0.04
     assert np.abs(change).max() > 1e-6, "the order must make a difference"
 
 
-def test_true_control_point_is_the_measured_one_without_noise(quiet: Result, noisy: Result):
+def test_true_control_point_is_the_measured_one_without_noise(quiet: Table, noisy: Table):
     measured = quiet.group(*(f"plant.y.{k}" for k in XYZ))
     np.testing.assert_allclose(true_control_point(quiet), measured, atol=1e-12)
     error = quiet.group(*(f"controller.e.{k}" for k in XYZ))[1:]
@@ -153,11 +153,10 @@ def test_true_control_point_is_the_measured_one_without_noise(quiet: Result, noi
     assert abs(noise.mean()) < 5e-5
 
 
-def test_finer_steps_converge_to_the_same_motion(system: System, quiet: Result):
+def test_finer_steps_converge_to_the_same_motion(system: System, quiet: Table):
     """Halving the step halves the distance of a first-order scheme from its limit."""
     halves = [
-        simulate(system.with_parameters(QUIET), 20.0, 0.02 / 2**n)["plant.eta.x"][-1]
-        for n in range(4)
+        run(system.with_parameters(QUIET), 20.0, 0.02 / 2**n)["plant.eta.x"][-1] for n in range(4)
     ]
     differences = np.abs(np.diff(halves))
     assert quiet["plant.eta.x"][1000] == halves[0]
@@ -177,52 +176,40 @@ def simple_jacobi_host(
     system: System, initial_exchange: bool, innovation_gate: float = 1.0
 ) -> np.ndarray:
     """Position of the vehicle after 100 s in a host that knows no more than it must."""
-    with TemporaryDirectory(prefix="auvfmu") as folder:
-        fmus = {}
-        for name, component in system.components.items():
-            unpacked = Path(folder, name)
-            fmpy.extract(component.fmu, unzipdir=unpacked)
-            fmus[name] = FMU2Slave(
-                instanceName=name,
-                guid=component.description.guid,
-                modelIdentifier=component.description.coSimulation.modelIdentifier,
-                unzipDirectory=str(unpacked),
-            )
-            fmus[name].instantiate()
-        gate = system.components["controller"].variables["innovation_gate"].valueReference
-        fmus["controller"].setReal([gate], [innovation_gate])
+    wires: dict[tuple[str, str], tuple[list[int], list[int]]] = {}
+    for connection in system.connections:
+        source, target = connection.source, connection.target
+        outs, ins = wires.setdefault((source.component, target.component), ([], []))
+        outs.append(system.components[source.component].variables[source.port].valueReference)
+        ins.append(system.components[target.component].variables[target.port].valueReference)
 
-        wires: dict[tuple[str, str], tuple[list[int], list[int]]] = {}
-        for connection in system.connections:
-            source, target = connection.source, connection.target
-            outs, ins = wires.setdefault((source.component, target.component), ([], []))
-            outs.append(system.components[source.component].variables[source.port].valueReference)
-            ins.append(system.components[target.component].variables[target.port].valueReference)
+    with TemporaryDirectory(prefix="auvfmu") as folder, ExitStack() as stack:
+        instances = {
+            name: stack.enter_context(unpacked(component.fmu, Path(folder, name), name))
+            for name, component in system.components.items()
+        }
 
         def read() -> list[list[float]]:
-            return [fmus[source].getReal(outs) for (source, _), (outs, _) in wires.items()]
+            return [
+                instances[source].read("Real", outs) for (source, _), (outs, _) in wires.items()
+            ]
 
         def write(values: list[list[float]]) -> None:
             for ((_, target), (_, ins)), numbers in zip(wires.items(), values, strict=True):
-                fmus[target].setReal(ins, numbers)
+                instances[target].write("Real", ins, numbers)
 
-        for fmu in fmus.values():
-            fmu.setupExperiment(startTime=0.0)
-            fmu.enterInitializationMode()
+        instances["controller"].set(innovation_gate=innovation_gate)
+        for instance in instances.values():
+            instance.fmu.setupExperiment(startTime=0.0)
+            instance.fmu.enterInitializationMode()
         for _ in range(3 if initial_exchange else 0):
             write(read())
-        for fmu in fmus.values():
-            fmu.exitInitializationMode()
-        values = [[0.0] * len(outs) for outs, _ in wires.values()]
-        if initial_exchange:
-            values = read()
-        for k in range(STEPS):
+        for instance in instances.values():
+            instance.fmu.exitInitializationMode()
+        values = read() if initial_exchange else [[0.0] * len(outs) for outs, _ in wires.values()]
+        for _ in range(STEPS):
             write(values)
-            for fmu in fmus.values():
-                fmu.doStep(k * 0.02, 0.02)
+            for instance in instances.values():
+                instance.step()
             values = read()
-        position = [system.components["plant"].variables[f"eta.{k}"].valueReference for k in XYZ]
-        final = np.array(fmus["plant"].getReal(position))
-        for fmu in fmus.values():
-            fmu.freeInstance()
-        return final
+        return np.array([instances["plant"].get(f"eta.{k}") for k in XYZ])

@@ -19,9 +19,8 @@ from orchestrator.experiments.scenario import names
 
 
 @pytest.fixture
-def workplace(dist: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder in which the bundle has been built, as the current one."""
-    shutil.copytree(dist, tmp_path / "fmus" / "dist")
+def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder as the current one."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -40,13 +39,20 @@ def test_build_writes_every_fmu_and_the_bundle_once(workplace, capsys):
     assert {p: p.stat().st_mtime_ns for p in (workplace / "elsewhere").iterdir()} == before
 
 
-def test_run_builds_what_is_missing_or_stale(workplace):
-    stale = workplace / "fmus/dist/build.json"
+def test_build_replaces_what_is_missing_or_stale(dist, workplace):
+    shutil.copytree(dist, workplace / "bundle")
+    stale = workplace / "bundle/build.json"
     stale.write_text('{"fingerprint": "of other sources"}')
-    (workplace / "fmus/dist/AuvPlant.fmu").unlink()
-    assert main(["run", "fig4", "--stop-time", "0.1"]) == 0
-    assert (workplace / "fmus/dist/AuvPlant.fmu").is_file()
+    (workplace / "bundle/AuvPlant.fmu").unlink()
+    assert main(["build", "--out", "bundle"]) == 0
+    assert (workplace / "bundle/AuvPlant.fmu").is_file()
     assert "other" not in stale.read_text()
+
+
+def test_run_writes_into_its_folder_alone(workplace):
+    assert main(["run", "fig4", "--stop-time", "0.1"]) == 0
+    assert files(workplace) == {"results"}
+    assert files(workplace / "results") == {"fig4"}
 
 
 def test_list_names_the_scenarios(capsys):
@@ -58,7 +64,8 @@ def test_run_writes_table_metrics_and_figures(workplace, capsys):
     assert main(["run", "fig4", "--stop-time", "2", "--set", "plant.noise.std=0"]) == 0
     folder = workplace / "results" / "fig4"
     figures = {f"{stem}.{end}" for stem in ("fig4", "fig4-velocity") for end in ("png", "svg")}
-    assert files(folder) == {"result.csv", "metrics.json", "certificates.csv"} | figures
+    tables = {"result.csv", "metrics.json", "certificates.csv", "run.json"}
+    assert files(folder) == tables | figures
     table = read_csv(folder / "result.csv")
     assert table.dtype.names[0] == "time"
     assert len(table) == 101
@@ -76,10 +83,12 @@ def test_same_run_gives_the_same_files(workplace):
     for name in ("a", "b"):
         assert main(["run", "fig4", "--stop-time", "1", "--out", name]) == 0
     for path in (workplace / "a").iterdir():
-        assert path.read_bytes() == (workplace / "b" / path.name).read_bytes(), path.name
+        # The record says when and with which command.
+        if path.name != "run.json":
+            assert path.read_bytes() == (workplace / "b" / path.name).read_bytes(), path.name
 
 
-def test_own_scenario_file_and_ssp_run_the_same_way(workplace):
+def test_own_scenario_file_and_ssp_run_the_same_way(dist, workplace):
     (workplace / "mine.toml").write_text(
         'title = "Mine"\nstop_time = 0.2\n[parameters]\nplant.noise.std = 0.0\n'
         '"controller.K1[1]" = 12.0\n'
@@ -87,7 +96,8 @@ def test_own_scenario_file_and_ssp_run_the_same_way(workplace):
     assert main(["run", "mine.toml"]) == 0
     values = json.loads((workplace / "results/mine/metrics.json").read_text())
     assert values["parameters"] == {"controller.K1[1]": 12.0, "plant.noise.std": 0.0}
-    assert main(["run", "fmus/dist/auv.ssp", "--stop-time", "0.2", "--out", "from_ssp"]) == 0
+    archive = str(dist / "auv.ssp")
+    assert main(["run", archive, "--stop-time", "0.2", "--out", "from_ssp"]) == 0
     assert (workplace / "from_ssp" / "result.csv").is_file()
 
 
@@ -105,8 +115,8 @@ def test_comparison_runs_both_and_changes_both_where_both_have_it(workplace):
     assert pd["velocities_reaching_controller"] == ["plant.dy.x", "plant.dy.y", "plant.dy.z"]
 
 
-def test_own_component_takes_the_place_of_another(workplace):
-    shutil.copy("fmus/dist/PdController.fmu", "mine.fmu")
+def test_own_component_takes_the_place_of_another(dist, workplace):
+    shutil.copy(dist / "PdController.fmu", "mine.fmu")
     (workplace / "mine.toml").write_text(
         'stop_time = 0.2\n[components]\ncontroller = "mine.fmu"\n'
         '[wires]\n"controller.dy" = "plant.dy"\n'
@@ -181,7 +191,7 @@ def test_termination_keeps_the_rows_and_leaves_nothing_behind(workplace):
     temporary = workplace / "temporary"
     temporary.mkdir()
     process = subprocess.Popen(
-        [sys.executable, "-m", "orchestrator.commands.main", "run", "fig4", "--step", "0.0005"],
+        [sys.executable, "-m", "orchestrator", "run", "fig4", "--step", "0.0005"],
         env={**os.environ, "TMPDIR": str(temporary)}, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     # Unpacked FMUs are the sign that the run has begun; a slow machine takes its time.
@@ -222,18 +232,22 @@ def test_animation_is_written(workplace):
         (["run", "fig4", "--out", "file/below"], "--out"),
         (["build", "--out", "file/below"], "cannot build"),
         (["run", "wire.toml"], "controller has no inputs dy.*"),
-        (["run", "wires.toml"], "something else than names"),
+        (["run", "wires.toml"], "not a table of names"),
         (["run", "only.toml"], "no such component"),
         (["run", "bool.toml"], "wrong type"),
         (["run", "compare.toml"], "no scenario 'nosuch'"),
         (["run", "fig4", "--stop-time", "1e300"], "steps"),
         (["run", "fig4", "--step", "1e-300"], "steps"),
         (["run", "fig4", "--set", "plant.noise.seed=4294967297"], "must be at most"),
+        (["run", "fig4", "--set", "controller.K1=20"], "did you mean K1[1]"),
+        (["run", "fig4", "--interval", "0"], "must be positive"),
+        (["run", "fig4", "--columns", "plant.tua.*"], "no column matches"),
+        (["run", "unwired.toml"], "no wire 'plant.tua' to remove; did you mean plant.tau"),
         (["run", "fig4", "--stop-time", "0.1", "--out", "taken"], "cannot write into"),
         (["gains", "--set", "plant.ell=0"], "must be at least"),
         (["gains", "--set", "controller.K1[1]=nan"], "must be finite"),
         (["run", "missing.toml"], "no such FMU"),
-        (["gains", "--set", "controller.lambda=much"], "not a Real"),
+        (["gains", "--set", "controller.lambda=much"], "not a real number"),
         (["gains", "--set", "controller.saturation=sigmoid"], "use one of tanh, algebraic"),
         (["animate", "fig4", "--stop-time", "0.1", "--out", "film.avi"], "write a .gif"),
     ],
@@ -249,6 +263,7 @@ def test_bad_input_is_one_line_and_status_2(workplace, capsys, arguments, reason
     (workplace / "wires.toml").write_text('[wires]\n"plant.tau" = 5')
     (workplace / "only.toml").write_text('only = ["pilot"]')
     (workplace / "bool.toml").write_text("stop_time = true")
+    (workplace / "unwired.toml").write_text('[wires]\n"plant.tua" = false')
     (workplace / "compare.toml").write_text('stop_time = 0.1\ncompare = "nosuch"')
     (workplace / "taken" / "result.csv").mkdir(parents=True)
     (workplace / "missing.toml").write_text('[components]\ncontroller = "missing.fmu"')

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from orchestrator.exchange.hosts import HOSTS, compare
-from orchestrator.exchange.reference import verify
-from orchestrator.experiments import bundle
+from orchestrator.exchange.verify import verify
 from orchestrator.experiments.scenario import read_scenario
+from orchestrator.experiments.wiring import closed_loop
 
 LIBDIR = sysconfig.get_config_var("LIBDIR")
 
@@ -27,7 +27,7 @@ def test_host_gives_the_numbers_of_our_jacobi_master(dist: Path, host: str, scen
         pytest.skip(f"{HOSTS[host].package} is not installed")
     if host == "fmpy-ssp" and scenario != "fig4":
         pytest.skip("fmpy.ssp ignores parameter sets")
-    system = bundle.closed_loop(dist, read_scenario(scenario))
+    system = closed_loop(dist, read_scenario(scenario))
     [verdict] = compare(system, [host], 500, 0.02)
     assert verdict.failure is None
     assert verdict.deviation <= HOSTS[host].bound
@@ -37,7 +37,7 @@ def test_missing_host_is_reported_and_does_not_end_the_others(dist: Path, monkey
     monkeypatch.setitem(
         HOSTS, "ghost", HOSTS["ecos"].__class__("no-such-package", HOSTS["ecos"].run)
     )
-    system = bundle.closed_loop(dist)
+    system = closed_loop(dist)
     verdicts = compare(system, ["ghost", "fmpy-ssp"], 50, 0.02)
     assert "not installed" in str(verdicts[0].failure)
     assert verdicts[1].failure is None
@@ -56,5 +56,5 @@ def test_ecos_command_line_runs_the_ssp_with_an_empty_environment(dist: Path, tm
         check=False, capture_output=True, text=True,
     )  # fmt: skip
     assert process.returncode == 0, process.stdout + process.stderr
-    said = verify(tmp_path / "auv.csv", bundle.closed_loop(dist), 1e-5)
+    said = verify(tmp_path / "auv.csv", closed_loop(dist), 1e-5)
     assert "agree over 5 s, in jacobi order" in said

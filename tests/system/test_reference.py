@@ -8,19 +8,22 @@ import numpy as np
 import pytest
 from fmpy.util import read_csv, read_ref_opt_file
 
+from fmus.packaging.discovery import components
 from orchestrator.errors import InputError
-from orchestrator.exchange.reference import reference_outputs, verify
-from orchestrator.experiments import bundle
-from orchestrator.master.simulation import simulate
-from orchestrator.system.structure import System, read_component
+from orchestrator.exchange.reference import reference_outputs
+from orchestrator.exchange.verify import verify
+from orchestrator.experiments.wiring import closed_loop
+from orchestrator.system.component import read_component
+from orchestrator.system.structure import System
+from support.runs import run
 
 COMMITTED = Path(__file__).parents[2] / "reference"
-NAMES = ["AuvPlant", "DisturbanceGenerator", "MotionPlanner", "ObserverController", "PdController"]
+NAMES = list(components())
 
 
 @pytest.fixture(scope="module")
 def system(dist: Path) -> System:
-    return bundle.closed_loop(dist)
+    return closed_loop(dist)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -43,13 +46,13 @@ def test_a_fresh_run_of_the_system_is_the_reference(system: System):
 
 def test_own_table_is_verified_in_its_order(system: System, tmp_path: Path):
     path = tmp_path / "ours.csv"
-    simulate(system, 2.0, 0.02).write_csv(path)
+    run(system, 2.0, 0.02).write_csv(path)
     assert "in gauss-seidel order" in verify(path, system, 1e-12)
 
 
 def test_table_of_another_tool_is_understood(system: System, tmp_path: Path):
     """Other separators, a prefix, quotes, Booleans as words, every fifth row, fewer columns."""
-    result = simulate(system, 2.0, 0.02, "jacobi")
+    result = run(system, 2.0, 0.02, "jacobi")
     path = tmp_path / "theirs.csv"
     rows = zip(result.time[::5], result["plant.eta.x"][::5], strict=True)
     lines = ['"Time", "auv.plant::eta.x[REAL]","controller.fault","controller.saturation"']
@@ -59,7 +62,7 @@ def test_table_of_another_tool_is_understood(system: System, tmp_path: Path):
 
 
 def test_first_port_that_differs_is_named(system: System, tmp_path: Path):
-    result = simulate(system, 2.0, 0.02, "jacobi")
+    result = run(system, 2.0, 0.02, "jacobi")
     result.rows[60:, result.columns.index("planner.y_d.z") + 1] += 1e-3
     result.rows[80:, result.columns.index("plant.eta.x") + 1] += 1.0
     result.write_csv(tmp_path / "wrong.csv")

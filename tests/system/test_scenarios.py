@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.analysis.certificates import COLUMNS, certificates, velocities_reaching
-from orchestrator.analysis.metrics import effort, final_error, tracking_error
-from orchestrator.experiments import bundle
+from orchestrator.analysis.certificates import COLUMNS, certificates
+from orchestrator.analysis.metrics import indices
+from orchestrator.analysis.sensors import velocities_reaching
+from orchestrator.analysis.signals import tracking_error
 from orchestrator.experiments.scenario import names, read_scenario
-from orchestrator.master.result import Result
-from orchestrator.master.simulation import simulate
+from orchestrator.experiments.wiring import closed_loop
+from orchestrator.master.table import Table
 from orchestrator.paper.published import (
     EFFORT_PD,
     EFFORT_PROPOSED,
@@ -23,9 +24,12 @@ from orchestrator.paper.published import (
     total_variation_until,
     turning_radius,
 )
-from orchestrator.system.structure import PortName, System
+from orchestrator.system.names import PortName
+from orchestrator.system.structure import System
+from support.runs import final_error
+from support.runs import run as simulated
 
-Runner = Callable[..., Result]
+Runner = Callable[..., Table]
 
 
 @pytest.fixture(scope="module")
@@ -33,9 +37,9 @@ def run(dist: Path) -> Runner:
     """Run a scenario once, with changes given as `component__parameter=value`."""
 
     @cache
-    def runner(name: str, order: str = "gauss-seidel", **changes: float) -> Result:
+    def runner(name: str, order: str = "gauss-seidel", **changes: float) -> Table:
         scenario = read_scenario(name)
-        system = bundle.closed_loop(dist, scenario).with_parameters(
+        system = closed_loop(dist, scenario).with_parameters(
             {
                 PortName(component, name.replace("__", ".")): value
                 for component, name, value in (
@@ -44,7 +48,7 @@ def run(dist: Path) -> Runner:
             }
         )
         assert scenario.stop_time is not None
-        result = simulate(system, scenario.stop_time, 0.02, order)
+        result = simulated(system, scenario.stop_time, 0.02, order)
         assert result.failure is None
         return result
 
@@ -52,11 +56,11 @@ def run(dist: Path) -> Runner:
 
 
 def system_of(name: str, dist: Path) -> System:
-    return bundle.closed_loop(dist, read_scenario(name))
+    return closed_loop(dist, read_scenario(name))
 
 
-def variation(result: Result) -> float:
-    return sum(effort(result)["total_variation"])
+def variation(result: Table) -> float:
+    return sum(indices(result)["total_variation"])
 
 
 def test_all_figures_are_there():
@@ -104,31 +108,31 @@ def test_smallest_turning_radius_is_that_of_the_printed_equations(dist: Path):
     system = system_of("fig3b", dist).with_parameters(
         {PortName("plant", f"tau.{k}"): value for k, value in torques.items()}
     )
-    radius = turning_radius(simulate(system, 60.0, 0.02))
+    radius = turning_radius(simulated(system, 60.0, 0.02))
     assert radius == pytest.approx(np.hypot(u, v) / r, rel=1e-6)
     assert radius < 0.5 * TURNING_RADIUS
 
 
 def test_fig4_does_not_saturate(run: Runner):
-    assert not any(effort(run("fig4"))["saturated_fraction"])
-    assert not any(effort(run("fig4", plant__noise__std=0.0))["saturated_fraction"])
+    assert not any(indices(run("fig4"))["saturated_fraction"])
+    assert not any(indices(run("fig4", plant__noise__std=0.0))["saturated_fraction"])
 
 
 @pytest.mark.parametrize("eps_t", [10.0, 1.0])
 def test_fig5_proposed_does_not_saturate(run: Runner, eps_t: float):
-    assert not any(effort(run("fig5", controller__eps_t=eps_t))["saturated_fraction"])
+    assert not any(indices(run("fig5", controller__eps_t=eps_t))["saturated_fraction"])
 
 
 def test_fig5_pd_saturates_chatters_and_ends_more_accurate(run: Runner):
     proposed, pd = run("fig5"), run("fig5-pd")
-    assert all(effort(pd)["saturated_fraction"])
+    assert all(indices(pd)["saturated_fraction"])
     assert variation(pd) >= 3.0 * variation(proposed)
     assert (final_error(proposed) >= 5.0 * final_error(pd)).all()
 
 
 @pytest.mark.parametrize(("name", "published"), [("fig5", EFFORT_PROPOSED), ("fig5-pd", EFFORT_PD)])
 def test_published_efforts_are_met_within_a_factor_of_2(run: Runner, name, published):
-    ratio = np.divide(effort(run(name))["l2_effort"], published)
+    ratio = np.divide(indices(run(name))["l2_effort"], published)
     assert (ratio > 0.5).all()
     assert (ratio < 2.0).all()
 
@@ -155,7 +159,7 @@ def test_fig5_passes_the_vertical_without_a_jump(run: Runner):
 
 
 def test_fig7_needs_more_effort_under_more_disturbance(run: Runner):
-    efforts = [np.array(effort(run(f"fig7{letter}"))["l2_effort"]) for letter in "abc"]
+    efforts = [np.array(indices(run(f"fig7{letter}"))["l2_effort"]) for letter in "abc"]
     assert (efforts[0] < efforts[1]).all()
     assert (efforts[1] < efforts[2]).all()
 
@@ -174,14 +178,14 @@ def test_jacobi_order_makes_pd_chatter_and_leaves_the_proposed_controller_alone(
 
 
 def test_jacobian_as_printed_saturates_where_the_full_attitude_does_not(run: Runner):
-    printed = effort(run("fig5", controller__printed_jacobian=True))
+    printed = indices(run("fig5", controller__printed_jacobian=True))
     assert any(printed["saturated_fraction"])
     assert sum(printed["total_variation"]) > 3.0 * variation(run("fig5"))
 
 
 def test_noise_of_1_cm_saturates_and_1_mm_does_not(run: Runner):
-    assert min(effort(run("fig4", plant__noise__std=0.01))["peak_command"]) > 160.0
-    assert max(effort(run("fig4"))["peak_command"]) < 80.0
+    assert min(indices(run("fig4", plant__noise__std=0.01))["peak_command"]) > 160.0
+    assert max(indices(run("fig4"))["peak_command"]) < 80.0
 
 
 @pytest.mark.parametrize("name", ["fig4", "fig5", "fig6", "fig7a", "fig7b", "fig7c"])

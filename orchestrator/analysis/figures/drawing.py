@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from tqdm import tqdm
+
 from orchestrator.analysis.figures.comparison import COMPARISON, COMPARISON_ERRORS, OVERLAY
 from orchestrator.analysis.figures.layout import Rows, compose
 from orchestrator.analysis.figures.open_loop import SURGE, TURN
@@ -23,6 +25,9 @@ FIGURES: Mapping[str, Mapping[str, Rows]] = {
 }
 
 _FORMATS = ("png", "svg")
+
+#: Seconds before a bar appears on a terminal.
+_PATIENCE = 2.0
 
 
 def check_figure(kind: str) -> None:
@@ -60,7 +65,8 @@ def draw(
 
     """
     notes: list[str] = []
-    for suffix, rows in FIGURES[kind].items():
+    bar = tqdm(FIGURES[kind].items(), desc="drawing", delay=_PATIENCE, disable=None, leave=False)
+    for suffix, rows in bar:
         if stop():
             break
         figure, left_out = compose(title, rows, runs)

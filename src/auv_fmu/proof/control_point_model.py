@@ -126,11 +126,15 @@ def G_2(vehicle: Vehicle, theta: float, psi: float, ell: float) -> Matrix:
 def C_2(vehicle: Vehicle, theta: float, psi: float, dy: Matrix, ell: float) -> Matrix:
     """C_2 = -J^-T M_1 J^-1 dJ/dt J^-1 of (15), (3, 3) [kg/s].
 
+    C_2(eta, dy) has no sway and heave to turn by: the (u, q, r) that dJ/dt is taken at are those of
+    (13) with J_delta left out. With v and w the attitude turns differently, and P2.2 holds only for
+    the rate of M_2 that leaves them out too, which is how it is tested.
+
     Args:
         vehicle: parameters.
         theta, psi: pitch and yaw [rad].
         dy: velocity of the control point [m/s]; the attitude turns as (4) says for
-            (u, q, r) = J^-1 dy.
+            (u, q, r) = J^-1 dy, without sway and heave.
         ell: distance of the control point [m].
 
     """

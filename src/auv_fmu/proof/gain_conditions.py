@@ -16,7 +16,7 @@ from auv_fmu.vehicle import Vehicle
 class Bounds(NamedTuple):
     """Extreme eigenvalues of M_2 and D_2 over all attitudes (P2.1 and P2.6).
 
-    M_2 = R P^-T M_1 P^-1 R' with J = R P, and P has one entry 1 and two of size ell: the
+    M_2 = R P^-T M_1 P^-1 R^T with J = R P, and P has one entry 1 and two of size ell: the
     eigenvalues are those of M_1 over 1 and ell^2, at every attitude. D_2 is alike.
     """
 

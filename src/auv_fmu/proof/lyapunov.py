@@ -46,13 +46,13 @@ def composite_errors(
     return difference(dy, dy_r), difference(dy, dy_o)
 
 
-def potential(K2: Vector3, integral: Integral, e: Vector3, z: Vector3) -> float:
+def potential(e: Vector3, z: Vector3, K2: Vector3, integral: Integral) -> float:
     """The sums over k_2i of (34) and (55) [J].
 
     Args:
+        e, z: tracking and estimation error [m].
         K2: diagonal of K_2 [N].
         integral: of the saturation function.
-        e, z: tracking and estimation error [m].
 
     """
     return sum(k * (integral(e_i - z_i) + integral(z_i)) for k, e_i, z_i in zip(K2, e, z))
@@ -93,7 +93,7 @@ def lyapunov(
     """
     e, z, r_1, r_2 = errors
     return (
-        potential(K2, integral, e, z)
+        potential(e, z, K2, integral)
         + kinetic(vehicle, rotation, r_1, ell)
         + kinetic(vehicle, rotation, r_2, ell)
     )

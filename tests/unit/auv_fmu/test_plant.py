@@ -111,8 +111,8 @@ def test_vehicle_that_passes_the_vertical_keeps_a_unit_quaternion_and_does_not_j
 
 
 def test_noise_is_scaled_by_its_standard_deviation():
-    assert plant.measure((1.0, 2.0, 3.0), 0.5, (1.0, -1.0, 0.0)) == (1.5, 1.5, 3.0)
-    assert plant.measure((1.0, 2.0, 3.0), 0.0, (1.0, -1.0, 0.0)) == (1.0, 2.0, 3.0)
+    assert plant.measure((1.0, 2.0, 3.0), (1.0, -1.0, 0.0), 0.5) == (1.5, 1.5, 3.0)
+    assert plant.measure((1.0, 2.0, 3.0), (1.0, -1.0, 0.0), 0.0) == (1.0, 2.0, 3.0)
 
 
 @given(euler=vectors(angles, 3), position=vectors(speeds, 3))

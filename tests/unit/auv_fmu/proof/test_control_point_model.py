@@ -106,6 +106,7 @@ def test_p2_1_inertia_is_symmetric_and_bounded(theta, psi, x, ell):
 
 @given(theta=pitch_angles, psi=angles, dy=vectors(speeds, 3), x=vectors(speeds, 3))
 def test_p2_2_rate_of_inertia_minus_twice_coriolis_is_skew(theta, psi, dy, x):
+    """With the attitude turning as it does without sway and heave, as C_2 has it."""
     *_, dtheta, dpsi = kinematic_matrix(theta, psi) @ np.linalg.solve(J(theta, psi, ELL), dy)
     h = 1e-6
     M_2_dot = M_2(VEHICLE, theta + h * dtheta, psi + h * dpsi, ELL)

@@ -5,12 +5,14 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from orchestrator.analysis.metrics import effort, final_error
-from orchestrator.master.result import Result
-from orchestrator.system.structure import PortName
+from orchestrator.analysis.metrics import Metrics, indices
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.observer import Ending, Header
+from orchestrator.master.table import Table
+from orchestrator.system.names import PortName
 
 
-def result_of(**columns: np.ndarray) -> Result:
+def table_of(**columns: np.ndarray) -> Table:
     names = tuple(name.replace("__", ".") for name in columns)
     n = len(next(iter(columns.values())))
     parameters = {
@@ -19,10 +21,8 @@ def result_of(**columns: np.ndarray) -> Result:
         for k in "uqr"
     }
     parameters[PortName("plant", "ell")] = 0.35
-    result = Result(names, np.arange(n) * 0.001, "gauss-seidel", 0.001, parameters)
-    for row in np.column_stack(list(columns.values())):
-        result.append(row)
-    return result
+    rows = np.column_stack([np.arange(n) * 0.001, *columns.values()])
+    return Table.of(Header(names, Experiment((n - 1) * 0.001, 0.001), parameters), rows)
 
 
 def test_effort_of_a_known_signal():
@@ -31,8 +31,8 @@ def test_effort_of_a_known_signal():
     command = 3.0 * np.sin(2 * pi * t)
     applied = np.clip(command, -2.0, 2.0)
     zeros = np.zeros_like(t)
-    found = effort(
-        result_of(
+    found = indices(
+        table_of(
             plant__tau__u=command, plant__tau__q=zeros, plant__tau__r=command / 3,
             plant__tau_applied__u=applied, plant__tau_applied__q=zeros,
             plant__tau_applied__r=command / 3,
@@ -54,11 +54,31 @@ def test_final_error_is_the_largest_of_the_last_5_seconds():
     t = np.arange(8001) * 0.001
     zeros, ones = np.zeros_like(t), np.ones_like(t)
     far = np.where(t < 2.9, 9.0, 0.0)
-    found = final_error(
-        result_of(
+    found = indices(
+        table_of(
             plant__eta__x=far, plant__eta__y=ones, plant__eta__z=-2 * t, plant__eta__phi=zeros,
             plant__eta__theta=zeros, plant__eta__psi=zeros, planner__y_d__x=0.35 * ones,
             planner__y_d__y=zeros, planner__y_d__z=zeros,
         )
     )  # fmt: skip
-    assert found == pytest.approx([0.0, 1.0, 16.0])
+    assert found["final_error"] == pytest.approx([0.0, 1.0, 16.0])
+
+
+def test_indices_do_not_depend_on_the_blocks_in_which_rows_come():
+    """To the last bit, on numbers that round."""
+    random = np.random.default_rng(1)
+    columns = {
+        f"plant__{signal}__{k}": random.normal(scale=3.0, size=7001)
+        for signal in ("tau", "tau_applied")
+        for k in "uqr"
+    }
+    columns |= {f"plant__eta__{k}": random.normal(size=7001)
+                for k in ("x", "y", "z", "phi", "theta", "psi")}  # fmt: skip
+    columns |= {f"planner__y_d__{k}": random.normal(size=7001) for k in "xyz"}
+    table = table_of(**columns)
+    found = Metrics()
+    found.begin(table.header)
+    for start, end in ((0, 1), (1, 2), (2, 700), (700, 6000), (6000, 7001)):
+        found.take(table.rows[start:end])
+    found.end(Ending())
+    assert found.indices() == indices(table)

@@ -1,0 +1,56 @@
+"""Gains that the step cannot follow: known before a run, or seen in it."""
+
+from __future__ import annotations
+
+from auv_fmu.proof.gain_conditions import bounds
+from auv_fmu.proof.sampling import observer_rate, robust_rate
+from orchestrator.analysis.signals import ELL, THETA_HAT, VEHICLE, parameter, vehicle
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.table import Table
+from orchestrator.system.names import port_name
+from orchestrator.system.structure import System
+
+_K_D, _LAMBDA, _EPS_T = "controller.k_d", "controller.lambda", "controller.eps_t"
+_H_MAX = "controller.h_max"
+
+#: h p beyond which a mode of Euler's scheme changes its sign in every step, and grows.
+_REVERSES, _GROWS = 1.0, 2.0
+
+
+def cautions(system: System, experiment: Experiment) -> list[str]:
+    """What can be said before a run, in lines for the user."""
+    if not all(system.has(port_name(name)) for name in (_K_D, _LAMBDA, _H_MAX)):
+        return []
+
+    def value(name: str) -> float:
+        return float(system.value(port_name(name)) or 0.0)
+
+    h = min(experiment.step, value(_H_MAX))
+    h_p = h * observer_rate(value(_LAMBDA), value(_K_D))
+    if h_p <= _GROWS:
+        return []
+    return [
+        f"{_K_D} = {value(_K_D):g} 1/s is unstable with internal steps of {h:g} s: the observer's "
+        f"fastest mode has h p = {h_p:.3g} and grows above {_GROWS:g}; lower k_d or h_max"
+    ]
+
+
+def cautions_after(table: Table) -> list[str]:
+    """What a run has shown, in lines for the user.
+
+    theta_hat[1] is the part of rho_hat that is there at any speed.
+    """
+    if len(table) < 2 or table.missing(THETA_HAT[:1], (_EPS_T, _H_MAX, ELL, *VEHICLE)):
+        return []
+    rho_hat, eps_t = float(table[THETA_HAT[0]].max()), parameter(table, _EPS_T)
+    plant = vehicle(lambda name: parameter(table, name))
+    lambda_m2 = bounds(plant, parameter(table, ELL)).lambda_m2
+    h = min(table.header.experiment.step, parameter(table, _H_MAX))
+    h_p = h * robust_rate(rho_hat, eps_t, lambda_m2)
+    if h_p <= _REVERSES:
+        return []
+    return [
+        f"the robust term chatters: with theta_hat[1] up to {rho_hat:.3g} N and {_EPS_T} = "
+        f"{eps_t:g} W it has h p = {h_p:.3g} and reverses in every step above {_REVERSES:g}; "
+        "raise eps_t or take smaller steps"
+    ]

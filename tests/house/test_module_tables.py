@@ -1,0 +1,36 @@
+"""The table of modules in a package's docstring is complete and true."""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from pkgutil import iter_modules
+
+import pytest
+
+#: Packages with a table in which each module or subpackage has a line :mod:`.name`.
+PACKAGES = (
+    "auv_fmu",
+    "auv_fmu.proof",
+    "fmus.ports",
+    "fmus.slave",
+    "fmus.packaging",
+    "orchestrator",
+    "orchestrator.system",
+    "orchestrator.system.ssp",
+    "orchestrator.master",
+    "orchestrator.analysis",
+    "orchestrator.experiments",
+    "orchestrator.exchange",
+    "orchestrator.paper",
+    "orchestrator.commands",
+)
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_table_lists_every_module_of_its_package(name):
+    package = import_module(name)
+    listed = re.findall(r"^:mod:`\.(\w+)` +\S", package.__doc__ or "", re.MULTILINE)
+    assert len(listed) == len(set(listed))
+    modules = {module.name for module in iter_modules(package.__path__)}
+    assert set(listed) == modules - {"__main__"}

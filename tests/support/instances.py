@@ -1,0 +1,177 @@
+"""One instance of a component, driven by the names of its ports: as a class, or as an FMU."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import fmpy
+from fmpy.fmi2 import FMU2Slave
+
+from fmus.packaging.discovery import components
+from fmus.slave.component import Component
+
+#: Names of all components, and of those with inputs.
+NAMES = [*components()]
+WITH_INPUTS = [name for name in NAMES if name != "MotionPlanner"]
+
+
+def component(name: str) -> type[Component[Any, Any, Any, Any]]:
+    """The class of a component."""
+    found: type[Component[Any, Any, Any, Any]]
+    found = getattr(import_module(components()[name]), name)
+    return found
+
+
+class Variable(NamedTuple):
+    """What a host knows of a port."""
+
+    reference: int
+    kind: str
+    causality: str
+
+
+class Instance(ABC):
+    """What tests do with an instance, whatever runs it."""
+
+    def __init__(self, variables: Mapping[str, Variable]) -> None:
+        self.variables = variables
+        self.time = 0.0
+
+    @abstractmethod
+    def write(self, kind: str, references: list[int], values: list[Any]) -> None: ...
+
+    @abstractmethod
+    def read(self, kind: str, references: list[int]) -> Sequence[Any]: ...
+
+    @abstractmethod
+    def advance(self, h: float) -> bool: ...
+
+    def set(self, **values: Any) -> None:
+        """Set ports by their names, with two underscores for a dot."""
+        for name, value in values.items():
+            variable = self.variables[name.replace("__", ".")]
+            self.write(variable.kind, [variable.reference], [value])
+
+    def get(self, name: str) -> Any:
+        variable = self.variables[name]
+        return self.read(variable.kind, [variable.reference])[0]
+
+    def references(self, causality: str) -> list[int]:
+        """Of the Real ports, in their order."""
+        return [
+            variable.reference
+            for variable in self.variables.values()
+            if (variable.causality, variable.kind) == (causality, "Real")
+        ]
+
+    def outputs(self) -> list[float]:
+        return [*self.read("Real", self.references("output"))]
+
+    def excite(self, k: int) -> None:
+        """Inputs of no special value, all in one call as a master does it."""
+        references = self.references("input")
+        if references:
+            self.write("Real", references, [0.05 * ((i * 7 + k) % 11) - 0.2 for i in references])
+
+    def step(self, h: float = 0.02) -> bool:
+        accepted = self.advance(h)
+        self.time += h
+        return accepted
+
+    def run(self, first: int, last: int) -> list[list[float]]:
+        """The outputs after each of some excited steps."""
+        rows = []
+        for k in range(first, last):
+            self.excite(k)
+            assert self.step()
+            rows.append(self.outputs())
+        return rows
+
+
+class ClassInstance(Instance):
+    """A component as a Python class, initialised with some values."""
+
+    def __init__(self, name: str, **values: object) -> None:
+        self.component = component(name)
+        self.slave = self.component(instance_name="under_test")
+        self.ports = self.slave._store.ports
+        super().__init__(
+            {
+                port.name: Variable(reference, port.kind, port.causality)
+                for reference, port in enumerate(self.ports)
+            }
+        )
+        self.slave.setup_experiment(0.0)
+        self.set(**values)
+        self.slave.enter_initialization_mode()
+        self.slave.exit_initialization_mode()
+
+    def write(self, kind: str, references: list[int], values: list[Any]) -> None:
+        getattr(self.slave, f"set_{kind.lower()}")(references, values)
+
+    def read(self, kind: str, references: list[int]) -> Sequence[Any]:
+        read: Sequence[Any] = getattr(self.slave, f"get_{kind.lower()}")(references)
+        return read
+
+    def advance(self, h: float) -> bool:
+        return self.slave.do_step(self.time, h)
+
+    def messages(self) -> list[str]:
+        return [entry.msg for entry in self.slave.log_queue]
+
+
+class FmuInstance(Instance):
+    """An unpacked FMU, instantiated."""
+
+    def __init__(self, folder: Path, name: str = "under_test") -> None:
+        self.folder = folder
+        self.description = fmpy.read_model_description(folder)
+        super().__init__(
+            {
+                variable.name: Variable(variable.valueReference, variable.type, variable.causality)
+                for variable in self.description.modelVariables
+            }
+        )
+        self.fmu = FMU2Slave(
+            instanceName=name,
+            guid=self.description.guid,
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            unzipDirectory=str(folder),
+        )
+        self.fmu.instantiate()
+
+    def initialise(self, **values: Any) -> FmuInstance:
+        self.fmu.setupExperiment(startTime=0.0)
+        self.set(**values)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+        self.time = 0.0
+        return self
+
+    def write(self, kind: str, references: list[int], values: list[Any]) -> None:
+        getattr(self.fmu, f"set{kind}")(references, values)
+
+    def read(self, kind: str, references: list[int]) -> Sequence[Any]:
+        read: Sequence[Any] = getattr(self.fmu, f"get{kind}")(references)
+        return read
+
+    def advance(self, h: float) -> bool:
+        """Raises FMICallException where the step is refused."""
+        self.fmu.doStep(self.time, h)
+        return True
+
+
+@contextmanager
+def unpacked(fmu: Path, folder: Path, name: str = "under_test") -> Iterator[FmuInstance]:
+    """An FMU unpacked into a folder and instantiated, freed in the end."""
+    fmpy.extract(fmu, unzipdir=folder)
+    instance = FmuInstance(folder, name)
+    try:
+        yield instance
+    finally:
+        instance.fmu.freeInstance()

@@ -1,0 +1,23 @@
+"""Runs in memory."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from orchestrator.analysis.metrics import indices
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.simulation import simulate
+from orchestrator.master.table import Table
+from orchestrator.system.structure import System
+
+
+def run(system: System, stop_time: float, step: float, order: str = "gauss-seidel") -> Table:
+    """All rows of a run."""
+    table = Table()
+    simulate(system, Experiment(stop_time, step, order), [table])
+    return table
+
+
+def final_error(table: Table) -> np.ndarray:
+    """e_f of section 4.2 [m]."""
+    return np.array(indices(table)["final_error"])

@@ -1,0 +1,172 @@
+"""What a run leaves behind, however long it is and however it ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator import simulate
+from orchestrator.commands.main import main
+from orchestrator.experiments.stored import read_result
+from orchestrator.master.files import read_columns, read_rows
+
+
+@pytest.fixture(autouse=True)
+def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def rows(path: str) -> np.ndarray:
+    return np.vstack(list(read_rows(Path(path))))
+
+
+def test_interval_and_columns_choose_from_the_same_numbers():
+    assert main(["run", "fig4", "--stop-time", "2", "--no-figures", "--out", "all"]) == 0
+    some = ["--interval", "0.5", "--columns", "plant.y,controller.tau.*"]
+    assert main(["run", "fig4", "--stop-time", "2", "--no-figures", "--out", "some", *some]) == 0
+    whole, columns = rows("all/result.csv"), read_columns(Path("all/result.csv"))
+    kept = read_columns(Path("some/result.csv"))
+    assert kept == (*(f"plant.y.{k}" for k in "xyz"), *(f"controller.tau.{k}" for k in "uqr"))
+    places = [0, *(1 + columns.index(name) for name in kept)]
+    assert np.array_equal(rows("some/result.csv"), whole[::25, places])
+    # Indices are those of all steps, whatever is kept.
+    assert Path("some/metrics.json").read_text() == Path("all/metrics.json").read_text()
+
+
+def test_outputs_alone():
+    arguments = ["--stop-time", "0.1", "--no-figures", "--columns", "outputs"]
+    assert main(["run", "fig4", *arguments]) == 0
+    columns = read_columns(Path("results/fig4/result.csv"))
+    assert "plant.y.x" in columns
+    assert "plant.tau.u" not in columns
+
+
+def test_parquet_holds_the_same_numbers():
+    pytest.importorskip("pyarrow")
+    assert main(["run", "fig4", "--stop-time", "1", "--no-figures"]) == 0
+    text = rows("results/fig4/result.csv")
+    assert main(["run", "fig4", "--stop-time", "1", "--no-figures", "--format", "parquet"]) == 0
+    assert np.array_equal(rows("results/fig4/result.parquet"), text)
+    assert not Path("results/fig4/result.csv").exists(), "of the earlier run"
+
+
+def test_record_says_what_was_run_and_with_what():
+    assert main(["run", "fig5", "--stop-time", "0.2", "--set", "plant.m11=26", "--no-figures"]) == 0
+    record = json.loads(Path("results/fig5/run.json").read_text())
+    assert record["command"][:3] == ["auv-fmu", "run", "fig5"]
+    assert record["scenario"] == "fig5"
+    assert record["experiment"] == {"stop_time": 0.2, "step": 0.02, "order": "gauss-seidel"}
+    assert record["parameters"]["plant.m11"] == 26.0
+    assert record["fmus"].keys() == {"plant", "controller", "disturbance", "planner"}
+    assert {"python", "auv-fmu", "fmpy", "numpy"} <= record["versions"].keys()
+    assert "fig5-pd/result.csv" in record["files"]
+    companion = json.loads(Path("results/fig5/fig5-pd/run.json").read_text())
+    assert companion["fmus"]["controller"]["file"] == "PdController.fmu"
+
+
+def test_stored_result_is_read_again_with_its_parameters():
+    assert main(["run", "fig4", "--stop-time", "1", "--no-figures"]) == 0
+    name, table = read_result(Path("results/fig4"))
+    again = simulate("fig4", stop_time=1.0)
+    assert name == "fig4"
+    assert np.array_equal(table.rows, again.rows)
+    assert table.parameters == again.parameters
+
+
+def start(*arguments: str) -> subprocess.Popen[str]:
+    """The command line in a process of its own, which has begun to step when this returns."""
+    process = subprocess.Popen(
+        [sys.executable, "-P", "-m", "orchestrator", "run", "fig4", *arguments],
+        stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
+    )  # fmt: skip
+    folder = Path("results/fig4")
+    for _ in range(600):
+        # Blocks are written when the buffer of the file is full.
+        if any(path.stat().st_size for path in folder.glob(".unfinished-*/result.csv")):
+            return process
+        time.sleep(0.1)
+    raise AssertionError(process.communicate()[1])
+
+
+def test_second_ctrl_c_leaves_the_figures_out_and_loses_nothing():
+    process = start("--stop-time", "20000")
+    for _ in range(2):
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.3)
+    _, error = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert "stopping" in error
+    table = rows("results/fig4/result.csv")
+    assert len(table) > 100
+    assert np.isfinite(table).all()
+    assert {path.name for path in Path("results/fig4").iterdir()} >= {"metrics.json", "run.json"}
+    assert not list(Path("results/fig4").glob(".unfinished-*"))
+
+
+def test_a_run_that_was_killed_leaves_the_earlier_result_as_it_was():
+    assert main(["run", "fig4", "--stop-time", "0.1", "--no-figures"]) == 0
+    before = Path("results/fig4/result.csv").read_bytes()
+    process = start("--stop-time", "20000")
+    process.kill()
+    process.communicate()
+    assert Path("results/fig4/result.csv").read_bytes() == before
+    assert json.loads(Path("results/fig4/run.json").read_text())["experiment"]["stop_time"] == 0.1
+
+
+def peak_memory(*arguments: str) -> int:
+    """Of a run on the command line [bytes]."""
+    process = subprocess.Popen(
+        [sys.executable, "-P", "-m", "orchestrator", "run", "fig4", *arguments],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    assert process.returncode == 0
+    return usage.ru_maxrss * 1024
+
+
+def test_memory_does_not_grow_with_the_length_of_a_run():
+    """60,000 rows of 95 values are 46 MB: none of it is kept."""
+    short = peak_memory("--stop-time", "20", "--no-figures")
+    long = peak_memory("--stop-time", "1200", "--no-figures", "--interval", "1")
+    assert long - short < 10e6
+
+
+def test_simulate_again_and_again_in_one_process_in_flat_memory():
+    """300 runs; 100 before, in which Python and the FMUs fill their caches."""
+
+    def resident() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    for _ in range(100):
+        simulate("fig4", stop_time=0.1)
+    before = resident()
+    for _ in range(300):
+        simulate("fig4", stop_time=0.1)
+    assert resident() - before < 3e6
+
+
+def test_gains_that_the_step_cannot_follow_are_told(capsys: pytest.CaptureFixture[str]):
+    """h p = 0.02 s * 501 1/s is far beyond 2; with steps of 2 ms it is 1."""
+    fast = ["run", "fig4", "--no-figures", "--set", "controller.k_d=500", "--stop-time", "0.1"]
+    assert main(fast) == 0
+    assert "warning: fig4: controller.k_d = 500 1/s is unstable" in capsys.readouterr().err
+    assert main([*fast, "--step", "0.002"]) == 0
+    assert "warning" not in capsys.readouterr().err
+
+
+def test_chatter_of_the_robust_term_is_told(capsys: pytest.CaptureFixture[str]):
+    quiet = ["run", "fig4", "--no-figures", "--stop-time", "60", "--set", "plant.noise.std=0"]
+    assert main(quiet) == 0
+    assert "warning" not in capsys.readouterr().err
+    assert main([*quiet, "--set", "controller.eps_t=0.01"]) == 0
+    assert "warning: fig4: the robust term chatters" in capsys.readouterr().err

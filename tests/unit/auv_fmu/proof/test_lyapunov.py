@@ -1,0 +1,48 @@
+"""(17), (19), (34) and (55) in the matrices of the paper, and the bounds (35)."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from auv_fmu.attitude import rotation_from_euler
+from auv_fmu.proof.control_point_model import M_2
+from auv_fmu.proof.gain_conditions import bounds
+from auv_fmu.proof.lyapunov import Errors, composite_errors, kinetic, lyapunov
+from auv_fmu.saturation import INTEGRALS, SATURATIONS
+from auv_fmu.vehicle import Vehicle
+from support.strategies import angles, lengths, pitch_angles, speeds, vectors
+
+VEHICLE, K2 = Vehicle(), (10.0, 20.0, 30.0)
+three = vectors(speeds, 3)
+
+
+@given(theta=pitch_angles, psi=angles, r=three, ell=lengths)
+def test_kinetic_term_is_that_of_the_matrix_m_2(theta, psi, r, ell):
+    expected = 0.5 * np.array(r) @ M_2(VEHICLE, theta, psi, ell) @ np.array(r)
+    found = kinetic(VEHICLE, rotation_from_euler(0.0, theta, psi), r, ell)
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+@given(dy=three, dy_d=three, dy_hat=three, e_z=three, z=three)
+def test_composite_errors_are_17_and_19(dy, dy_d, dy_hat, e_z, z):
+    """r_1 = de + Lambda Tanh(e - z) and r_2 = dz + Lambda Tanh(z)."""
+    s = SATURATIONS["tanh"]
+    r_1, r_2 = composite_errors(dy, dy_d, dy_hat, e_z, z, 0.7, s)
+    de, dz = np.subtract(dy, dy_d), np.subtract(dy, dy_hat)
+    np.testing.assert_allclose(r_1, de + 0.7 * np.tanh(e_z), atol=1e-14)
+    np.testing.assert_allclose(r_2, dz + 0.7 * np.tanh(z), atol=1e-14)
+
+
+@pytest.mark.parametrize("name", SATURATIONS)
+@given(euler=vectors(angles, 3), e=three, z=three, r_1=three, r_2=three, ell=lengths)
+def test_bounds_35_of_the_lyapunov_function(name, euler, e, z, r_1, r_2, ell):
+    """With the largest slope s'_M = 1, and without the terms in theta."""
+    errors = Errors(e, z, r_1, r_2)
+    V = lyapunov(VEHICLE, rotation_from_euler(*euler), errors, K2, INTEGRALS[name], ell)
+    known = bounds(VEHICLE, ell)
+    e_z = tuple(np.subtract(e, z))
+    r_square = np.dot(r_1, r_1) + np.dot(r_2, r_2)
+    s_ez, s_z = (np.array(SATURATIONS[name](x)[0]) for x in (e_z, z))
+    lower = 0.5 * np.dot(K2, s_ez**2 + s_z**2) + 0.5 * known.lambda_m2 * r_square
+    upper = 0.5 * max(K2) * (np.dot(e_z, e_z) + np.dot(z, z)) + 0.5 * known.lambda_M2 * r_square
+    assert lower * (1 - 1e-12) - 1e-12 <= V <= upper * (1 + 1e-12) + 1e-12

@@ -1,0 +1,120 @@
+"""Groups and flat values: made from each other, and held against the ports."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypedDict
+
+import pytest
+
+from fmus.ports.groups import ParameterSet, packing, slices, unpacking
+from fmus.ports.port import inputs, outputs, parameter, parameters
+from fmus.ports.quantities import NU, POSITION, TAU, per_axis
+from fmus.slave.component import Component, Nothing
+
+Vector3 = tuple[float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
+
+IN = (*inputs("tau", TAU, "Command"), *inputs("nu", NU, "Velocity"))
+OUT = (*outputs("y", POSITION, "Point"), *outputs("nu", NU, "Velocity"))
+
+
+class Inputs(NamedTuple):
+    tau: Vector3
+    nu: Vector6
+
+
+class Outputs(TypedDict):
+    y: Vector3
+    nu: Vector6
+
+
+class Reordered(NamedTuple):
+    nu: Vector6
+    tau: Vector3
+
+
+class Short(NamedTuple):
+    tau: Vector3
+    nu: Vector3
+
+
+class Incomplete(NamedTuple):
+    tau: Vector3
+
+
+class Renamed(NamedTuple):
+    tau: Vector3
+    velocity: Vector6
+
+
+def test_values_become_groups_in_the_order_of_the_ports():
+    unpack = unpacking(Inputs, IN, {})
+    assert unpack([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]) == Inputs(
+        tau=(1.0, 2.0, 3.0), nu=(4.0, 5.0, 6.0, 7.0, 8.0, 9.0)
+    )
+    assert isinstance(unpack([0.0] * 9), Inputs)
+
+
+def test_groups_become_values_in_the_order_of_the_ports_whatever_their_own():
+    pack = packing(Outputs, OUT)
+    groups: Outputs = {"nu": (4.0, 5.0, 6.0, 7.0, 8.0, 9.0), "y": (1.0, 2.0, 3.0)}
+    assert pack(groups) == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]
+
+
+def test_no_groups_and_one_are_groups_too():
+    assert unpacking(Nothing, (), {})([]) == Nothing()
+    assert unpacking(Incomplete, IN[:3], {})([1.0, 2.0, 3.0]) == Incomplete((1.0, 2.0, 3.0))
+
+
+@pytest.mark.parametrize("wrong", [Reordered, Short, Incomplete, Renamed])
+def test_groups_that_are_not_those_of_the_ports_are_found_at_once(wrong: type):
+    with pytest.raises(TypeError, match=wrong.__name__):
+        unpacking(wrong, IN, {})
+
+
+def test_a_field_may_bear_another_name_than_its_group_if_that_is_said():
+    assert unpacking(Renamed, IN, {"velocity": "nu"})([0.0] * 9).velocity == (0.0,) * 6
+
+
+def test_ports_of_a_group_lie_together():
+    assert slices(IN) == {"tau": slice(0, 3), "nu": slice(3, 9)}
+    with pytest.raises(TypeError, match="nu"):
+        slices((*IN[3:5], *IN[:3], *IN[5:]))
+
+
+class Gains(NamedTuple):
+    K1: Vector3
+    lambda_: float
+
+
+class Nested(NamedTuple):
+    gains: Gains
+    ell: float
+
+
+K1 = parameters("K1", (1.0, 2.0, 3.0), per_axis("N"), "Gain")
+LAMBDA = parameter("lambda", 4.0, "1/s", "Gain")
+ELL = parameter("ell", 5.0, "m", "Distance")
+
+
+def test_parameters_become_the_set_of_the_equations_field_by_field():
+    declared = ParameterSet(Nested, ell=ELL, gains=ParameterSet(Gains, K1=K1, lambda_=LAMBDA))
+    assert [port.name for port in declared.ports] == ["ell", "K1[1]", "K1[2]", "K1[3]", "lambda"]
+    values = {port.name: port.start for port in declared.ports}
+    assert declared.of(values) == Nested(Gains((1.0, 2.0, 3.0), 4.0), 5.0)
+
+
+@pytest.mark.parametrize(
+    "fields", [{"K1": K1}, {"K1": K1[:2], "lambda_": LAMBDA}, {"K1": K1, "lambda_": K1}]
+)
+def test_a_field_that_is_missing_or_of_another_size_is_found_at_once(fields):
+    with pytest.raises(TypeError):
+        ParameterSet(Gains, **fields)
+
+
+def test_a_component_whose_parameters_mean_nothing_is_no_component():
+    with pytest.raises(TypeError, match="Meaningless"):
+
+        class Meaningless(Component[Nothing, Inputs, Outputs, Nothing]):
+            ports = (*IN, *OUT, ELL)
+            parameter_set = ParameterSet(Nothing)

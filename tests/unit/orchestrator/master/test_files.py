@@ -1,0 +1,45 @@
+"""Tables written as they come, and read again to the last bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.files import FORMATS, count_rows, read_columns, read_rows
+from orchestrator.master.observer import Ending, Header
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_what_is_written_is_read_again_exactly(tmp_path: Path, ending: str):
+    if ending == "parquet":
+        pytest.importorskip("pyarrow")
+    path = tmp_path / f"result.{ending}"
+    rows = np.random.default_rng(1).normal(scale=1e3, size=(20_001, 4))
+    rows[5] = [1e-310, -0.0, 1.7976931348623157e308, np.nextafter(1.0, 2.0)]
+    file = FORMATS[ending](path)
+    file.begin(Header(("a.x", "a.y", "b.z"), Experiment(1.0, 0.1)))
+    for block in np.split(rows, [1, 600, 19_000]):
+        file.take(block)
+    file.end(Ending())
+    assert read_columns(path) == ("a.x", "a.y", "b.z")
+    assert count_rows(path) == len(rows)
+    read = list(read_rows(path))
+    assert len(read) > 1, "in blocks"
+    assert np.vstack(read).tobytes() == rows.tobytes()
+
+
+@pytest.mark.parametrize("text", ["", "x,y\n1,2\n", "time,a\n1,2\n3\n", "time,a\n1,much\n"])
+def test_what_is_no_table_is_refused(tmp_path: Path, text: str):
+    path = tmp_path / "odd.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match="not a table of a run"):
+        assert read_columns(path) != list(read_rows(path))
+
+
+def test_missing_file_is_refused(tmp_path: Path):
+    with pytest.raises(InputError, match="cannot be read"):
+        read_columns(tmp_path / "missing.csv")

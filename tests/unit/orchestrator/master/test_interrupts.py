@@ -1,0 +1,51 @@
+"""Signals are collected, not raised."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+from orchestrator.master.interrupts import Interrupts, held_interrupts
+
+
+def test_signals_are_collected_and_announced_at_once():
+    said: list[bool] = []
+    with held_interrupts(lambda interrupts: said.append(interrupts.urgent)) as interrupts:
+        assert not interrupts
+        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGINT)
+        assert interrupts
+    assert said == [False, True]
+
+
+def test_what_a_batch_system_sends_is_urgent():
+    with held_interrupts() as interrupts:
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert interrupts.urgent
+
+
+def test_inner_context_shares_the_signals_of_the_outer_one():
+    with held_interrupts() as outer, held_interrupts() as inner:
+        os.kill(os.getpid(), signal.SIGINT)
+        assert inner is outer
+
+
+def test_handlers_are_restored():
+    before = signal.getsignal(signal.SIGINT)
+    with held_interrupts():
+        assert signal.getsignal(signal.SIGINT) is not before
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_other_threads_hold_nothing():
+    found: list[Interrupts] = []
+
+    def work() -> None:
+        with held_interrupts() as interrupts:
+            found.append(interrupts)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert not found[0]
