@@ -7,17 +7,24 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.commands.options import OK, add_out
+from orchestrator.experiments.scenario import names
 from orchestrator.paper.report import write_report
 
 
 def add_to(commands: Any) -> None:
     """Add these commands to the parser."""
     report = commands.add_parser("report", help="run all scenarios and compare with the paper")
+    report.add_argument(
+        "scenarios",
+        nargs="*",
+        metavar="FILE.toml",
+        help="a scenario file to be in the report beside those of `auv-fmu list`",
+    )
     add_out(report, Path("results", "report"))
     report.set_defaults(action=_report)
 
 
 def _report(options: argparse.Namespace) -> int:
-    for path in write_report(options.out):
+    for path in write_report(options.out, [*names(), *options.scenarios], options.command):
         print(path)
     return OK

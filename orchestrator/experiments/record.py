@@ -56,7 +56,7 @@ def write_record(
             "order": experiment.order,
         },
         "fmus": {
-            component.name: {"file": component.fmu.name, "sha256": _digest(component.fmu)}
+            component.name: {"file": component.fmu.name, "sha256": digest_of(component.fmu)}
             for component in prepared.system.components.values()
         },
         "parameters": {str(name): value for name, value in header.parameters.items()},
@@ -84,5 +84,6 @@ def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
     )
 
 
-def _digest(path: Path) -> str:
+def digest_of(path: Path) -> str:
+    """SHA-256 of a file."""
     return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -1,11 +1,19 @@
-"""The paper's section 4: printed numbers and claims beside ours.
+"""The paper's section 4: printed numbers, claims, effects, report.
 
-==================  ==================================================================
-module              what it holds
-==================  ==================================================================
-:mod:`.published`   printed numbers, claims, and what the runs give
-:mod:`.effects`     figures of effects that the paper does not show
-:mod:`.batch`       many runs side by side
-:mod:`.report`      the page
-==================  ==================================================================
+======================  ==============================================================
+module                  what it holds
+======================  ==============================================================
+:mod:`.published`       what the paper prints
+:mod:`.readings`        the points where it is silent or contradicts itself, in short
+:mod:`.formatting`      numbers, tables and pictures in Markdown
+:mod:`.workers`         processes on the cores that end when the user says so
+:mod:`.runs`            a scenario with changes
+:mod:`.outcomes`        what is kept of runs, each made once
+:mod:`.measures`        numbers of a run that claims speak of
+:mod:`.claims`          each claim of the paper, judged by the runs named beside it
+:mod:`.effects`         what runs show when they are compared
+:mod:`.sections`        a section for each scenario
+:mod:`.page`            Markdown as one HTML page
+:mod:`.report`          all of it put together
+======================  ==============================================================
 """

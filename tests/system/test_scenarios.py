@@ -17,13 +17,8 @@ from orchestrator.analysis.signals import tracking_error
 from orchestrator.experiments.scenario import names, read_scenario
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.table import Table
-from orchestrator.paper.published import (
-    EFFORT_PD,
-    EFFORT_PROPOSED,
-    TURNING_RADIUS,
-    total_variation_until,
-    turning_radius,
-)
+from orchestrator.paper.measures import total_variation_until, turning_radius
+from orchestrator.paper.published import EFFORT_PD, EFFORT_PROPOSED, TURNING_RADIUS
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from support.runs import final_error

@@ -1,0 +1,360 @@
+"""Every printed number and claim of section 4 that a simulation can be held against.
+
+A claim is a function of the outcomes of the runs that are named beside it. The report makes these
+runs, calls every claim, and prints what it finds in the order of this file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from auv_fmu.control_point import ELL
+from auv_fmu.output_feedback import Gains
+from auv_fmu.proof.gain_conditions import bounds, conditions
+from auv_fmu.saturation import MAXIMUM_SLOPE
+from auv_fmu.vehicle import Vehicle
+from orchestrator.paper.formatting import actuator_values, numbers
+from orchestrator.paper.measures import (
+    largest_error_after,
+    largest_estimate,
+    total_variation_until,
+    turning_radius,
+)
+from orchestrator.paper.outcomes import Outcome
+from orchestrator.paper.published import (
+    EFFORT_PD,
+    EFFORT_PROPOSED,
+    FINAL_ERROR_PD,
+    FINAL_ERROR_PROPOSED,
+    TURNING_RADIUS,
+)
+from orchestrator.paper.runs import Run
+
+#: The runs of the figures, and what the claims change in them.
+FIVE, FIVE_PD = Run("fig5"), Run("fig5-pd")
+SIX, SIX_PD = Run("fig6"), Run("fig6-pd")
+SEVEN = (Run("fig7a"), Run("fig7b"), Run("fig7c"))
+QUIET = Run("fig4", {"plant.noise.std": 0.0})
+SHARP = Run("fig5", {"controller.eps_t": 1.0})
+TURNING = Run("fig3b", {"plant.tau.u": 80.0, "plant.tau.q": 0.0, "plant.tau.r": 80.0})
+
+#: A signal that is squared and integrated.
+_SQUARED = "·√s"
+
+
+class Finding(NamedTuple):
+    """What our runs say to a claim.
+
+    Attributes:
+        ours: what they give.
+        verdict: whether that is what the paper says.
+
+    """
+
+    ours: str
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Something that the paper says.
+
+    Attributes:
+        title: where it says it, and of what.
+        published: what it says.
+        runs: whose outcomes it is judged by.
+        judge: finds what these say.
+
+    """
+
+    title: str
+    published: str
+    runs: tuple[Run, ...]
+    judge: Callable[..., Finding]
+
+    def finding(self, outcomes: Sequence[Outcome]) -> Finding:
+        """What the outcomes of the runs say."""
+        for outcome in outcomes:
+            if outcome.failure is not None:
+                return Finding(f"a run ended early: {outcome.failure}", "none")
+        return self.judge(*outcomes)
+
+
+#: All claims, in the order of the paper.
+CLAIMS: list[Claim] = []
+
+
+def claim(
+    title: str, published: str, *runs: Run
+) -> Callable[[Callable[..., Finding]], Callable[..., Finding]]:
+    """Register a function of the outcomes of some runs as the judge of a claim."""
+
+    def register(judge: Callable[..., Finding]) -> Callable[..., Finding]:
+        CLAIMS.append(Claim(title, published, runs, judge))
+        return judge
+
+    return register
+
+
+def said(holds: bool) -> str:
+    """Whether it is what the paper says."""
+    return "agrees" if holds else "**differs**"
+
+
+def ratio(ours: Sequence[float], published: Sequence[float]) -> str:
+    """Our numbers in parts of the published ones."""
+    return f"ratio {numbers(np.divide(ours, published).tolist())}"
+
+
+@claim(
+    "4.1: minimum turning radius under the largest surge force and yaw moment",
+    f"{TURNING_RADIUS:g} m",
+    TURNING,
+)
+def turning(run: Outcome) -> Finding:
+    """The radius of the circle, and its diameter, which is what may have been printed."""
+    radius = turning_radius(run.table)
+    return Finding(
+        f"{radius:.2f} m; its diameter {2 * radius:.3f} m",
+        f"{said(abs(radius / TURNING_RADIUS - 1.0) < 0.1)}, ratio {radius / TURNING_RADIUS:.2f}: "
+        f"so the printed equations have it (reading 11). The diameter is {2 * radius:.1f} m to the "
+        "digit that is printed",
+    )
+
+
+@claim("Fig. 4: the vehicle tracks the reference without saturation", "no saturation", QUIET)
+def no_saturation(quiet: Outcome) -> Finding:
+    """No step whose command is outside the limits of (3)."""
+    return Finding(
+        f"peaks {actuator_values(quiet.metrics['peak_command'])} of 80",
+        said(not any(quiet.metrics["saturated_fraction"])),
+    )
+
+
+@claim("Fig. 4: the tracking errors converge to a neighbourhood of the origin", "no numbers", QUIET)
+def convergence(quiet: Outcome) -> Finding:
+    """e_f within 0.1 m."""
+    error = quiet.metrics["final_error"]
+    return Finding(f"e_f {numbers(error)} m", said(max(error) < 0.1))
+
+
+@claim("Fig. 4: the estimated parameters are bounded", "no numbers", QUIET)
+def bounded_estimates(quiet: Outcome) -> Finding:
+    """A run of finite length can only fail to contradict this."""
+    largest = largest_estimate(quiet.table)
+    return Finding(
+        f"largest {largest:.3g}, still growing at {quiet.table.time[-1]:g} s; (22) cannot exceed "
+        "max(G |r|) / sigma",
+        said(bool(np.isfinite(largest))),
+    )
+
+
+@claim(
+    "4.2: control effort of the proposed controller (u, q, r); L2 norm, reading 6",
+    actuator_values(EFFORT_PROPOSED),
+    FIVE,
+)
+def effort_proposed(five: Outcome) -> Finding:
+    """The L2 norms beside the printed numbers."""
+    effort = five.metrics["l2_effort"]
+    return Finding(actuator_values(effort, _SQUARED), ratio(effort, EFFORT_PROPOSED))
+
+
+@claim(
+    "4.2: control effort of the PD controller (u, q, r); L2 norm, reading 6",
+    actuator_values(EFFORT_PD),
+    FIVE_PD,
+)
+def effort_pd(pd: Outcome) -> Finding:
+    """The L2 norms beside the printed numbers."""
+    effort = pd.metrics["l2_effort"]
+    return Finding(actuator_values(effort, _SQUARED), ratio(effort, EFFORT_PD))
+
+
+@claim(
+    "4.2: the same two rows by (59) as printed, with 1/T_f under the root",
+    f"{actuator_values(EFFORT_PROPOSED)}, and {actuator_values(EFFORT_PD)}",
+    FIVE,
+    FIVE_PD,
+)
+def effort_as_printed(five: Outcome, pd: Outcome) -> Finding:
+    """(59) itself."""
+    proposed, baseline = five.metrics["rms_effort"], pd.metrics["rms_effort"]
+    holds = np.allclose(proposed, EFFORT_PROPOSED, rtol=0.5)
+    return Finding(
+        f"{actuator_values(proposed)}, and {actuator_values(baseline)}",
+        f"{said(bool(holds))}: an RMS of signals within 80 cannot exceed 80 (reading 6)",
+    )
+
+
+@claim("4.2: e_f of the proposed controller (x, y, z)", f"{numbers(FINAL_ERROR_PROPOSED)} m", FIVE)
+def final_error_proposed(five: Outcome) -> Finding:
+    """e_f beside the printed numbers."""
+    error = five.metrics["final_error"]
+    return Finding(f"{numbers(error)} m", ratio(error, FINAL_ERROR_PROPOSED))
+
+
+@claim("4.2: the same with eps_t = 1 instead of 10", f"{numbers(FINAL_ERROR_PROPOSED)} m", SHARP)
+def final_error_sharp(sharp: Outcome) -> Finding:
+    """The paper may mean 10 for the PD controller alone."""
+    return final_error_proposed(sharp)
+
+
+@claim("4.2: e_f of the PD controller (x, y, z)", f"{numbers(FINAL_ERROR_PD)} m", FIVE_PD)
+def final_error_pd(pd: Outcome) -> Finding:
+    """e_f beside the printed numbers."""
+    error = pd.metrics["final_error"]
+    return Finding(f"{numbers(error)} m", ratio(error, FINAL_ERROR_PD))
+
+
+@claim(
+    "Fig. 5: the proposed controller does not saturate (eps_t = 10, and 1)",
+    "no saturation",
+    FIVE,
+    SHARP,
+)
+def proposed_does_not_saturate(five: Outcome, sharp: Outcome) -> Finding:
+    """With both values that the paper may mean."""
+    runs = (five.metrics, sharp.metrics)
+    return Finding(
+        "peaks " + ", and ".join(actuator_values(run["peak_command"]) for run in runs),
+        said(not any(any(run["saturated_fraction"]) for run in runs)),
+    )
+
+
+@claim("Fig. 5: the PD controller saturates", "saturation", FIVE_PD)
+def pd_saturates(pd: Outcome) -> Finding:
+    """All three actuators do."""
+    shares = [100 * share for share in pd.metrics["saturated_fraction"]]
+    return Finding(
+        f"{numbers(shares)} % of the steps, peaks {actuator_values(pd.metrics['peak_command'])}",
+        said(all(shares)),
+    )
+
+
+@claim(
+    "Fig. 5: the PD controller chatters where the proposed one is smooth",
+    "chattering",
+    FIVE,
+    FIVE_PD,
+)
+def pd_chatters(five: Outcome, pd: Outcome) -> Finding:
+    """By the total variation of the applied signals."""
+    proposed, baseline = sum(five.metrics["total_variation"]), sum(pd.metrics["total_variation"])
+    return Finding(
+        f"total variation {baseline:.4g} against {proposed:.4g} (N, N·m)",
+        f"{said(baseline > proposed)}, ratio {baseline / proposed:.3g}",
+    )
+
+
+@claim(
+    "Fig. 5: the PD controller ends more accurate (e_f, x, y, z)",
+    f"{numbers(np.divide(FINAL_ERROR_PROPOSED, FINAL_ERROR_PD).tolist())} times",
+    FIVE,
+    FIVE_PD,
+)
+def pd_is_accurate(five: Outcome, pd: Outcome) -> Finding:
+    """Along every axis."""
+    times = np.divide(five.metrics["final_error"], pd.metrics["final_error"])
+    return Finding(f"{numbers(times.tolist())} times", said(bool((times > 1.0).all())))
+
+
+@claim("Fig. 6: from 100 m the PD controller chatters severely", "severe chattering", SIX, SIX_PD)
+def pd_chatters_severely(six: Outcome, pd: Outcome) -> Finding:
+    """While both are on their way."""
+    proposed, baseline = (total_variation_until(run.table, 60.0) for run in (six, pd))
+    return Finding(
+        f"total variation of the first 60 s {baseline:.4g} against {proposed:.4g} (N, N·m)",
+        f"{said(baseline > proposed)}, ratio {baseline / proposed:.3g}",
+    )
+
+
+@claim(
+    "4.3, Remark 6: a larger eps_t makes the control smoother and less accurate",
+    "eps_t from 1 to 10",
+    SHARP,
+    FIVE,
+)
+def smoother_and_less_accurate(sharp: Outcome, five: Outcome) -> Finding:
+    """Total variation falls, e_f grows."""
+    runs = (sharp.metrics, five.metrics)
+    rough, smooth = (sum(run["total_variation"]) for run in runs)
+    exact, inexact = (max(run["final_error"]) for run in runs)
+    return Finding(
+        f"total variation {rough:.4g} to {smooth:.4g} (N, N·m), largest e_f {exact:.3g} to "
+        f"{inexact:.3g} m",
+        said(rough > smooth and exact < inexact),
+    )
+
+
+@claim(
+    "Fig. 7: larger disturbances need more effort",
+    "a larger adaptive gain and more chattering",
+    *SEVEN,
+)
+def more_effort(*sevens: Outcome) -> Finding:
+    """Effort, adaptive gain and total variation grow from (a) to (c)."""
+    efforts = [float(np.linalg.norm(run.metrics["l2_effort"])) for run in sevens]
+    estimates = [largest_estimate(run.table) for run in sevens]
+    variations = [sum(run.metrics["total_variation"]) for run in sevens]
+    return Finding(
+        f"|L2 effort| {numbers(efforts)} (N{_SQUARED}, N·m{_SQUARED}); largest estimate "
+        f"{numbers(estimates)}; total variation {numbers(variations)} (N, N·m)",
+        said(all(values == sorted(values) for values in (efforts, estimates, variations))),
+    )
+
+
+@claim(
+    "4.3: under very large disturbances the chattering is more than the actuators bear",
+    "not tolerable and feasible",
+    SEVEN[-1],
+)
+def intolerable_chattering(largest: Outcome) -> Finding:
+    """The largest disturbance that the paper shows."""
+    saturates = any(largest.metrics["saturated_fraction"])
+    return Finding(
+        f"peaks of (c) {actuator_values(largest.metrics['peak_command'])} of 80",
+        said(True)
+        if saturates
+        else "**not seen** in Fig. 7: at the largest disturbance it shows every command stays "
+        "within the limits",
+    )
+
+
+@claim("Fig. 7: the performance degrades gradually", "errors grow from (a) to (c)", *SEVEN)
+def gradual_degradation(*sevens: Outcome) -> Finding:
+    """By e_f."""
+    errors = [max(run.metrics["final_error"]) for run in sevens]
+    return Finding(f"largest e_f {numbers(errors)} m", said(bool((np.diff(errors) > 0).all())))
+
+
+@claim(
+    "Fig. 7: the same, by the largest error of any axis after the first 40 s",
+    "errors grow from (a) to (c)",
+    *SEVEN,
+)
+def gradual_degradation_on_the_way(*sevens: Outcome) -> Finding:
+    """By the largest error once the start is forgotten."""
+    errors = [largest_error_after(run.table, 40.0) for run in sevens]
+    return Finding(
+        f"{numbers(errors)} m, when the waves turn at 72 s; 0.2 m holds for e_f, and in (a) "
+        "throughout",
+        said(errors == sorted(errors)),
+    )
+
+
+@claim("Theorem 1: the gains of section 4.1 meet (30)", "presumed")
+def gains_meet_the_condition() -> Finding:
+    """(30) with the gains as printed, which needs no run."""
+    gains = Gains()
+    [condition, *_] = conditions(
+        bounds(Vehicle(), ELL), gains.K1, gains.K2, gains.lambda_, gains.k_d, MAXIMUM_SLOPE["tanh"]
+    )
+    return Finding(
+        f"{condition.left:g}, needed: above {condition.right:g}",
+        f"{said(condition.margin > 0.0)}: {condition.verdict} (reading 10); `auv-fmu gains`",
+    )

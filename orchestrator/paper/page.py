@@ -1,0 +1,93 @@
+"""The report's Markdown as one HTML page that needs no other file."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+from string import Template
+from typing import NamedTuple
+
+from markdown_it import MarkdownIt
+from markdown_it.token import Token
+
+_TEMPLATE = Path(__file__).with_name("report.html")
+
+_MARKDOWN = MarkdownIt("commonmark", {"html": False}).enable("table")
+
+
+class Heading(NamedTuple):
+    """A heading of a text.
+
+    Attributes:
+        level: 1 for the title.
+        title: in Markdown.
+        anchor: what a link leads to, as GitHub names it too.
+
+    """
+
+    level: int
+    title: str
+    anchor: str
+
+
+def headings(text: str) -> list[Heading]:
+    """The headings of a text in Markdown."""
+    return list(_headings(_MARKDOWN.parse(text)))
+
+
+def _headings(tokens: Sequence[Token]) -> Iterator[Heading]:
+    """The headings among some tokens, which are given their anchors."""
+    seen: Counter[str] = Counter()
+    for token, inline in pairwise(tokens):
+        if token.type == "heading_open":
+            words = "".join(part.content for part in inline.children or ())
+            anchor = re.sub(r"[^\w -]", "", words.lower()).replace(" ", "-")
+            seen[anchor] += 1
+            if seen[anchor] > 1:
+                anchor += f"-{seen[anchor] - 1}"
+            token.attrSet("id", anchor)
+            yield Heading(int(token.tag[1:]), inline.content, anchor)
+
+
+def contents(text: str, deepest: int = 3) -> str:
+    """Links to the headings of a text below its title, down to a level."""
+    return "\n".join(
+        f"{'  ' * (heading.level - 2)}- [{heading.title}](#{heading.anchor})"
+        for heading in headings(text)
+        if 1 < heading.level <= deepest
+    )
+
+
+def html(text: str, folder: Path) -> str:
+    """A text in Markdown as a page, with the pictures of a folder within it."""
+    tokens = _MARKDOWN.parse(text)
+    [title, *_] = _headings(tokens)
+    _name_cells(tokens)
+    body = _MARKDOWN.renderer.render(tokens, _MARKDOWN.options, {})
+    body = re.sub(r'src="([^":]+\.png)"', lambda picture: _embedded(folder / picture[1]), body)
+    return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(title=title.title, body=body)
+
+
+def _name_cells(tokens: Sequence[Token]) -> None:
+    """Give each cell of a table the name of its column: narrow screens show it beside the cell."""
+    names: list[str] = []
+    column = 0
+    for token, inline in pairwise(tokens):
+        if token.type == "thead_open":
+            names = []
+        elif token.type == "th_open":
+            names.append(inline.content)
+        elif token.type == "tr_open":
+            column = 0
+        elif token.type == "td_open":
+            token.attrSet("data-name", names[column])
+            column += 1
+
+
+def _embedded(file: Path) -> str:
+    content = base64.b64encode(file.read_bytes()).decode()
+    return f'loading="lazy" src="data:image/png;base64,{content}"'

@@ -1,0 +1,99 @@
+"""The readings of `docs/readings.md` in short: the report must stand alone."""
+
+from __future__ import annotations
+
+import re
+
+#: By number: the heading of the point, and what it decides.
+READINGS: dict[int, tuple[str, str]] = {
+    1: (
+        "The plant has six degrees of freedom.",
+        "The controller is derived on five; the plant has roll too, with a righting moment that is "
+        "not given: ours is that of pitch, 5 N·m.",
+    ),
+    2: (
+        "The vertical.",
+        "The kinematics (1) have a pole at a pitch of 90 degrees, which Figs. 5 and 6 reach: the "
+        "plant integrates a quaternion.",
+    ),
+    3: (
+        "The Jacobian of a vehicle that rolls.",
+        "(11) is written for zero roll; the controller takes the whole attitude. "
+        "`printed_jacobian` restores (11) as printed.",
+    ),
+    4: (
+        "The observer.",
+        "(24) contradicts its initial values; the second derivative form (51) is integrated, from "
+        "the initial values as printed.",
+    ),
+    5: (
+        "Order of evaluation.",
+        "At t_k everything is evaluated, then all states advance by 20 ms: no delay in the loop.",
+    ),
+    6: (
+        "(59) is not what was tabulated.",
+        "The printed efforts have the size of (59) without 1/T_f under the root, the L2 norm of "
+        "the applied signals; both are computed.",
+    ),
+    7: (
+        "Not given at all:",
+        "the level of the noise, the end times, the initial roll, and for which controller "
+        "eps_t = 10 goes in Fig. 5. What is used is ours.",
+    ),
+    8: (
+        "(56):",
+        "sign(k) is the sign of the velocity in direction k, and sign(0) = 0; tau_w enters (2) "
+        "with a minus.",
+    ),
+    9: (
+        "nu in Tanh(nu rho r / eps_t)",
+        "is the constant 0.2785 of Lemma 2, no velocity.",
+    ),
+    10: (
+        "Gain conditions.",
+        "The paper's gains violate (30), which Remark 4 calls sufficient and conservative.",
+    ),
+    11: (
+        "Turning radius.",
+        "With the printed parameters (2) turns on a radius of 0.28 m, not 0.6 m; nothing was "
+        "changed to meet it.",
+    ),
+    12: (
+        "The acceleration of the reference",
+        "follows in closed form from the planner's state, without differences of samples.",
+    ),
+    13: (
+        "What results are held against:",
+        "every number and claim of section 4, in this report.",
+    ),
+    14: (
+        "P2.3 does not hold with C_2 as printed.",
+        "The proof uses it in (20) and (28); the controller is not affected.",
+    ),
+    15: (
+        "Two signals named almost alike.",
+        "dy_o of (18) and the state with a hat of (23) and (24) differ by k_d z; the control law "
+        "(21) takes the first.",
+    ),
+}
+
+#: Mentions outside headings.
+_MENTION = re.compile(r"(?<!# )\b[Rr]eadings? \d+(?:(?:, | to | and )\d+)*")
+
+
+def linked(text: str) -> str:
+    """Markdown in which every mention of a reading leads to its section."""
+
+    def link(number: re.Match[str]) -> str:
+        known = int(number[0]) in READINGS
+        return f"[{number[0]}](#reading-{number[0]})" if known else number[0]
+
+    return _MENTION.sub(lambda mention: re.sub(r"\d+", link, mention[0]), text)
+
+
+def section() -> str:
+    """The readings in Markdown, a heading each."""
+    return "\n\n".join(
+        f"#### Reading {number}\n\n**{heading}** {decision}"
+        for number, (heading, decision) in READINGS.items()
+    )

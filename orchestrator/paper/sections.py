@@ -1,0 +1,176 @@
+"""A section of the report for each scenario: its figure, its indices, and what in it is ours."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from operator import attrgetter
+from pathlib import Path
+from typing import Any
+
+from orchestrator.analysis.figures import FIGURES, Drawn, draw
+from orchestrator.errors import InputError, did_you_mean
+from orchestrator.experiments.scenario import Scenario, read_scenario
+from orchestrator.paper.formatting import actuator_values, numbers, picture, plain, table
+from orchestrator.paper.outcomes import Outcome, Outcomes
+from orchestrator.paper.runs import Run
+from orchestrator.system.names import port_name
+
+#: The parameter that decides whether a run has a twin without noise.
+_NOISE = "plant.noise.std"
+
+#: Rows of the table of indices: keys of metrics.json, what they are, and how they are written.
+_INDICES: Sequence[tuple[str, str, Callable[[Sequence[float]], str]]] = (
+    ("l2_effort", "L2 effort (u; q, r)", lambda values: actuator_values(values, "·√s")),
+    ("rms_effort", "RMS effort (59) (u; q, r)", actuator_values),
+    ("peak_command", "peak command (u; q, r)", actuator_values),
+    ("saturated_fraction", "share of saturated steps (u, q, r)", numbers),
+    ("total_variation", "total variation (u; q, r)", actuator_values),
+    ("final_error", "e_f of the last 5 s (x, y, z)", lambda values: f"{numbers(values)} m"),
+)
+
+
+@dataclass(frozen=True)
+class Section:
+    """A scenario in the report.
+
+    Attributes:
+        name: of its figures' folder.
+        scenario: what its file says.
+        runs: what is drawn, by the labels that tell them apart; its own comes first.
+
+    """
+
+    name: str
+    scenario: Scenario
+    runs: Mapping[str, Run]
+
+    @property
+    def title(self) -> str:
+        """Heading."""
+        return plain(self.scenario.title or self.scenario.name)
+
+
+def sections(references: Sequence[str]) -> list[Section]:
+    """The sections of some scenarios, names or paths of files.
+
+    Raises:
+        InputError: there is no such scenario, or its file has a mistake.
+
+    """
+    found: list[Section] = []
+    for reference in references:
+        scenario = read_scenario(reference)
+        taken = {section.name for section in found}
+        name = next(name for name in _numbered(scenario.name) if name not in taken)
+        found.append(Section(name, scenario, _runs(reference, scenario)))
+    return found
+
+
+def _numbered(name: str) -> Iterator[str]:
+    yield name
+    n = 2
+    while True:
+        yield f"{name}-{n}"
+        n += 1
+
+
+def _runs(reference: str, scenario: Scenario) -> dict[str, Run]:
+    """The run of a scenario and what it is drawn with: its companion, or its twin without noise."""
+    run = Run(reference)
+    try:
+        system = run.prepared().system
+    except InputError:
+        # Whoever makes the run says why it cannot be made.
+        return {scenario.legend: run}
+    if scenario.compare:
+        [companion] = run.companions()
+        label = read_scenario(scenario.compare).legend
+        return {scenario.legend: run, label + " (2)" * (label == scenario.legend): companion}
+    noise = port_name(_NOISE)
+    if scenario.figure == "tracking" and system.has(noise) and system.value(noise):
+        quiet = replace(run, parameters={_NOISE: 0.0})
+        return {"with noise": run, "without noise": quiet}
+    return {scenario.legend: run}
+
+
+def draw_section(section: Section, outcomes: Sequence[Outcome], folder: Path) -> list[str]:
+    """Draw the figures of a section and give notes on what is left out; a task for a worker.
+
+    Args:
+        section: whose figures.
+        outcomes: of its runs.
+        folder: to write into.
+
+    """
+    kind = section.scenario.figure
+    if kind not in FIGURES:
+        return [f"no figure: there is none of the name {kind!r}{did_you_mean(kind, FIGURES)}"]
+    runs = [
+        Drawn(label, outcome.table)
+        for label, outcome in zip(section.runs, outcomes, strict=True)
+        if len(outcome.table)
+    ]
+    if not runs:
+        return []
+    folder.mkdir(parents=True)
+    # The heading of the section stands above the figure already.
+    return draw(kind, "", runs, folder, section.name)
+
+
+def written(
+    section: Section, outcomes: Outcomes, notes: Sequence[str], folder: Path
+) -> Iterator[str]:
+    """A section in Markdown.
+
+    Args:
+        section: to write.
+        outcomes: of its runs.
+        notes: on what its figures leave out.
+        folder: of the report, in which its figures are.
+
+    """
+    scenario, own = section.scenario, outcomes[next(iter(section.runs.values()))]
+    yield f"### {section.title}"
+    # By their stems: `fig4` comes before `fig4-velocity`.
+    files = Path(folder, "figures", section.name).glob("*.png")
+    for file in sorted(files, key=attrgetter("stem")):
+        yield picture(section.title, file.relative_to(folder).as_posix())
+    yield from (f"Note: {plain(note)}." for note in notes)
+    if scenario.remark:
+        yield scenario.remark
+    made = {label: outcomes[run] for label, run in section.runs.items()}
+    for label, outcome in made.items():
+        if outcome.failure is not None:
+            yield f"**The run {plain(label)} ended early:** {plain(outcome.failure)}"
+    if rows := list(_indices([outcome.metrics for outcome in made.values()])):
+        yield table(["index", *map(plain, made)], rows)
+    reaching = own.metrics.get("velocities_reaching_controller")
+    if reaching is not None:
+        names = ", ".join(f"`{name}`" for name in reaching) or "none"
+        yield f"Velocities of the vehicle that reach the controller: {names}."
+    yield "\n".join(
+        f"- {plain(label)}: `auv-fmu run {outcomes.label(run)}`"
+        + (f", until {time:g} s" if (time := outcomes[run].metrics.get("stop_time")) else "")
+        for label, run in section.runs.items()
+    )
+    if scenario.ours:
+        yield "Ours, not the paper's:"
+        yield "\n".join(_ours(scenario))
+
+
+def _indices(metrics: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
+    for key, name, write in _INDICES:
+        if any(key in values for values in metrics):
+            yield [name, *(write(values[key]) if key in values else "" for values in metrics)]
+
+
+def _ours(scenario: Scenario) -> Iterator[str]:
+    """The values that are not the paper's, and why."""
+    values = {str(name): value for name, value in scenario.parameters.items()}
+    for name, why in scenario.ours.items():
+        value = values.get(name, vars(scenario).get(name))
+        is_short = value is not None and not isinstance(value, Mapping)
+        stated = f"{name} = {json.dumps(value, default=str)}" if is_short else name
+        yield f"- `{stated}`: {plain(why)}"

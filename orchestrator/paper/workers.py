@@ -1,0 +1,112 @@
+"""Processes that work side by side on the cores, and end at once when the user says so."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from itertools import islice
+from multiprocessing import active_children, get_context
+from typing import Any, TypeVar
+
+from tqdm import tqdm
+
+from orchestrator.errors import InputError
+from orchestrator.master.interrupts import Interrupts, held_interrupts
+
+#: How long the loop waits before it asks whether it shall stop [s].
+_PATIENCE = 0.1
+
+_Key = TypeVar("_Key", bound=Hashable)
+
+
+class Workers:
+    """Some processes, as :func:`workers` gives them."""
+
+    def __init__(self, pool: ProcessPoolExecutor, n: int, interrupts: Interrupts) -> None:
+        """Use a pool of n processes."""
+        self._pool, self._n, self._interrupts = pool, n, interrupts
+
+    def results(
+        self, tasks: Mapping[_Key, Callable[[], Any]], unit: str
+    ) -> Iterator[tuple[_Key, Any]]:
+        """Keys and results of tasks, which are begun in their order, as they are done.
+
+        Raises:
+            InputError: a process has died.
+            KeyboardInterrupt: there was a signal to stop.
+
+        """
+        left = iter(tasks.items())
+        keys: dict[Future[Any], _Key] = {}
+        with tqdm(total=len(tasks), unit=unit, disable=None) as bar:
+            while True:
+                # No more than can be begun: what a process has been given it cannot give back.
+                with _without_interrupt():
+                    for key, task in islice(left, self._n - len(keys)):
+                        keys[self._pool.submit(task)] = key
+                if not keys:
+                    return
+                done, _ = wait(keys, _PATIENCE, FIRST_COMPLETED)
+                if self._interrupts:
+                    raise KeyboardInterrupt
+                for future in done:
+                    bar.update()
+                    yield keys.pop(future), _result(future, unit)
+
+
+def _result(future: Future[Any], unit: str) -> Any:
+    try:
+        return future.result()
+    except BrokenProcessPool as error:
+        raise InputError(
+            f"a process has died while it made a {unit}: an FMU has crashed, or memory was short"
+        ) from error
+
+
+@contextmanager
+def workers() -> Iterator[Workers]:
+    """Processes for the time of the context; an exception ends them at once.
+
+    FMUs are libraries that a process loads, so the processes are fresh ones, not copies of this.
+    """
+    others = set(active_children())
+    n = os.cpu_count() or 1
+    with held_interrupts() as interrupts:
+        pool = ProcessPoolExecutor(n, get_context("spawn"), _begin)
+        try:
+            yield Workers(pool, n, interrupts)
+        except BaseException:
+            for process in set(active_children()) - others:
+                process.terminate()
+            raise
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _without_interrupt() -> Iterator[None]:
+    """Processes that are started here never see Ctrl-C, which is for this one to answer."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _begin() -> None:
+    """In a new process: leave by SIGTERM as by any other exit, without temporary folders."""
+    signal.signal(signal.SIGTERM, _leave)
+
+
+def _leave(*_: Any) -> None:
+    # Once: the way out is not to be cut short.
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    sys.exit()

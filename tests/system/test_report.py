@@ -1,0 +1,126 @@
+"""The whole report, with runs of a second, and with scenarios of a stranger in it."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from orchestrator.commands import paper
+from orchestrator.commands.main import main
+from orchestrator.paper.claims import CLAIMS
+from orchestrator.paper.effects import EFFECTS
+from orchestrator.paper.report import write_report
+
+STRANGER = """\
+title = "Mine | <b>own</b>"
+figure = "comparison-errors"
+remark = "A remark with **marks**, see reading 3."
+
+[components]
+controller = "mine.fmu"
+
+[parameters]
+controller.k_d = 40.0
+
+[ours]
+controller.k_d = "all of it"
+"""
+
+SCENARIOS = ("fig3a", "fig4")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, dist: Path) -> Path:
+    """A report of two figures, a stranger's scenario, and one whose FMU is not there."""
+    theirs = tmp_path_factory.mktemp("theirs")
+    shutil.copy(dist / "ObserverController.fmu", theirs / "mine.fmu")
+    (theirs / "stranger.toml").write_text(STRANGER)
+    (theirs / "lost.toml").write_text(STRANGER.replace("mine.fmu", "lost.fmu"))
+    report = tmp_path_factory.mktemp("report")
+    files = [str(theirs / f"{name}.toml") for name in ("stranger", "lost")]
+    write_report(report, [*SCENARIOS, *files], ["auv-fmu", "report"], stop_time=1.0)
+    return report
+
+
+@pytest.fixture(scope="module")
+def text(folder: Path) -> str:
+    return (folder / "report.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def page(folder: Path) -> str:
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_every_claim_has_a_row_and_every_effect_a_section(text):
+    for claim in CLAIMS:
+        assert f"\n| {claim.title.split(', reading')[0]}" in text
+    for effect in EFFECTS:
+        assert f"\n### {effect.title}\n" in text
+        assert f"](figures/{effect.name}.png)" in text
+
+
+def test_the_stranger_is_in_the_report(folder, text, page):
+    assert "\n### Mine \\| \\<b\\>own\\</b\\>\n" in text
+    assert ">Mine | &lt;b&gt;own&lt;/b&gt;</h3>" in page
+    assert '<strong>marks</strong>, see reading <a href="#reading-3">3</a>' in page
+    assert "- `controller.k_d = 40.0`: all of it" in text
+    assert (folder / "figures" / "stranger" / "stranger.png").is_file()
+
+
+def test_a_scenario_that_cannot_run_says_why_and_breaks_nothing(text):
+    [reason] = re.findall(r"\*\*The run lost ended early:\*\* (.*)", text)
+    assert "lost.fmu: no such FMU" in reason
+
+
+def test_links_lead_somewhere(folder, page):
+    links = set(re.findall(r'href="([^"]+)"', page))
+    assert {link[1:] for link in links if link[0] == "#"} <= set(re.findall(r' id="([^"]+)"', page))
+    files = {link for link in links if link[0] != "#"}
+    assert files
+    assert all((folder / file).is_file() for file in files)
+
+
+def test_the_page_needs_no_other_file(page):
+    sources = re.findall(r'src="([^"]+)"', page)
+    assert len(sources) >= len(EFFECTS) + len(SCENARIOS) + 1
+    assert all(source.startswith("data:image/png;base64,") for source in sources)
+
+
+def test_the_record_names_runs_and_files(folder, text):
+    record = json.loads((folder / "run.json").read_text())
+    assert "auv-fmu run fig4 --stop-time 1" in record["runs"]
+    assert len(record["runs"]) == len(set(record["runs"]))
+    assert all(command in text for command in record["runs"])
+    assert {"report.md", "report.html", "run.json"} < set(record["files"])
+    assert record["versions"].keys() >= {"python", "auv-fmu", "numpy"}
+
+
+def test_runs_are_kept_for_the_next_report(folder):
+    """As many as differ: of the scenarios and of what claims and effects name."""
+    runs = {run.label for each in (*CLAIMS, *EFFECTS) for run in each.runs}
+    # Fig. 4 with 1 mm of noise is Fig. 4 itself; Fig. 3(a) and the stranger are further runs.
+    assert len(list((folder / "runs").glob("*.npz"))) == len(runs) + 2
+    assert not list(folder.glob(".unfinished*"))
+
+
+def test_files_on_the_command_line_come_after_the_scenarios(tmp_path, monkeypatch, capsys):
+    asked = []
+    monkeypatch.setattr(
+        paper, "write_report", lambda *arguments: asked.append(arguments) or (Path("a"), Path("b"))
+    )
+    assert main(["report", "mine.toml", "--out", str(tmp_path)]) == 0
+    [(folder, scenarios, command)] = asked
+    assert (folder, scenarios[-2:]) == (tmp_path, ["fig7c", "mine.toml"])
+    assert command == ["auv-fmu", "report", "mine.toml", "--out", str(tmp_path)]
+    assert capsys.readouterr().out == "a\nb\n"
+
+
+def test_a_file_that_is_not_there_is_said_in_a_line(tmp_path, capsys):
+    assert main(["report", str(tmp_path / "gone.toml"), "--out", str(tmp_path / "out")]) == 2
+    assert "gone.toml" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

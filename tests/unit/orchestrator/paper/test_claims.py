@@ -1,0 +1,226 @@
+"""Claims judged by outcomes whose numbers are known by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from orchestrator.analysis.signals import APPLIED, THETA_HAT, Y_D
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.observer import Header
+from orchestrator.master.table import Table
+from orchestrator.paper import claims
+from orchestrator.paper.claims import CLAIMS, Claim
+from orchestrator.paper.measures import largest_error_after, total_variation_until, turning_radius
+from orchestrator.paper.outcomes import Outcome
+from orchestrator.system.names import PortName
+
+ELL = 0.35
+ONES, TWOS, THREES = (1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (3.0, 3.0, 3.0)
+
+
+def table_of(time, parameters=None, **columns):
+    """A table whose columns are given with `__` for dots; a list of names shares one value."""
+    names = tuple(name.replace("__", ".") for name in columns)
+    values = [np.broadcast_to(value, len(time)) for value in columns.values()]
+    header = Header(names, Experiment(float(time[-1]), float(time[1])), parameters or {})
+    return Table.of(header, np.column_stack([time, *values]))
+
+
+def outcome(table=None, **metrics):
+    return Outcome(metrics, table or Table())
+
+
+def claim_of(judge) -> Claim:
+    [found] = [claim for claim in CLAIMS if claim.judge is judge]
+    return found
+
+
+def test_claims_have_titles_of_their_own():
+    assert len({claim.title for claim in CLAIMS}) == len(CLAIMS)
+
+
+def test_turning_radius_is_speed_by_yaw_rate():
+    """3-4-5: a speed of 0.5 m/s at 2 rad/s is a radius of 0.25 m."""
+    table = table_of(np.arange(3.0), plant__nu__u=0.3, plant__nu__v=-0.4, plant__nu__r=-2.0)
+    assert turning_radius(table) == pytest.approx(0.25)
+    found = claims.turning(outcome(table))
+    assert found.ours == "0.25 m; its diameter 0.500 m"
+    assert found.verdict.startswith("**differs**, ratio 0.42")
+
+
+def test_turning_radius_of_the_paper_would_agree():
+    table = table_of(np.arange(3.0), plant__nu__u=0.6, plant__nu__v=0.0, plant__nu__r=1.0)
+    assert claims.turning(outcome(table)).verdict.startswith("agrees, ratio 1.00")
+
+
+def test_efforts_are_given_in_parts_of_the_published_ones():
+    found = claims.effort_proposed(outcome(l2_effort=(260.0, 20.0, 53.0)))
+    assert found.verdict == "ratio 2, 0.5, 1"
+    assert found.ours == "260 N·√s; 20, 53 N·m·√s"
+    assert claims.effort_pd(outcome(l2_effort=(235.0, 163.0, 172.0))).verdict == "ratio 1, 1, 1"
+
+
+def test_efforts_by_59_as_printed_differ_unless_both_are_near():
+    near = outcome(rms_effort=(130.0, 40.0, 53.0)), outcome(rms_effort=(235.0, 163.0, 172.0))
+    assert claims.effort_as_printed(*near).verdict.startswith("agrees")
+    far = outcome(rms_effort=(13.0, 4.0, 5.3))
+    assert claims.effort_as_printed(far, near[1]).verdict.startswith("**differs**")
+
+
+def test_final_errors_are_given_in_parts_of_the_published_ones():
+    error = (0.02, 0.02, 0.03)
+    assert claims.final_error_proposed(outcome(final_error=error)).verdict == "ratio 2, 1, 0.5"
+    assert claims.final_error_sharp(outcome(final_error=error)).ours == "0.02, 0.02, 0.03 m"
+    assert claims.final_error_pd(outcome(final_error=error)).verdict == "ratio 5, 20, 30"
+
+
+@pytest.mark.parametrize(
+    ("judge", "true", "false"),
+    [
+        (
+            claims.no_saturation,
+            [outcome(peak_command=ONES, saturated_fraction=(0.0, 0.0, 0.0))],
+            [outcome(peak_command=ONES, saturated_fraction=(0.0, 0.1, 0.0))],
+        ),
+        (
+            claims.convergence,
+            [outcome(final_error=(0.01, 0.09, 0.0))],
+            [outcome(final_error=(0.01, 0.11, 0.0))],
+        ),
+        (
+            claims.proposed_does_not_saturate,
+            [outcome(peak_command=ONES, saturated_fraction=(0.0, 0.0, 0.0))] * 2,
+            [
+                outcome(peak_command=ONES, saturated_fraction=(0.0, 0.0, 0.0)),
+                outcome(peak_command=ONES, saturated_fraction=(0.0, 0.0, 0.1)),
+            ],
+        ),
+        (
+            claims.pd_saturates,
+            [outcome(peak_command=ONES, saturated_fraction=(0.1, 0.1, 0.1))],
+            [outcome(peak_command=ONES, saturated_fraction=(0.1, 0.0, 0.1))],
+        ),
+        (
+            claims.pd_chatters,
+            [outcome(total_variation=ONES), outcome(total_variation=TWOS)],
+            [outcome(total_variation=TWOS), outcome(total_variation=ONES)],
+        ),
+        (
+            claims.pd_is_accurate,
+            [outcome(final_error=TWOS), outcome(final_error=ONES)],
+            [outcome(final_error=(2.0, 0.5, 2.0)), outcome(final_error=ONES)],
+        ),
+        (
+            claims.smoother_and_less_accurate,
+            [
+                outcome(total_variation=TWOS, final_error=ONES),
+                outcome(total_variation=ONES, final_error=TWOS),
+            ],
+            [
+                outcome(total_variation=TWOS, final_error=TWOS),
+                outcome(total_variation=ONES, final_error=ONES),
+            ],
+        ),
+        (
+            claims.gradual_degradation,
+            [outcome(final_error=error) for error in (ONES, TWOS, THREES)],
+            [outcome(final_error=error) for error in (ONES, THREES, TWOS)],
+        ),
+    ],
+)
+def test_verdict_follows_from_the_numbers(judge, true, false):
+    assert claim_of(judge).finding(true).verdict.startswith("agrees")
+    assert claim_of(judge).finding(false).verdict.startswith("**differs**")
+
+
+def test_more_accurate_is_said_in_times():
+    found = claims.pd_is_accurate(
+        outcome(final_error=(2.0, 3.0, 4.0)), outcome(final_error=(1.0, 0.5, 0.1))
+    )
+    assert found.ours == "2, 6, 40 times"
+
+
+def applied(values):
+    """Three signals of one course, sampled each second."""
+    return table_of(
+        np.arange(float(len(values))), **{k.replace(".", "__"): values for k in APPLIED}
+    )
+
+
+def test_total_variation_counts_the_steps_until_a_time():
+    """|2 - 5| + |5 - 4| in each of three signals: the first row ends no step."""
+    table = applied([100.0, 2.0, 5.0, 4.0, 50.0])
+    assert total_variation_until(table, 3.0) == pytest.approx(3 * (3.0 + 1.0))
+
+
+def test_severe_chattering_is_held_against_the_first_minute():
+    smooth, rough = applied([0.0, 1.0, 2.0]), applied([0.0, 1.0, 5.0])
+    found = claims.pd_chatters_severely(outcome(smooth), outcome(rough))
+    assert found.verdict == "agrees, ratio 4"
+    assert claims.pd_chatters_severely(outcome(rough), outcome(smooth)).verdict.startswith("**")
+
+
+def still(offsets):
+    """A level vehicle at rest in the origin, and a reference that is so far along y."""
+    posture = {f"plant__eta__{k}": 0.0 for k in ("x", "y", "z", "phi", "theta", "psi")}
+    reference = dict(zip((k.replace(".", "__") for k in Y_D), (ELL, offsets, 0.0), strict=True))
+    time = np.arange(float(len(offsets))) * 20.0
+    return table_of(time, {PortName("plant", "ell"): ELL}, **posture, **reference)
+
+
+def test_largest_error_forgets_the_start():
+    """The control point lies ell ahead of the vehicle, so the error is the offset alone."""
+    table = still(np.array([9.0, 8.0, 7.0, 0.5, -0.75]))
+    assert largest_error_after(table, 40.0) == pytest.approx(0.75)
+    assert largest_error_after(table, 100.0) == 0.0
+    runs = [outcome(still(np.array([9.0, 9.0, 9.0, e]))) for e in (0.1, 0.2, 0.3)]
+    assert claims.gradual_degradation_on_the_way(*runs).verdict == "agrees"
+    assert claims.gradual_degradation_on_the_way(*runs[::-1]).verdict == "**differs**"
+
+
+def estimating(largest, **metrics):
+    estimates = {k.replace(".", "__"): 0.5 for k in THETA_HAT} | {
+        "controller__theta_hat[2]": largest
+    }
+    return outcome(table_of(np.arange(2.0), **estimates), **metrics)
+
+
+def test_estimates_are_bounded():
+    found = claims.bounded_estimates(estimating(17.0))
+    assert found.verdict == "agrees"
+    assert found.ours.startswith("largest 17, still growing at 1 s")
+    assert claims.bounded_estimates(estimating(np.inf)).verdict == "**differs**"
+
+
+def test_more_effort_means_effort_gain_and_chattering():
+    """3-4-12: the norm of the three efforts is 13."""
+    runs = [
+        estimating(i, l2_effort=np.multiply(i, (3.0, 4.0, 12.0)), total_variation=(i, i, i))
+        for i in (1.0, 2.0, 3.0)
+    ]
+    found = claims.more_effort(*runs)
+    assert found.ours.startswith("|L2 effort| 13, 26, 39 ")
+    assert found.verdict == "agrees"
+    less = estimating(1.5, l2_effort=(30.0, 40.0, 120.0), total_variation=THREES)
+    assert claims.more_effort(*runs[:2], less).verdict == "**differs**"
+
+
+def test_intolerable_chattering_is_not_said_to_be_seen_where_it_is_not():
+    quiet = outcome(peak_command=(61.0, 22.9, 22.8), saturated_fraction=(0.0, 0.0, 0.0))
+    assert claims.intolerable_chattering(quiet).verdict.startswith("**not seen**")
+    rough = outcome(peak_command=(610.0, 22.9, 22.8), saturated_fraction=(0.5, 0.0, 0.0))
+    assert claims.intolerable_chattering(rough).verdict == "agrees"
+
+
+def test_gains_of_the_paper_miss_30():
+    """Reading 10: lambda_min(K_2 Lambda) = 10 is not above 0.5 10 1 + 10 = 15."""
+    found = claim_of(claims.gains_meet_the_condition).finding([])
+    assert found.ours == "10, needed: above 15"
+    assert found.verdict.startswith("**differs**")
+
+
+def test_a_run_that_ended_early_gives_no_verdict():
+    stopped = outcome(failure="stopped at t = 1 s: a mast has broken")
+    found = claim_of(claims.pd_chatters).finding([outcome(total_variation=ONES), stopped])
+    assert found == ("a run ended early: stopped at t = 1 s: a mast has broken", "none")

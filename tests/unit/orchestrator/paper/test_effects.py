@@ -1,0 +1,108 @@
+"""Effects in words and figures, from outcomes whose numbers are known by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from orchestrator.master.table import Table
+from orchestrator.paper import effects
+from orchestrator.paper.effects import EFFECTS, NOISE_LEVELS, show_effect
+from orchestrator.paper.outcomes import Outcome, Outcomes
+
+
+class Here:
+    def results(self, tasks, unit):
+        for key, task in tasks.items():
+            yield key, task()
+
+
+@pytest.fixture(scope="module")
+def tables(tmp_path_factory) -> dict[str, list[Table]]:
+    """Of some steps of the runs of each effect."""
+    outcomes = Outcomes(tmp_path_factory.mktemp("runs"), stop_time=0.2)
+    outcomes.make([run for effect in EFFECTS for run in effect.runs], Here())
+    return {effect.name: [outcomes[run].table for run in effect.runs] for effect in EFFECTS}
+
+
+def made(tables, *metrics):
+    return [Outcome(values, table) for values, table in zip(metrics, tables, strict=True)]
+
+
+def test_names_are_apart():
+    assert len({effect.name for effect in EFFECTS}) == len(EFFECTS)
+
+
+def test_disturbance(tables):
+    shown = effects.disturbance(
+        *made(
+            tables["effect-disturbance"],
+            *(
+                {"final_error": (0.0, 0.1 * i, 0.01), "peak_command": (60.0 + i, 20.0, 20.0)}
+                for i in (1, 2, 3)
+            ),
+        )
+    )
+    assert "0.1, 0.2, 0.3 m" in shown.text
+    assert "61, 62, 63 N" in shown.text
+
+
+def test_jacobian(tables):
+    shown = effects.jacobian(
+        *made(
+            tables["effect-jacobian"],
+            {"saturated_fraction": (0.0, 0.0, 0.0), "final_error": (1.0, 2.0, 3.0)},
+            {"saturated_fraction": (0.1, 0.25, 0.0), "final_error": (4.0, 5.0, 6.0)},
+        )
+    )
+    assert "25 % of the steps of Fig. 5 saturate and e_f is 4, 5, 6 m" in shown.text
+    assert "0 % and 1, 2, 3 m" in shown.text
+
+
+def test_order(tables):
+    variations = ((1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (3.0, 3.0, 3.0), (4.0, 4.0, 400.0))
+    runs = made(tables["effect-order"], *({"total_variation": each} for each in variations))
+    shown = effects.order(*runs)
+    assert "proposed 3 in Gauss-Seidel order and 6 in Jacobi order; PD 9 and 408." in shown.text
+
+
+def test_noise(tables):
+    def metrics(level):
+        # 1 mm: peaks of 1; 1 cm: peaks of 10.
+        values = tuple(level * 1e3 * np.ones(3) + 1e-9)
+        return {"l2_effort": values, "peak_command": values, "saturated_fraction": (0.0, level, 0)}
+
+    shown = effects.noise(*made(tables["effect-noise"], *map(metrics, NOISE_LEVELS)))
+    assert "at 1 N; 1, 1 N·m; 1 cm drives them to 10 N; 10, 10 N·m, and 1 %" in shown.text
+    [line, *_] = shown.figure.axes[0].lines
+    np.testing.assert_allclose(line.get_xdata(), line.get_ydata(), atol=1e-8)
+
+
+def test_saturation(tables):
+    shown = effects.saturation(
+        *made(
+            tables["effect-saturation"],
+            {"l2_effort": (1.0, 2.0, 3.0), "final_error": (0.1, 0.2, 0.3)},
+            {"l2_effort": (4.0, 5.0, 6.0), "final_error": (0.4, 0.5, 0.6)},
+        )
+    )
+    assert "1 N·√s; 2, 3 N·m·√s against 4 N·√s; 5, 6 N·m·√s" in shown.text
+    assert "e_f 0.1, 0.2, 0.3 m against 0.4, 0.5, 0.6 m" in shown.text
+
+
+def test_certificates(tables):
+    [table] = tables["certificates"]
+    figure = effects.certificates_along_a_run(Outcome({}, table)).figure
+    # An instant a step: at t = 0 the command is away from its limit by 80 less what it is.
+    u, *_ = figure.axes[2].lines
+    assert len(u.get_xdata()) == len(table) - 1
+    assert u.get_ydata()[0] == pytest.approx(80.0 - abs(table["plant.tau.u"][1]))
+
+
+def test_an_effect_is_drawn_or_says_why_not(tables, tmp_path):
+    [table] = tables["certificates"]
+    text = show_effect("certificates", [Outcome({}, table)], tmp_path)
+    assert f"({tmp_path.name}/certificates.png)" in text
+    assert (tmp_path / "certificates.png").stat().st_size > 10_000
+    failed = [Outcome({"failure": "the sea is dry"}, table)]
+    assert show_effect("certificates", failed, tmp_path) == "A run ended early: the sea is dry"

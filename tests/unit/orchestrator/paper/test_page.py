@@ -1,0 +1,67 @@
+"""Markdown as a page: anchors, cells, pictures, and texts of strangers."""
+
+import base64
+import re
+
+import pytest
+
+from orchestrator.paper.formatting import actuator_values, numbers, picture, plain, table
+from orchestrator.paper.page import contents, headings, html
+
+
+def test_anchors_are_those_of_github():
+    text = (
+        "# Top\n\n## Fig. 3(a): 10 N, 4 N·m\n## A_f = 1\n\n## Same\n\n### Same\n\n```\n# code\n```"
+    )
+    assert [heading.anchor for heading in headings(text)] == [
+        "top",
+        "fig-3a-10-n-4-nm",
+        "a_f--1",
+        "same",
+        "same-1",
+    ]
+
+
+def test_contents_link_to_what_is_there(tmp_path):
+    text = "# Top\n\n## First\n\n### Second `code`\n\n#### Too deep\n\n## First"
+    assert contents(text) == (
+        "- [First](#first)\n  - [Second `code`](#second-code)\n- [First](#first-1)"
+    )
+    page = html(f"# Top\n\n{contents(text)}\n\n{text}", tmp_path)
+    ids = re.findall(r'id="([^"]+)"', page)
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r'href="#([^"]+)"', page)) <= set(ids)
+
+
+def test_cells_know_their_columns(tmp_path):
+    text = "# T\n\n" + table(["a", "b `c`"], [["1", "2"], ["3", "4"]])
+    found = re.findall(r'<td data-name="([^"]*)">(\d)</td>', html(text, tmp_path))
+    assert found == [("a", "1"), ("b `c`", "2"), ("a", "3"), ("b `c`", "4")]
+
+
+def test_pictures_are_within_the_page_and_lead_to_their_files(tmp_path):
+    (tmp_path / "a.png").write_bytes(b"pixels")
+    page = html("# T\n\n" + picture("one", "a.png"), tmp_path)
+    assert f"data:image/png;base64,{base64.b64encode(b'pixels').decode()}" in page
+    assert '<a href="a.png">' in page
+    assert 'src="a.png"' not in page
+
+
+@pytest.mark.parametrize(
+    "text", ["<b>bold</b>", "a | b", "*x*, _y_ and __z__", "[l](http://x)", "`c`", "1 # 2", "A_f_d"]
+)
+def test_texts_of_strangers_are_texts(text, tmp_path):
+    page = html(f"# T\n\n## {plain(text)}\n\n" + table(["c"], [[plain(text)]]), tmp_path)
+    escaped = text.replace("<", "&lt;").replace(">", "&gt;")
+    assert f">{escaped}</h2>" in page
+    assert f">{escaped}</td>" in page
+
+
+def test_html_in_markdown_is_text(tmp_path):
+    assert "<script>alert" not in html("# T\n\n<script>alert(1)</script>", tmp_path)
+
+
+def test_numbers_have_three_digits_and_units():
+    assert numbers([1234.5, 0.00123456, 2.0]) == "1.23e+03, 0.00123, 2"
+    assert actuator_values([80.0, 1.0, 2.5]) == "80 N; 1, 2.5 N·m"
+    assert actuator_values([80.0, 1.0, 2.5], "·s") == "80 N·s; 1, 2.5 N·m·s"
