@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from auv_fmu.attitude import rotation_from_euler
-from orchestrator.analysis.body import body
+from orchestrator.analysis.body import PAINT, body
 from orchestrator.analysis.figures.layout import Cell
 from orchestrator.analysis.figures.panels import draw_commands, over_time, title
 from orchestrator.analysis.figures.signal import moving_mean
@@ -64,10 +64,11 @@ _VEHICLE = 0.3
 _DISTANCE = 2.2
 _DIRECTION = np.array([-0.75, -0.5, -0.45])
 
+#: What is nearer to the camera than this many widths is behind it.
+_BEHIND = 0.2
+
 #: Lines of the ground on either side of the camera's middle, and its depth below it in widths.
 _GROUND_LINES, _GROUND_DEPTH = 7, 0.4
-
-_PARTS = (COLOURS[5], COLOURS[1], REFERENCE)
 
 
 def check_film(path: Path, fps: int) -> None:
@@ -108,7 +109,7 @@ def animate(text: str, table: Table, path: Path, fps: int = FRAMES_PER_SECOND) -
 
 def _write_gif(frames: Iterator[Image.Image], path: Path, fps: int) -> None:
     first = next(frames)
-    palette = first.quantize(128)
+    palette = first.quantize(128, method=Image.Quantize.MAXCOVERAGE)
 
     def rest() -> Iterator[Image.Image]:
         # One palette for all: colours do not flicker, and it is found once.
@@ -144,7 +145,7 @@ def _frames(text: str, table: Table, n: int) -> Iterator[Image.Image]:
     rows = np.searchsorted(table.time, instants).clip(0, len(table) - 1)
     with styled():
         figure = Figure(figsize=_SIZE, dpi=_DPI)
-        canvas = FigureCanvasAgg(figure)
+        canvas: Any = FigureCanvasAgg(figure)
         figure.suptitle(heading(text))
         grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1))
         scene = _Scene(figure.add_subplot(grid[0]), table)
@@ -227,7 +228,7 @@ class _Scene:
         """What is to be drawn at a row, from back to front."""
         middle, width = self._middle[row], float(self._width[row, 0])
         camera = _Camera.at(middle, width)
-        self._ground.set_segments(self._ground_lines(camera, middle, width))
+        spacing = self._show_ground(camera, middle, width)
         self._trail.set_segments(camera.line(self._y[: row + 1]))
         if self._y_d is not None:
             self._reference.set_segments(camera.line(self._y_d))
@@ -237,11 +238,11 @@ class _Scene:
         self._drop.set_segments(camera.line(np.array([self._y[row], below])))
         self._show_body(camera, row, _VEHICLE * width)
         time, depth = self._time[row], self._y[row, 2]
-        self._caption.set_text(f"t = {time:.1f} s\nz = {depth:.1f} m\nwidth {width:.0f} m")
+        self._caption.set_text(f"t = {time:.1f} s\nz = {depth:.1f} m\ngrid {spacing:g} m")
         return self._all()
 
-    def _ground_lines(self, camera: _Camera, middle: np.ndarray, width: float) -> list[np.ndarray]:
-        """A grid that stands still while the camera moves."""
+    def _show_ground(self, camera: _Camera, middle: np.ndarray, width: float) -> float:
+        """Draw a grid that stands still while the camera moves; its spacing [m]."""
         spacing = 10.0 ** np.floor(np.log10(width / 3.0))
         depth = middle[2] + _GROUND_DEPTH * width
         n = _GROUND_LINES
@@ -253,7 +254,8 @@ class _Scene:
         for mark, (a, b) in zip(self._marks, ((0.55, 0.0), (0.0, 0.55)), strict=True):
             place = np.array([[middle[0] + a * width, middle[1] + b * width, depth]])
             mark.set_position(camera.project(place)[0][0])
-        return [segment for line in lines for segment in camera.line(line)]
+        self._ground.set_segments([piece for line in lines for piece in camera.line(line)])
+        return float(spacing)
 
     def _show_body(self, camera: _Camera, row: int, length: float) -> None:
         R = np.array(rotation_from_euler(*self._euler[row].tolist())).T
@@ -264,9 +266,9 @@ class _Scene:
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
         # Light from above; a triangle has two sides.
         light = 0.45 + 0.55 * np.abs(normals @ np.array([0.3, -0.35, -0.89]))
-        colours = np.array([to_rgb(colour) for colour in _PARTS])[self._body.part]
+        colours = np.array([to_rgb(colour) for colour in PAINT])[self._body.part]
         order = np.argsort(-depth.reshape(-1, 3).mean(axis=1))
-        self._hull.set_verts(seen.reshape(-1, 3, 2)[order])
+        self._hull.set_verts(list(seen.reshape(-1, 3, 2)[order]))
         self._hull.set_facecolor((colours * light[:, np.newaxis])[order].clip(0, 1))
 
 
@@ -276,13 +278,13 @@ class _Camera(NamedTuple):
     Attributes:
         place: of the camera, earth frame [m].
         axes: unit vectors to the right, up and ahead, (3, 3).
-        scale: of the picture: what lies one width across at the middle is 1 wide.
+        width: what it sees in the middle [m]; it is 1 wide in the picture.
 
     """
 
     place: np.ndarray
     axes: np.ndarray
-    scale: float
+    width: float
 
     @classmethod
     def at(cls, middle: np.ndarray, width: float) -> _Camera:
@@ -291,23 +293,18 @@ class _Camera(NamedTuple):
         right = np.cross(np.array([0.0, 0.0, 1.0]), ahead)
         right /= np.linalg.norm(right)
         up = np.cross(right, ahead)
-        return cls(middle - _DISTANCE * width * ahead, np.array([right, up, ahead]), _DISTANCE)
+        return cls(middle - _DISTANCE * width * ahead, np.array([right, up, ahead]), width)
 
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where points are in the picture, (n, 2), and how far from the camera [m]."""
         right, up, ahead = self.axes @ (points - self.place).T
         distance = np.maximum(ahead, 1e-9)
-        return self.scale * np.column_stack((right, up)) / distance[:, np.newaxis], ahead
+        return _DISTANCE * np.column_stack((right, up)) / distance[:, np.newaxis], ahead
 
     def line(self, points: np.ndarray) -> list[np.ndarray]:
         """A line in the picture, in pieces where it passes behind the camera."""
         seen, ahead = self.project(points)
-        is_hidden = ahead < 0.1 * _DISTANCE
-        pieces = np.split(seen, np.flatnonzero(np.diff(is_hidden)) + 1)
-        return [
-            piece
-            for piece, hidden in zip(
-                pieces, np.split(is_hidden, np.flatnonzero(np.diff(is_hidden)) + 1), strict=True
-            )
-            if not hidden[0]
-        ]
+        is_hidden = ahead < _BEHIND * self.width
+        breaks = np.flatnonzero(np.diff(is_hidden)) + 1
+        pieces = zip(np.split(seen, breaks), np.split(is_hidden, breaks), strict=True)
+        return [piece for piece, hidden in pieces if not hidden[0]]

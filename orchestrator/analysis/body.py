@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from orchestrator.analysis.figures.style import COLOURS, REFERENCE
+
 #: Distance behind the nose and radius of the rings of the hull, as shares of its length.
 _RINGS = (
     (0.0, 0.0),
@@ -23,13 +25,17 @@ _SIDES = 12
 _FIN = ((0.74, 0.05), (0.84, 0.22), (0.94, 0.22), (0.94, 0.03))
 
 
+#: Colours of the hull, the upper fin, which shows the roll, and the other fins.
+PAINT = (COLOURS[5], COLOURS[0], REFERENCE)
+
+
 class Body(NamedTuple):
     """Triangles of a vehicle of length 1, its nose in the origin.
 
     Attributes:
         points: in the body frame, x ahead, y to starboard, z down; (n, 3).
         triangles: of points, (m, 3).
-        part: of each triangle: hull 0, upper fin 1, which shows the roll, other fins 2.
+        part: of each triangle, an index of :data:`PAINT`.
 
     """
 

@@ -44,6 +44,7 @@ Y_HAT, DY_HAT = _group("controller.y_hat", AXES), _group("controller.dy_hat", AX
 Z = _group("controller.z", AXES)
 TAU = _group("controller.tau", ACTUATORS)
 THETA_HAT = tuple(f"controller.theta_hat[{i}]" for i in range(1, 5))
+THETA_UNITS = ("N", "kg/s", "kg/m", "kg")
 
 #: The parameters of (3), ell, and those of (2).
 LOWER_LIMITS, UPPER_LIMITS = _group("plant.tau_min", ACTUATORS), _group("plant.tau_max", ACTUATORS)

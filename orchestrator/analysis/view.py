@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_fmu.attitude import rotation_from_euler
-from orchestrator.analysis.body import body
+from orchestrator.analysis.body import PAINT, body
 from orchestrator.analysis.figures.style import COLOURS, REFERENCE
 from orchestrator.analysis.signals import (
     ACTUATORS,
@@ -45,7 +45,7 @@ _FRAMES = 1000
 _DIVISIONS = 700
 
 #: Length of the drawn vehicle as a share of the largest extent of the scene, and times ell.
-_SHARE, _LENGTH = 0.12, 2.0
+_SHARE, _LENGTH = 0.18, 2.0
 
 #: Height of a panel of the series, and of the gaps between them [px].
 _PANEL, _GAP, _MARGIN = 150, 26, 40
@@ -97,7 +97,8 @@ def page(title: str, table: Table) -> str:
 
 def _panels(table: Table) -> tuple[list[_Lines], list[str]]:
     """What is shown over time, and what is left out, and why."""
-    panels, notes = [], []
+    panels: list[_Lines] = []
+    notes: list[str] = []
     for name, needs, lines in (
         ("tracking errors", TRACKING, _errors),
         ("commands", (COMMANDED, ()), _commands),
@@ -112,7 +113,7 @@ def _panels(table: Table) -> tuple[list[_Lines], list[str]]:
 
 
 def _errors(table: Table) -> Iterator[_Lines]:
-    names = [f"e_{k}" for k in AXES]
+    names = [f"e<sub>{k}</sub>" for k in AXES]
     yield _Lines("tracking errors [m]", names, table.time, tracking_error(table))
 
 
@@ -120,14 +121,16 @@ def _commands(table: Table) -> Iterator[_Lines]:
     for k, column in enumerate(COMMANDED):
         known = not table.missing((), LIMITS)
         limits = [parameter(table, bounds[k]) for bounds in (LOWER_LIMITS, UPPER_LIMITS)] * known
-        name = f"τ_{ACTUATORS[k]}"
+        name = f"τ<sub>{ACTUATORS[k]}</sub>"
         unit = "N·m" if k else "N"
         values = table.step_values(column)
         yield _Lines(f"command {name} [{unit}]", [name], table.step_start, values, limits)
 
 
 def _estimates(table: Table) -> Iterator[_Lines]:
-    names = [f"θ̂_{i} [{unit}]" for i, unit in enumerate(("N", "kg/s", "kg/m", "kg"), start=1)]
+    names = [
+        f"θ̂<sub>{i}</sub> [{unit}]" for i, unit in enumerate(("N", "kg/s", "kg/m", "kg"), start=1)
+    ]
     values = table.step_values(*THETA_HAT)
     yield _Lines("estimated parameters", names, table.step_start, values)
 
@@ -252,7 +255,7 @@ def _frames(table: Table) -> dict[str, Any]:
     shape = body()
     parts = []
     for part, (colour, name) in enumerate(
-        ((COLOURS[5], "vehicle"), (COLOURS[1], "upper fin"), (REFERENCE, "other fins"))
+        zip(PAINT, ("vehicle", "upper fin", "other fins"), strict=True)
     ):
         chosen = shape.triangles[shape.part == part]
         used, triangles = np.unique(chosen, return_inverse=True)
@@ -268,7 +271,7 @@ def _frames(table: Table) -> dict[str, Any]:
             | {"mode": "markers", "marker": {"color": REFERENCE, "size": 4, "symbol": "square"}}
         )
     low, high = lower - length, upper + length
-    ratio = 1.4 * (high - low) / float((high - low).max())
+    ratio = (high - low) / float((high - low).max())
     axes = {
         f"{k}axis": {"title": {"text": f"{k} {name} [m]"}, "range": ends, "nticks": 5}
         for k, name, ends in (
@@ -283,7 +286,7 @@ def _frames(table: Table) -> dict[str, Any]:
             **axes,
             "aspectmode": "manual",
             "aspectratio": dict(zip("xyz", ratio.tolist(), strict=True)),
-            "camera": {"eye": {"x": -1.2, "y": -1.2, "z": 0.7}},
+            "camera": {"eye": {"x": -1.35, "y": -1.35, "z": 0.7}},
         },
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         "legend": {"x": 0, "y": 1, "bgcolor": "rgba(255,255,255,0.6)"},

@@ -29,7 +29,7 @@ ALLOWED = {
     "auv_fmu": set(),
     "fmus": {"auv_fmu", "markdown_it", "pythonfmu"},
     "orchestrator": {
-        "auv_fmu", "fmpy", "libcosimpy", "markdown_it", "matplotlib", "numpy", "pandas",
+        "auv_fmu", "fmpy", "libcosimpy", "markdown_it", "matplotlib", "numpy", "pandas", "PIL",
         "platformdirs", "tqdm",
     },
 }  # fmt: skip

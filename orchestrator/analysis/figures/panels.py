@@ -74,6 +74,7 @@ def _path(cell: Cell, runs: Sequence[Drawn]) -> None:
 
 
 def _frame_path(axes: Any, points: np.ndarray) -> None:
+    points = points[np.isfinite(points).all(axis=1)]
     lower, upper = np.min(points, axis=0), np.max(points, axis=0)
     extent = np.maximum(upper - lower, _FLATTEST * max(float((upper - lower).max()), 1e-3))
     middle = (lower + upper) / 2

@@ -13,9 +13,7 @@ from orchestrator.analysis.figures.layout import Cell, Panel, Rows
 from orchestrator.analysis.figures.panels import COMMANDS, PATH, over_time, title
 from orchestrator.analysis.figures.signal import draw_signal
 from orchestrator.analysis.figures.style import COLOURS, STYLES, Drawn, having, plain
-from orchestrator.analysis.signals import AXES, DY, DY_HAT, THETA_HAT, tracking_error
-
-_THETA_UNITS = ("N", "kg/s", "kg/m", "kg")
+from orchestrator.analysis.signals import AXES, DY, DY_HAT, THETA_HAT, THETA_UNITS, tracking_error
 
 
 def draw_lines(
@@ -52,7 +50,7 @@ def _errors(cell: Cell, runs: Sequence[Drawn]) -> None:
 
 def _estimates(cell: Cell, runs: Sequence[Drawn]) -> None:
     axes = cell.axes()
-    labels = [rf"$\hat{{\theta}}_{i}$ [{unit}]" for i, unit in enumerate(_THETA_UNITS, start=1)]
+    labels = [rf"$\hat{{\theta}}_{i}$ [{unit}]" for i, unit in enumerate(THETA_UNITS, start=1)]
     for i, (run, _) in enumerate(having(runs, (THETA_HAT, ()))):
         estimates = run.result.step_values(*THETA_HAT)
         draw_lines(axes, run.result.step_start, estimates, labels, run.label if i else None)

@@ -1,0 +1,46 @@
+"""Tables of runs that were never made."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from orchestrator.analysis.signals import (
+    COMMANDED,
+    DY,
+    DY_HAT,
+    ELL,
+    LOWER_LIMITS,
+    NU,
+    POSTURE,
+    THETA_HAT,
+    UPPER_LIMITS,
+    Y_D,
+)
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.observer import Header
+from orchestrator.master.table import Table
+from orchestrator.system.names import port_name
+
+COLUMNS = (*POSTURE, *NU, *DY, *COMMANDED, *Y_D, *DY_HAT, *THETA_HAT)
+STEP = 0.02
+
+
+def loop_table(n: int = 400, without: Collection[str] = (), seed: int = 1) -> Table:
+    """A closed loop whose signals wander about; limits are +-80, ell is 0.35 m."""
+    columns = tuple(name for name in COLUMNS if name not in without)
+    steps = np.random.default_rng(seed).normal(0.0, 0.05, (n, len(columns)))
+    rows = np.column_stack((STEP * np.arange(n), np.cumsum(steps, axis=0)))
+    parameters = {ELL: 0.35}
+    parameters |= dict.fromkeys(LOWER_LIMITS, -80.0) | dict.fromkeys(UPPER_LIMITS, 80.0)
+    known = {port_name(name): value for name, value in parameters.items() if name not in without}
+    return Table.of(Header(columns, Experiment(max(n - 1, 1) * STEP, STEP), known), rows)
+
+
+def table_of(**columns: np.ndarray) -> Table:
+    """A table of given columns, `a__b` for `a.b`, and no parameters."""
+    names = tuple(name.replace("__", ".") for name in columns)
+    n = len(next(iter(columns.values())))
+    rows = np.column_stack((STEP * np.arange(n), *columns.values()))
+    return Table.of(Header(names, Experiment((n - 1) * STEP, STEP)), rows)
