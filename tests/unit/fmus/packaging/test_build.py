@@ -22,7 +22,7 @@ def test_every_source_is_part_of_the_fingerprint(tmp_path: Path, monkeypatch: py
         shutil.copytree(
             folder,
             folders[package.__name__],
-            ignore=shutil.ignore_patterns("dist", "__pycache__"),
+            ignore=shutil.ignore_patterns("dist", "__pycache__", "py.typed"),
         )
     monkeypatch.setattr(build, "_FOLDERS", folders)
     fingerprints = {build.fingerprint()}
