@@ -11,13 +11,9 @@ module                  what it holds
 :mod:`.cautions`        gains that the step cannot follow
 :mod:`.visible`         of a long run, the rows that can be seen
 :mod:`.figures`         the paper's figures
-<<<<<<< HEAD
 :mod:`.plot`            any signals of any results
 :mod:`.body`            a hull with fins, so that the attitude can be seen
 :mod:`.view`            a page to turn a run around and play it
-=======
-:mod:`.plot`            any signals of any results over time
->>>>>>> main
 :mod:`.animation`       a film of a run
 ======================  ==============================================================
 """
