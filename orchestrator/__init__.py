@@ -34,6 +34,11 @@ __all__ = ["Result", "load", "simulate"]
 _MODULES = {"Result": "result", "load": "experiment", "simulate": "result"}
 
 
+def __dir__() -> list[str]:
+    """What is to be found here, asked for or not."""
+    return sorted({*globals(), *__all__})
+
+
 def __getattr__(name: str) -> object:
     """Import what is asked for when it is asked for: `auv-fmu --help` needs none of it."""
     if name not in _MODULES:

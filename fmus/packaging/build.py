@@ -52,38 +52,65 @@ def fingerprint() -> str:
     return digest.hexdigest()
 
 
-def _stage(component: str, module: str, stage: Path) -> Path:
+def _stage(component: str, module: str, stage: Path, script: str, own: Path | None) -> Path:
     """Lay out a script and the modules it needs the way PythonFMU wants them."""
-    script = stage / f"{component}.py"
-    script.write_text(_SCRIPT.format(module=module, component=component), encoding="utf-8")
-    roots = [str(folder.parent) for folder in _FOLDERS.values()]
-    finder = ModuleFinder(path=roots)
-    finder.run_script(str(script))
+    path = stage / f"{script}.py"
+    path.write_text(_SCRIPT.format(module=module, component=component), encoding="utf-8")
+    roots = [folder.parent for folder in _FOLDERS.values()]
+    finder = ModuleFinder(path=[str(root) for root in (*roots, *([own] if own else []))])
+    finder.run_script(str(path))
     for name, found in finder.modules.items():
-        top = name.split(".")[0]
-        source = getattr(found, "__file__", None)
+        source, top = getattr(found, "__file__", None), name.split(".")[0]
         if top in _FOLDERS and source is not None:
-            target = stage / top / Path(source).relative_to(_FOLDERS[top])
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(source, target)
-    return script
+            root = _FOLDERS[top].parent
+        elif own is not None and source is not None and _lies_in(own, Path(source), top):
+            root = own
+        else:
+            continue
+        target = stage / Path(source).relative_to(root)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(source, target)
+    return path
 
 
-def _build(component: str, module: str, loader: str, destination: Path) -> None:
+def _lies_in(folder: Path, source: Path, top: str) -> bool:
+    """Whether a module's top-level package stands in a folder, and not in one further below."""
+    return folder in source.parents and source.relative_to(folder).parts[0] in (top, f"{top}.py")
+
+
+def fmu_entries(
+    component: str, module: str, loader: str, script: str, own: Path | None = None
+) -> dict[str, bytes]:
+    """The contents of an FMU, before it is sealed.
+
+    Args:
+        component: class of its slave.
+        module: that the class is imported from.
+        loader: `native` or `plain`.
+        script: name of the FMU's own script.
+        own: folder of modules that go into the FMU beside those of this package; None: none.
+
+    Raises:
+        OSError: the loader cannot be compiled.
+
+    """
     with tempfile.TemporaryDirectory(prefix="auv_fmu_build_") as temporary:
         stage, built = Path(temporary, "stage"), Path(temporary, "built")
         stage.mkdir()
-        script = _stage(component, module, stage)
+        path = _stage(component, module, stage, script, own)
         raw = pythonfmu.FmuBuilder.build_FMU(
-            script, dest=built, project_files=[stage / name for name in _FOLDERS]
+            path, dest=built, project_files=set(stage.iterdir()) - {path}
         )
         with zipfile.ZipFile(raw) as archive:
             entries = {name: archive.read(name) for name in archive.namelist()}
     entries["model.png"] = _ICON.read_bytes()
-    entries["documentation/index.html"] = documentation.html(component).encode()
     entries["documentation/licenses/license.txt"] = documentation.licences().encode()
-    if loader == "native":
-        entries = with_loader(entries)
+    return with_loader(entries) if loader == "native" else entries
+
+
+def _build(component: str, module: str, loader: str, destination: Path) -> None:
+    entries = fmu_entries(component, module, loader, script=component)
+    entries["documentation/index.html"] = documentation.html(component).encode()
     seal(entries, destination / f"{component}.fmu")
 
 
@@ -110,7 +137,7 @@ def build(destination: Path, loader: str | None = None) -> list[Path]:
         before = {}
     sources = fingerprint()
     current = before.get("fingerprint") == sources and loader in (None, before.get("loader"))
-    chosen = loader or (before["loader"] if current else _best_loader())
+    chosen = loader or (before["loader"] if current else best_loader())
     written = []
     for component, module in components().items():
         path = destination / f"{component}.fmu"
@@ -123,7 +150,8 @@ def build(destination: Path, loader: str | None = None) -> list[Path]:
     return written
 
 
-def _best_loader() -> str:
+def best_loader() -> str:
+    """The loader for new files: native where it can be compiled."""
     return "plain" if compiler() is None else "native"
 
 

@@ -27,6 +27,7 @@ UNITS: dict[str, Unit] = {
     "W": Unit("Power", {"kg": 1, "m": 2, "s": -3}),
     "kg": Unit("Mass", {"kg": 1}),
     "kg/s": Unit("LinearDamping", {"kg": 1, "s": -1}),
+    "N/m": Unit("Stiffness", {"kg": 1, "s": -2}),
     "kg/m": Unit("QuadraticDamping", {"kg": 1, "m": -1}),
     "kg.m2": Unit("MomentOfInertia", {"kg": 1, "m": 2}),
     "kg.m2/s": Unit("AngularDamping", {"kg": 1, "m": 2, "s": -1}),

@@ -8,6 +8,7 @@ module              commands
 :mod:`.build`       build, list, gains
 :mod:`.run`         run
 :mod:`.look`        plot, view, animate
+:mod:`.new`         new: a controller of one's own
 :mod:`.exchange`    export, hosts, verify
 :mod:`.upkeep`      reference, docs: files of this repository
 :mod:`.paper`       report

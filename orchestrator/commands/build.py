@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from orchestrator.analysis import gains
 from orchestrator.commands.options import OK, add_out, add_set, assignments
 from orchestrator.experiments import bundle
+from orchestrator.experiments.own_controller import build_own
 from orchestrator.experiments.scenario import names, read_scenario
 from orchestrator.experiments.wiring import closed_loop
 
 
 def add_to(commands: Any) -> None:
     """Add these commands to the parser."""
-    build = commands.add_parser("build", help="build every FMU and the bundle auv.ssp")
-    add_out(build, bundle.DEFAULT_FOLDER)
+    build = commands.add_parser(
+        "build", help="build every FMU and the bundle auv.ssp, or a component of your own"
+    )
+    build.add_argument(
+        "script",
+        nargs="?",
+        type=Path,
+        metavar="SCRIPT.py",
+        help="a slave of PythonFMU, whose FMU is built beside it; default: the bundle",
+    )
+    add_out(build, None, f"{bundle.DEFAULT_FOLDER}, or the folder of SCRIPT.py")
     build.add_argument(
         "--loader",
         choices=("native", "plain"),
@@ -33,11 +44,15 @@ def add_to(commands: Any) -> None:
 
 
 def _build(options: argparse.Namespace) -> int:
-    written = bundle.build(options.out, options.loader)
+    if options.script is not None:
+        print(build_own(options.script, options.out, options.loader))
+        return OK
+    folder = options.out or bundle.DEFAULT_FOLDER
+    written = bundle.build(folder, options.loader)
     for path in written:
         print(path)
     state = "built" if written else "up to date"
-    print(f"{options.out} is {state}, with the {bundle.loader_of(options.out)} loader")
+    print(f"{folder} is {state}, with the {bundle.loader_of(folder)} loader")
     return OK
 
 

@@ -10,6 +10,7 @@ from orchestrator.commands.options import OK, add_out
 from orchestrator.errors import InputError, reason
 from orchestrator.exchange.reference import write_reference
 from orchestrator.experiments.bundle import current_fmus, run_fmus
+from orchestrator.experiments.scenario_page import scenario_page
 
 
 def add_to(commands: Any) -> None:
@@ -18,8 +19,8 @@ def add_to(commands: Any) -> None:
     add_out(reference, Path("reference"))
     reference.set_defaults(action=_reference)
 
-    docs = commands.add_parser("docs", help="write the pages of the components")
-    add_out(docs, Path("docs", "components"))
+    docs = commands.add_parser("docs", help="write the pages of components and scenario files")
+    add_out(docs, Path("docs"))
     docs.set_defaults(action=_docs)
 
 
@@ -35,6 +36,9 @@ def _reference(options: argparse.Namespace) -> int:
 
 
 def _docs(options: argparse.Namespace) -> int:
-    for path in run_fmus("packaging.documentation", options.out):
+    written = run_fmus("packaging.documentation", options.out / "components")
+    page = options.out / "scenarios.md"
+    page.write_text(scenario_page(), encoding="utf-8")
+    for path in (*written, page):
         print(path)
     return OK

@@ -4,9 +4,11 @@
 module                    what it holds
 ========================  ============================================================
 :mod:`.scenario`          scenario files
+:mod:`.scenario_page`     their reference page
 :mod:`.wiring`            which FMUs there are, and which ports feed which
 :mod:`.bundle`            the FMUs and auv.ssp, built when missing or stale
 :mod:`.bill_of_materials` checksums and packages of the bundle
+:mod:`.own_controller`    a controller of the user's own, to begin with
 :mod:`.experiment`        from a name to what is run
 :mod:`.run`               a run with its files, as the command line makes it
 :mod:`.folder`            a folder of results that changes all at once

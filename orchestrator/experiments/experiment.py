@@ -47,7 +47,7 @@ class Prepared:
 
 
 def load(name: str | Path) -> System:
-    """The system of a scenario, or of an SSP.
+    """The system of a scenario, or of an SSP, with its experiment.
 
     Args:
         name: of a scenario of the bundle, or path of a .toml or .ssp file.
@@ -56,7 +56,13 @@ def load(name: str | Path) -> System:
         InputError: there is no such scenario, or its system cannot be put together.
 
     """
-    return loaded(str(name))[1]
+    scenario, system = loaded(str(name))
+    return replace(
+        system,
+        name=scenario.name,
+        stop_time=_first_given(scenario.stop_time, system.stop_time),
+        step=_first_given(scenario.step, system.step),
+    )
 
 
 def loaded(name: str) -> tuple[Scenario, System]:
@@ -88,7 +94,9 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     stop_time = _first_given(request.stop_time, scenario.stop_time, system.stop_time)
     if stop_time is None:
         raise InputError(f"{scenario.name}: names no stop time; give one with --stop-time")
-    step = _first_given(request.step, scenario.step, system.step) or DEFAULT_STEP
+    step = _first_given(request.step, scenario.step, system.step)
+    if step is None:
+        step = DEFAULT_STEP
     return Prepared(scenario, system, Experiment(stop_time, step, request.order))
 
 

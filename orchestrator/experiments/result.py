@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
+from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.analysis.metrics import metrics_of
 from orchestrator.analysis.plot import plot
+from orchestrator.errors import InputError, did_you_mean
 from orchestrator.experiments.experiment import Prepared, Request, loaded, prepare
 from orchestrator.experiments.folder import replaced
 from orchestrator.experiments.record import write_record
@@ -29,11 +31,43 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+class Parameters(Mapping[Any, Any]):
+    """Values of the parameters of all components, by `component.parameter`."""
+
+    def __init__(self, values: Mapping[PortName, Any]) -> None:
+        """Take the values as the FMUs reported them."""
+        self._values = {str(name): value for name, value in values.items()}
+
+    def __getitem__(self, name: str | PortName) -> Any:
+        """The value of one parameter.
+
+        Raises:
+            KeyError: there is no such parameter; the text has a suggestion.
+
+        """
+        if str(name) not in self._values:
+            raise KeyError(f"no parameter {str(name)!r}{did_you_mean(str(name), self._values)}")
+        return self._values[str(name)]
+
+    def __iter__(self) -> Iterator[str]:
+        """Their names."""
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._values)
+
+    def __repr__(self) -> str:
+        """As a dictionary."""
+        return repr(self._values)
+
+
 class Result(Table):
     """The table of a run, with its indices and figures.
 
-    `result["plant.eta.x"]` is a column, `result.time` the times, `result.columns` the names of
-    all columns.
+    `result["plant.eta.x"]` is a column as a numpy array; an unknown name is a KeyError with a
+    suggestion. `result.time` holds the times, `result.columns` the names of all columns,
+    `result.failure` why the run ended early, or None.
     """
 
     def __init__(self, prepared: Prepared) -> None:
@@ -50,6 +84,11 @@ class Result(Table):
             f"<Result {self._prepared.scenario.name}: {len(self)} rows of {len(self.columns)} "
             f"columns, 0 to {last:g} s, {self.header.experiment.order}{end}>"
         )
+
+    @cached_property
+    def parameters(self) -> Parameters:
+        """Of all components, as the FMUs reported them after initialisation."""
+        return Parameters(self.header.parameters)
 
     @property
     def system(self) -> System:
@@ -75,7 +114,11 @@ class Result(Table):
         return pd.DataFrame(self.rows[:, 1:], index=index, columns=list(self.columns), copy=True)
 
     def plot(self, *patterns: str) -> Figure:
-        """Draw the columns that match patterns such as `plant.y.*` over time.
+        """Draw columns over time, a group such as `plant.y` a panel.
+
+        Args:
+            patterns: names of groups or columns, or patterns such as `plant.eta.*`; none: errors,
+                commands and estimates of the loop.
 
         Raises:
             ValueError: a pattern matches no column.
@@ -94,9 +137,11 @@ class Result(Table):
             The folder.
 
         Raises:
-            ValueError: the folder cannot be written.
+            ValueError: the folder cannot be written, or there is no such format.
 
         """
+        if format not in FORMATS:
+            raise InputError(f"format {format!r}: use one of {', '.join(FORMATS)}")
         folder = Path(folder)
         with replaced(folder) as unfinished:
             table = FORMATS[format](unfinished / f"result.{format}")
@@ -121,12 +166,16 @@ def simulate(
 ) -> Result:
     """Run a scenario, an SSP or a system.
 
+        result = simulate("fig4", {"controller.eps_t": 10.0}, stop_time=50.0)
+        result["plant.eta.x"], result.metrics(), result.plot("plant.tau.*")
+
     Args:
         system: name of a scenario, path of a .toml or .ssp file, or what :func:`load` has given.
-        parameters: values that win over the scenario's, by `component.parameter`.
+        parameters: values that win over the scenario's, by `component.parameter`: numbers, truth
+            values, names, or text as it stands on the command line.
         stop_time: end of the run [s]; None: the scenario's own.
-        step: communication step [s]; None: the scenario's own.
-        order: `gauss-seidel` or `jacobi`.
+        step: communication step [s]; None: the scenario's own, else 0.02.
+        order: `gauss-seidel`, as the paper's scheme has it, or `jacobi`, as most tools step.
         progress: show a bar on runs that take longer than some seconds.
 
     Returns:

@@ -171,6 +171,8 @@ def read_scenario(name: str) -> Scenario:
         text = path.read_text(encoding="utf-8")
         content = tomllib.loads(text)
     except FileNotFoundError:
+        if name.endswith(".toml"):
+            raise InputError(f"{name}: no such scenario file") from None
         raise InputError(
             f"no scenario {name!r}; there are {', '.join(names())}, or give a .toml or .ssp file"
             f"{did_you_mean(name, names())}"

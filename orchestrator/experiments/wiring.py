@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from orchestrator.errors import InputError, did_you_mean
 from orchestrator.experiments.scenario import Scenario
@@ -13,6 +14,11 @@ from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import Connection, System
 
 _WIRING = Path(__file__).with_name("closed_loop.toml")
+
+
+def read_wiring() -> dict[str, Any]:
+    """What `closed_loop.toml` holds."""
+    return tomllib.loads(_WIRING.read_text(encoding="utf-8"))
 
 
 def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
@@ -26,7 +32,7 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
         InputError: a component or group of ports that the scenario names does not exist.
 
     """
-    wiring = tomllib.loads(_WIRING.read_text(encoding="utf-8"))
+    wiring = read_wiring()
     chosen, wires = wiring["components"], wiring["wires"]
     if scenario is not None:
         chosen = chosen | scenario.components
@@ -85,7 +91,10 @@ def _wire(components: Mapping[str, Component], target: str, source: str) -> list
         if variable.name.startswith(f"{group}.")
     ]
     if not inputs:
-        raise InputError(f"wire {source} -> {target}: {to} has no inputs {group}.*")
+        raise InputError(
+            f"wire {source} -> {target}: {to} has no inputs {group}.*; a scenario removes a wire "
+            f'with "{target}" = false under [wires]'
+        )
     return [
         Connection(PortName(start, source_group + name.removeprefix(group)), PortName(to, name))
         for name in inputs

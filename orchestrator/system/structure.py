@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.values import Value, typed, unit_of
@@ -95,6 +95,7 @@ class System:
         if name not in self.components:
             raise InputError(
                 f"the system has no component {name!r}; it has {', '.join(self.components)}"
+                f"{did_you_mean(name, self.components)}"
             )
         return self.components[name]
 

@@ -1,0 +1,146 @@
+"""The guide to an own controller, followed literally."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from orchestrator.commands.main import main
+from support.markdown import DOCS, blocks
+
+
+@pytest.fixture(scope="module")
+def followed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which everything on the page was done."""
+    folder = tmp_path_factory.mktemp("guide")
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    environment = {**os.environ, "PATH": path}
+    for language, text in blocks(DOCS / "own-controller.md", "sh", "diff", "python"):
+        if language == "diff":
+            patch(folder, text)
+            continue
+        command = ["bash", "-ec", text] if language == "sh" else [sys.executable, "-P", "-c", text]
+        subprocess.run(command, cwd=folder, env=environment, check=True)
+    return folder
+
+
+def patch(folder: Path, difference: str) -> None:
+    """Apply a change that names its file in the first line."""
+    first, *lines = difference.splitlines()
+    file = folder / first.removeprefix("--- ")
+    before, after = (
+        "".join(f"{line[1:]}\n" for line in lines if not line.startswith(other)) for other in "+-"
+    )
+    text = file.read_text(encoding="utf-8")
+    assert text.count(before) == 1, f"{file} holds {text.count(before)} times:\n{before}"
+    file.write_text(text.replace(before, after), encoding="utf-8")
+
+
+def final_error(folder: Path) -> list[float]:
+    error: list[float] = json.loads((folder / "metrics.json").read_text())["final_error"]
+    return error
+
+
+def test_law_of_the_guide_follows_the_reference(followed: Path):
+    """Within 6 cm, as the page says; the gain alone, made five times softer, misses that."""
+    assert max(final_error(followed / "my_law/results")) < 0.06
+    assert max(final_error(followed / "my_law/soft")) > 0.2
+
+
+def test_runs_of_the_guide_are_drawn(followed: Path):
+    assert (followed / "my_law/results/scenario.png").is_file()
+    assert (followed / "hardened/results/scenario.svg").is_file()
+    assert (followed / "compared.png").is_file()
+
+
+def test_both_bases_give_the_same_motion(followed: Path):
+    """All signals but the plain slave's outputs before its first step, which are zero."""
+    plain, hardened = (
+        (followed / folder / "results/result.csv").read_text().splitlines()
+        for folder in ("my_law", "hardened")
+    )
+    columns = [line.split(",") for line in (plain[0], hardened[0])]
+    shared = [name for name in columns[0] if name in columns[1]]
+    assert "plant.eta.x" in shared
+    for line, other in zip(plain[2:], hardened[2:], strict=True):
+        values = [
+            dict(zip(names, text.split(","), strict=True))
+            for names, text in zip(columns, (line, other), strict=True)
+        ]
+        for name in shared:
+            assert float(values[0][name]) == pytest.approx(float(values[1][name]), abs=1e-9), name
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["3x"], "not a name for a controller"),
+        (["a-b"], "not a name for a controller"),
+        (["größe"], "not a name for a controller"),
+        (["random"], "taken in Python"),
+        (["class"], "taken in Python"),
+        (["Law", "full"], "full: is not empty"),
+        (["Law", "full/file"], "cannot write into full/file"),
+    ],
+)
+def test_what_cannot_be_made_is_refused_in_one_line(
+    arguments, complaint, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full/file").write_text("mine")
+    assert main(["new", "controller", *arguments]) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert complaint in line
+    assert (tmp_path / "full/file").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("x = = 1", "mine.py:1: SyntaxError"),
+        ("import os\nraise ValueError('no')", "mine.py:2: ValueError: no"),
+        ("x = 1", "No child class of Fmi2Slave"),
+    ],
+)
+def test_mistake_in_a_script_is_told_with_its_line(text, complaint, tmp_path, capsys):
+    script = tmp_path / "mine.py"
+    script.write_text(text)
+    assert main(["build", str(script)]) == 2
+    assert complaint in capsys.readouterr().err
+    assert not list(tmp_path.glob("*.fmu"))
+
+
+def test_changed_script_runs_changed_in_the_same_process(tmp_path, monkeypatch):
+    """Modules beside the script are in the FMU, and those of two versions do not meet."""
+    from orchestrator import simulate  # noqa: PLC0415
+
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "controller", "two_versions", "."]) == 0
+    script = Path("two_versions.py")
+    text = script.read_text().replace(
+        "from pythonfmu import", "from beside import SIGN\nfrom pythonfmu import", 1
+    )
+    script.write_text(text.replace('value["tau.u"] = dot', 'value["tau.u"] = SIGN * dot'))
+    forces = []
+    for sign in ("1.0", "-1.0"):
+        Path("beside.py").write_text(f"SIGN = {sign}\n")
+        assert main(["build", "two_versions.py"]) == 0
+        forces.append(simulate("scenario.toml", stop_time=0.02)["controller.tau.u"][-1])
+    assert forces[0] == -forces[1] != 0.0
+
+
+def test_many_instances_of_a_plain_slave_in_one_process(tmp_path, monkeypatch):
+    """PythonFMU alone crashes the process after some dozens."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "controller", "Often", "."]) == 0
+    code = (
+        "from orchestrator import simulate\n"
+        "for _ in range(150): simulate('scenario.toml', stop_time=0.02)\n"
+    )
+    subprocess.run([sys.executable, "-P", "-c", code], check=True)

@@ -1,0 +1,74 @@
+"""README and the other pages: true to the command line and to the packaging, with no dead links."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import tomllib
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from auv_fmu import __version__
+from orchestrator.commands.main import main, parser
+from support.markdown import DOCS, blocks
+
+ROOT = DOCS.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md")])
+
+
+def commands() -> dict[str, argparse.ArgumentParser]:
+    [group] = [a for a in parser()._actions if isinstance(a, argparse._SubParsersAction)]
+    return dict(group.choices)
+
+
+@pytest.mark.parametrize("name", commands())
+def test_readme_names_the_command(name):
+    assert re.search(rf"^    auv-fmu (\w+ \| )*{name}\b", README, re.MULTILINE)
+
+
+def test_readme_names_every_option_of_run():
+    described = README.split("auv-fmu run SCENARIO|FILE.toml", 1)[1].split("    auv-fmu ", 1)[0]
+    options = {o for action in commands()["run"]._actions for o in action.option_strings}
+    assert options - {"-h", "--help"} == set(re.findall(r"--[\w-]+", described))
+
+
+def test_readme_names_every_file_of_a_run(tmp_path):
+    assert main(["run", "fig5", "--stop-time", "0.1", "--out", str(tmp_path)]) == 0
+    for file in tmp_path.rglob("*.*"):
+        kind = "SCENARIO.png`, `.svg`" if file.suffix in (".png", ".svg") else file.name
+        assert f"| `{kind}" in README, file.name
+
+
+def test_python_on_the_first_screen_runs(capsys):
+    [example] = blocks(ROOT / "README.md", "python")
+    assert len(example.text.splitlines()) == 3
+    exec(compile(example.text, "README.md", "exec"), {})
+    assert "[" in capsys.readouterr().out
+
+
+def test_extras_that_pages_name_are_there():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    for page in PAGES:
+        for extras in re.findall(r"'\.\[([\w,]+)\]'", page.read_text(encoding="utf-8")):
+            assert set(extras.split(",")) <= project["optional-dependencies"].keys(), page
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page: Path):
+    for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+        if "://" not in target:
+            assert (page.parent / target).exists(), target
+
+
+def test_packages_say_that_they_are_typed():
+    for package in ("auv_fmu", "fmus", "orchestrator"):
+        [folder] = import_module(package).__path__
+        assert Path(folder, "py.typed").is_file()
+
+
+def test_citation_is_of_this_version():
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {__version__}\n" in citation
