@@ -78,7 +78,7 @@ def test_animation_is_written_with_step_and_order(tmp_path):
     assert [path.name for path in out.parent.iterdir()] == ["fig4.gif"]
 
 
-def test_page_stands_by_itself_and_is_light(results, capsys):
+def test_view_stands_by_itself_and_is_light(results, capsys):
     pytest.importorskip("plotly")
     capsys.readouterr()
     assert main(["view", str(results / "noisy")]) == 0
@@ -90,7 +90,7 @@ def test_page_stands_by_itself_and_is_light(results, capsys):
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium")
-def test_page_plays_in_a_browser(results, tmp_path):
+def test_view_plays_in_a_browser(results, tmp_path):
     """Opened with #play, time moves on; nothing is said on the console."""
     pytest.importorskip("plotly")
     page = tmp_path / "view.html"
