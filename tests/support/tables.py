@@ -28,10 +28,11 @@ STEP = 0.02
 
 
 def loop_table(n: int = 400, without: Collection[str] = (), seed: int = 1) -> Table:
-    """A closed loop whose signals wander about; limits are +-80, ell is 0.35 m."""
+    """A closed loop whose signals swing; limits are +-80, ell is 0.35 m."""
     columns = tuple(name for name in COLUMNS if name not in without)
-    steps = np.random.default_rng(seed).normal(0.0, 0.05, (n, len(columns)))
-    rows = np.column_stack((STEP * np.arange(n), np.cumsum(steps, axis=0)))
+    time = STEP * np.arange(n)
+    phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, len(columns))
+    rows = np.column_stack((time, np.sin(time[:, np.newaxis] + phases)))
     parameters = {ELL: 0.35}
     parameters |= dict.fromkeys(LOWER_LIMITS, -80.0) | dict.fromkeys(UPPER_LIMITS, 80.0)
     known = {port_name(name): value for name, value in parameters.items() if name not in without}

@@ -61,6 +61,14 @@ _GREEK = {
 _SYMBOL = re.compile(rf"(?<![\w\\.])({'|'.join(_GREEK)}|[A-Za-z])_([A-Za-z0-9]+)(?!\w)")
 
 
+#: What a file would say of its time and tool, by its ending.
+_NO_DATE: dict[str, Any] = {
+    ".png": {"Software": None},
+    ".svg": {"Date": None},
+    ".pdf": {"CreationDate": None},
+}
+
+
 class Drawn(NamedTuple):
     """A run in a figure."""
 
@@ -111,12 +119,10 @@ def styled() -> Iterator[None]:
 
 def save(figure: Figure, *paths: Path) -> None:
     """Write a figure without the time and the tool, so that the same run gives the same file."""
-    with styled():
+    with styled(), mpl.rc_context({"figure.constrained_layout.use": False}):
         # Laid out once for all files.
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")
+        if (engine := figure.get_layout_engine()) is not None:
+            engine.execute(figure)
+        figure.set_layout_engine(None)
         for path in paths:
-            no_date = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-            if path.suffix == ".pdf":
-                no_date = {"CreationDate": None}
-            figure.savefig(path, metadata=no_date)
+            figure.savefig(path, metadata=_NO_DATE[path.suffix])

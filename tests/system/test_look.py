@@ -1,0 +1,112 @@
+"""`auv-fmu plot`, `view` and `animate` as a user types them, and the page in a browser."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+from shutil import which
+
+import pytest
+
+from orchestrator.commands.main import main
+
+BROWSER = which("chromium") or which("chromium-browser") or which("google-chrome")
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with two short results."""
+    folder = tmp_path_factory.mktemp("results")
+    for name, std in (("noisy", "0.001"), ("quiet", "0")):
+        out = str(folder / name)
+        arguments = ["run", "fig4", "--stop-time", "4", "--set", f"plant.noise.std={std}"]
+        assert main([*arguments, "--no-figures", "--out", out]) == 0
+    return folder
+
+
+def test_plot_draws_results_over_each_other(results, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    both = [str(results / "noisy"), str(results / "quiet" / "result.csv")]
+    assert main(["plot", *both, "plant.y.*"]) == 0
+    assert capsys.readouterr().out == "plot.png\n"
+    assert (tmp_path / "plot.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["plot", *both, "plant.nu", "--out", "below/nu.svg"]) == 0
+    text = (tmp_path / "below" / "nu.svg").read_text()
+    assert "noisy" in text
+    assert "quiet" in text
+
+
+def test_plots_need_no_record(results, tmp_path):
+    """A table of another tool, by itself."""
+    table = tmp_path / "other.csv"
+    table.write_bytes((results / "quiet" / "result.csv").read_bytes())
+    assert main(["plot", str(table), "--out", str(tmp_path / "plot.pdf")]) == 0
+    assert (tmp_path / "plot.pdf").read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["plot", "{noisy}", "plant.yy"], "no column matches 'plant.yy'; did you mean"),
+        (["plot", "plant.y"], "plant.y: no such result"),
+        (["plot", "{noisy}", "--out", "plot.txt"], "write a .png, .svg, .pdf"),
+        (["plot", "."], "holds no result"),
+        (["view", "nowhere"], "nowhere: holds no result"),
+        (["view", "{noisy}", "--out", "page.txt"], "write a .html"),
+        (["animate", "fig4", "--stop-time", "0.1", "--out", "film.avi"], "write a .gif"),
+        (["animate", "fig4", "--stop-time", "0.1", "--fps", "0"], "--fps 0"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(
+    results, tmp_path, monkeypatch, capsys, arguments, reason
+):
+    monkeypatch.chdir(tmp_path)
+    noisy = str(results / "noisy")
+    assert main([noisy if text == "{noisy}" else text for text in arguments]) == 2
+    error = capsys.readouterr().err
+    assert reason in error
+    assert error.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_animation_is_written_with_step_and_order(tmp_path):
+    out = tmp_path / "films" / "fig4.gif"
+    arguments = ["animate", "fig4", "--stop-time", "1", "--step", "0.01", "--order", "jacobi"]
+    assert main([*arguments, "--fps", "2", "--out", str(out)]) == 0
+    assert out.read_bytes().startswith(b"GIF89a")
+    assert [path.name for path in out.parent.iterdir()] == ["fig4.gif"]
+
+
+def test_view_stands_by_itself_and_is_light(results, capsys):
+    pytest.importorskip("plotly")
+    capsys.readouterr()
+    assert main(["view", str(results / "noisy")]) == 0
+    page = results / "noisy" / "view.html"
+    assert capsys.readouterr().out == f"{page}\n"
+    text = page.read_text(encoding="utf-8")
+    assert len(text) < 8e6
+    assert not re.search(r"<(script|link|img)[^>]+(src|href)=", text)
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium")
+def test_view_plays_in_a_browser(results, tmp_path):
+    """Opened with #play, time moves on; nothing is said on the console."""
+    pytest.importorskip("plotly")
+    page = tmp_path / "view.html"
+    assert main(["view", str(results / "noisy"), "--out", str(page)]) == 0
+    process = subprocess.run(
+        [
+            str(BROWSER), "--headless", "--no-sandbox", f"--user-data-dir={tmp_path / 'profile'}",
+            "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--enable-logging=stderr",
+            "--timeout=8000", "--dump-dom", f"{page.as_uri()}#play",
+        ],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    said = [line for line in process.stderr.splitlines() if ":CONSOLE" in line]
+    assert not [line for line in said if "ERROR" in line or "Uncaught" in line], said
+    body = process.stdout[process.stdout.index("<body") :]
+    assert body.count("<canvas") >= 1
+    assert 'class="cartesianlayer"' in body
+    [shown] = re.findall(r'<output id="time">([0-9.]+) s', body)
+    assert float(shown) > 0.0
