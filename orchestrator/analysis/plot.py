@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -23,6 +24,15 @@ _PANEL, _MARGIN = 1.9, 0.6
 
 #: Entries in a row of a legend.
 _COLUMNS = 6
+
+
+class Plot(Figure):
+    """A figure that a notebook shows by itself."""
+
+    def _repr_png_(self) -> bytes:
+        image = BytesIO()
+        self.savefig(image, format="png")
+        return image.getvalue()
 
 
 def wanted(columns: Sequence[str], patterns: Sequence[str]) -> list[str]:
@@ -52,7 +62,7 @@ def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Fig
     for name in matching(names, patterns):
         panels.setdefault((group_of(name), unit_of(name)), []).append(name)
     with styled():
-        figure = Figure(figsize=(WIDTH, _MARGIN + _PANEL * len(panels)))
+        figure = Plot(figsize=(WIDTH, _MARGIN + _PANEL * len(panels)))
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         has_means = [
             _draw_panel(place, group, unit, members, runs)

@@ -17,6 +17,7 @@ from orchestrator.analysis.visible import VisibleRows
 from orchestrator.commands.options import OK, add_experiment, add_set, add_system, request, status
 from orchestrator.errors import InputError, reason
 from orchestrator.experiments.experiment import loaded, prepare
+from orchestrator.experiments.record import add_to_record
 from orchestrator.experiments.stored import read_record, read_result, table_in
 from orchestrator.master.progress import Progress
 from orchestrator.master.simulation import simulate
@@ -89,6 +90,7 @@ def _view(options: argparse.Namespace) -> int:
     except InputError as error:
         raise InputError(f"{options.result}: {error}") from error
     _write(out, lambda unfinished: unfinished.write_text(text, encoding="utf-8"))
+    add_to_record(out)
     return OK
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import platform
 import sys
 from collections.abc import Sequence
@@ -72,6 +73,20 @@ def write_files(folder: Path, content: dict[str, Any]) -> None:
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     text = json.dumps({**content, "files": sorted(files | {RECORD})}, indent=2)
     (folder / RECORD).write_text(text + "\n", encoding="utf-8")
+
+
+def add_to_record(file: Path) -> None:
+    """Name a file that was made from a result in its record, so that it goes with the result."""
+    path = file.parent / RECORD
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        record["files"] = sorted({*record["files"], file.name})
+    except (OSError, ValueError, KeyError, TypeError):
+        # Beside a table that no run of ours has left.
+        return
+    unfinished = path.with_name(f".{RECORD}.{os.getpid()}")
+    unfinished.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+    unfinished.replace(path)
 
 
 def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:

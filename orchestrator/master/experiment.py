@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import floor, isfinite
+from numbers import Real
 
 from orchestrator.errors import InputError
 
@@ -35,6 +36,9 @@ class Experiment:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be run."""
+        for value in (self.stop_time, self.step):
+            if not isinstance(value, Real):
+                raise InputError(f"stop time and step must be numbers, not {value!r}")
         if not all(isfinite(value) and value > 0.0 for value in (self.stop_time, self.step)):
             raise InputError(
                 f"stop time {self.stop_time:g} s and step {self.step:g} s must be positive"

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from orchestrator.analysis.metrics import indices
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.files import CsvFile
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
 from orchestrator.system.structure import System
@@ -16,6 +19,14 @@ def run(system: System, stop_time: float, step: float, order: str = "gauss-seide
     table = Table()
     simulate(system, Experiment(stop_time, step, order), [table])
     return table
+
+
+def write(table: Table, path: Path) -> None:
+    """The table as the command line writes it."""
+    file = CsvFile(path)
+    file.begin(table.header)
+    file.take(table.rows)
+    file.end(table.ending)
 
 
 def final_error(table: Table) -> np.ndarray:

@@ -19,14 +19,14 @@ from fmpy.util import read_csv
 
 from orchestrator.errors import InputError
 from orchestrator.experiments.wiring import closed_loop
-from orchestrator.master.files import CsvFile, read_columns, read_rows
+from orchestrator.master.files import read_columns, read_rows
 from orchestrator.master.schedule import stages
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.reading import read_ssp
 from orchestrator.system.ssp.writing import ssp_bytes
 from orchestrator.system.structure import Connection, System
-from support.runs import run
+from support.runs import run, write
 
 
 def port(text: str) -> PortName:
@@ -249,10 +249,7 @@ def test_ssp_with_parameters_and_a_swapped_component_runs(dist: Path, tmp_path: 
 
 def test_csv_opens_in_the_reader_of_fmpy_and_loses_no_digit(system, tmp_path):
     result, path = run(system, 1.0, 0.02), tmp_path / "result.csv"
-    file = CsvFile(path)
-    file.begin(result.header)
-    file.take(result.rows)
-    file.end(result.ending)
+    write(result, path)
     table = read_csv(path)
     assert table.dtype.names == ("time", *result.columns)
     assert np.array_equal(table["time"], result.time)

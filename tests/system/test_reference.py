@@ -15,7 +15,7 @@ from orchestrator.exchange.verify import verify
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.system.component import read_component
 from orchestrator.system.structure import System
-from support.runs import run
+from support.runs import run, write
 
 COMMITTED = Path(__file__).parents[2] / "reference"
 NAMES = list(components())
@@ -46,7 +46,7 @@ def test_a_fresh_run_of_the_system_is_the_reference(system: System):
 
 def test_own_table_is_verified_in_its_order(system: System, tmp_path: Path):
     path = tmp_path / "ours.csv"
-    run(system, 2.0, 0.02).write_csv(path)
+    write(run(system, 2.0, 0.02), path)
     assert "in gauss-seidel order" in verify(path, system, 1e-12)
 
 
@@ -65,7 +65,7 @@ def test_first_port_that_differs_is_named(system: System, tmp_path: Path):
     result = run(system, 2.0, 0.02, "jacobi")
     result.rows[60:, result.columns.index("planner.y_d.z") + 1] += 1e-3
     result.rows[80:, result.columns.index("plant.eta.x") + 1] += 1.0
-    result.write_csv(tmp_path / "wrong.csv")
+    write(result, tmp_path / "wrong.csv")
     with pytest.raises(InputError, match=r"planner\.y_d\.z differs first, at t = 1\.2 s"):
         verify(tmp_path / "wrong.csv", system, 1e-6)
 

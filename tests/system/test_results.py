@@ -79,7 +79,7 @@ def test_stored_result_is_read_again_with_its_parameters():
     again = simulate("fig4", stop_time=1.0)
     assert name == "fig4"
     assert np.array_equal(table.rows, again.rows)
-    assert table.parameters == again.parameters
+    assert {str(name): value for name, value in table.parameters.items()} == again.parameters
 
 
 def start(*arguments: str) -> subprocess.Popen[str]:

@@ -33,6 +33,11 @@ def test_impossible_experiments_are_refused(values):
         Experiment(*values)
 
 
+def test_text_is_no_time():
+    with pytest.raises(InputError, match="must be numbers, not '3'"):
+        Experiment("3", 0.1)  # type: ignore[arg-type]
+
+
 def test_an_unknown_order_is_refused():
     with pytest.raises(InputError, match="use one of gauss-seidel, jacobi"):
         Experiment(1.0, 0.1, "random")
