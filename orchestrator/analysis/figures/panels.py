@@ -89,7 +89,9 @@ def _frame_path(axes: Any, points: np.ndarray) -> None:
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(MaxNLocator(4))
     axes.tick_params(labelsize="small", pad=0)
-    for axis, pad in ((axes.xaxis, -2), (axes.yaxis, -2), (axes.zaxis, 4)):
+    # Below a flat box the names of the axes would lie upon their numbers.
+    below = 8.0 * (box.max() / box[2] - 1.0) - 2.0
+    for axis, pad in ((axes.xaxis, below), (axes.yaxis, below), (axes.zaxis, 4)):
         axis.labelpad = pad
 
 
