@@ -26,12 +26,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from orchestrator.experiments.experiment import load
+    from orchestrator.experiments.preparation import load
     from orchestrator.experiments.result import Result, simulate
 
 __all__ = ["Result", "load", "simulate"]
 
-_MODULES = {"Result": "result", "load": "experiment", "simulate": "result"}
+_MODULES = {"Result": "result", "load": "preparation", "simulate": "result"}
 
 
 def __dir__() -> list[str]:

@@ -12,7 +12,7 @@ from orchestrator.commands.options import FAILED, OK, add_out, add_set, add_syst
 from orchestrator.errors import InputError, reason
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.exchange.verify import verify
-from orchestrator.experiments.experiment import DEFAULT_STEP, Request, loaded, prepare
+from orchestrator.experiments.preparation import DEFAULT_STEP, Request, loaded, prepare
 from orchestrator.system.container import write_container
 from orchestrator.system.osp import write_osp
 from orchestrator.system.ssp.writing import write_ssp

@@ -16,7 +16,7 @@ from orchestrator.analysis.view import page
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.commands.options import OK, add_experiment, add_set, add_system, request, status
 from orchestrator.errors import InputError, reason
-from orchestrator.experiments.experiment import loaded, prepare
+from orchestrator.experiments.preparation import loaded, prepare
 from orchestrator.experiments.record import add_to_record
 from orchestrator.experiments.stored import read_record, read_result, table_in
 from orchestrator.master.progress import Progress

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from orchestrator.errors import InputError
-from orchestrator.experiments.experiment import Request
+from orchestrator.experiments.preparation import Request
 from orchestrator.master.experiment import ORDERS
 from orchestrator.master.observer import Ending
 from orchestrator.system.names import PortName, port_name

@@ -20,7 +20,7 @@ from orchestrator.commands.options import (
     say,
     status,
 )
-from orchestrator.experiments.experiment import loaded, prepare, with_companion
+from orchestrator.experiments.preparation import loaded, prepare, with_companion
 from orchestrator.experiments.run import Files, run_into
 from orchestrator.master.files import FORMATS
 

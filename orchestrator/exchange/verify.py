@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.errors import InputError
-from orchestrator.experiments.experiment import DEFAULT_STEP
+from orchestrator.experiments.preparation import DEFAULT_STEP
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table

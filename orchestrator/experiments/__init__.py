@@ -9,7 +9,7 @@ module                    what it holds
 :mod:`.bundle`            the FMUs and auv.ssp, built when missing or stale
 :mod:`.bill_of_materials` checksums and packages of the bundle
 :mod:`.own_controller`    a controller of the user's own, to begin with
-:mod:`.experiment`        from a name to what is run
+:mod:`.preparation`       from a name to what is run
 :mod:`.run`               a run with its files, as the command line makes it
 :mod:`.folder`            a folder of results that changes all at once
 :mod:`.record`            run.json

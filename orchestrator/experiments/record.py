@@ -13,8 +13,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from orchestrator.experiments.experiment import Prepared
 from orchestrator.experiments.folder import RECORD
+from orchestrator.experiments.preparation import Prepared
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observer import Ending, Header
 from orchestrator.system.names import port_name

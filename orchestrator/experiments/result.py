@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from orchestrator.analysis.metrics import metrics_of
 from orchestrator.analysis.plot import plot
 from orchestrator.errors import InputError, did_you_mean
-from orchestrator.experiments.experiment import Prepared, Request, loaded, prepare
 from orchestrator.experiments.folder import replaced
+from orchestrator.experiments.preparation import Prepared, Request, loaded, prepare
 from orchestrator.experiments.record import write_record
 from orchestrator.experiments.run import metrics_json, write_metrics
 from orchestrator.experiments.scenario import Scenario

@@ -19,8 +19,8 @@ from orchestrator.analysis.sensors import velocities_reaching
 from orchestrator.analysis.signals import CONTROLLER
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
-from orchestrator.experiments.experiment import Prepared
 from orchestrator.experiments.folder import replaced
+from orchestrator.experiments.preparation import Prepared
 from orchestrator.experiments.record import write_record
 from orchestrator.master.files import FORMATS
 from orchestrator.master.interrupts import Interrupts, held_interrupts

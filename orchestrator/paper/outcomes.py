@@ -21,7 +21,7 @@ import orchestrator
 from orchestrator.analysis.metrics import Metrics
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
-from orchestrator.experiments.experiment import Prepared
+from orchestrator.experiments.preparation import Prepared
 from orchestrator.experiments.record import PACKAGES, digest_of
 from orchestrator.experiments.run import metrics_json
 from orchestrator.master.experiment import Experiment

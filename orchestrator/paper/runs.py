@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from orchestrator.experiments.experiment import (
+from orchestrator.experiments.preparation import (
     Prepared,
     Request,
     loaded,
