@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from auv_fmu.euler import STEP
 from orchestrator.analysis.figures import check_figure
 from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import current_fmus
@@ -17,7 +18,7 @@ from orchestrator.system.ssp.reading import read_ssp
 from orchestrator.system.structure import System
 
 #: Communication step of the paper [s], for systems that name none.
-DEFAULT_STEP = 0.02
+DEFAULT_STEP = STEP
 
 
 @dataclass(frozen=True)
