@@ -76,7 +76,7 @@ def packing(given: type[T], ports: Sequence[Port]) -> Callable[[T], list[float]]
     """A function that makes the values of ports from groups.
 
     Args:
-        given: TypedDict with one tuple a group; their order does not matter.
+        given: TypedDict with one tuple a group, in the order of the ports.
         ports: to have one value each.
 
     Raises:

@@ -108,11 +108,14 @@ class CertificatesFile:
 
         """
         self._path = path
-        self._every = None if interval is None else Every(interval)
+        self._interval = interval
+        self._every: Every | None = None
         self._file: Any = None
 
     def begin(self, header: Header) -> None:
         """Find out whether there will be certificates."""
+        if self._interval is not None and self._interval > header.experiment.step:
+            self._every = Every(self._interval)
         self._header = header
         self._last = np.empty((0, 1 + len(header.columns)))
         self._is_possible = not missing_for_certificates(Table.of(header, self._last))

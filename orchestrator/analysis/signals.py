@@ -61,7 +61,7 @@ DRAWN = frozenset(
 CONTROL_POINT = (POSTURE, (ELL,))
 TRACKING = ((*POSTURE, *Y_D), (ELL,))
 
-#: The controller, and the vehicle that it feeds.
+#: The component that commands the vehicle.
 CONTROLLER = "controller"
 
 

@@ -36,9 +36,12 @@ class Experiment:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be run."""
-        for value in (self.stop_time, self.step):
-            if not isinstance(value, Real):
+        for name in ("stop_time", "step"):
+            value = getattr(self, name)
+            if not isinstance(value, Real) or isinstance(value, bool):
                 raise InputError(f"stop time and step must be numbers, not {value!r}")
+            # numpy's numbers do not go into JSON.
+            object.__setattr__(self, name, float(value))
         if not all(isfinite(value) and value > 0.0 for value in (self.stop_time, self.step)):
             raise InputError(
                 f"stop time {self.stop_time:g} s and step {self.step:g} s must be positive"

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from copy import copy
 from functools import partial
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import fmpy
@@ -33,20 +34,25 @@ from orchestrator.system.component import Component
 from orchestrator.system.unpacking import unpacked
 from orchestrator.system.values import Value
 
+#: Messages that are kept: an FMU may have something to say in every step.
+_MOST_MESSAGES = 100
+
 
 class Log:
     """What the FMUs of a run have said with status warning or worse.
 
     Attributes:
-        messages: all of it.
-        refusals: with status discard or worse.
+        refusals: the first of it with status discard or worse.
+        last: the latest, a refusal before a warning.
 
     """
 
     def __init__(self) -> None:
         """Start empty."""
-        self.messages: list[str] = []
+        self._said: list[str] = []
+        self._n = 0
         self.refusals: list[str] = []
+        self.last = ""
         self.callbacks = fmi2CallbackFunctions()
         self.callbacks.logger = fmi2CallbackLoggerTYPE(self._take)
         self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
@@ -56,9 +62,18 @@ class Log:
     def _take(self, _: Any, instance: bytes, status: int, _category: bytes, message: bytes) -> None:
         text = f"{instance.decode(errors='replace')}: {message.decode(errors='replace')}"
         if status >= fmi2Warning:
-            self.messages.append(text)
+            self._n += 1
+            self._said += [text] * (len(self._said) < _MOST_MESSAGES)
         if status >= fmi2Discard:
-            self.refusals.append(text)
+            self.refusals += [text] * (len(self.refusals) < _MOST_MESSAGES)
+        if status >= fmi2Discard or not self.refusals:
+            self.last = text
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """The first of it, and how much there was."""
+        more = self._n - len(self._said)
+        return (*self._said, *([f"and {more} messages more"] * (more > 0)))
 
 
 class Instance:
@@ -142,7 +157,8 @@ def running(component: Component, log: Log) -> Iterator[Instance]:
 
     """
     # The functions of the library serve all instances; what differs is theirs alone.
-    fmu = copy(_library(component.fmu, component.description, unpacked(component.fmu)))
+    with _LOCK:
+        fmu = copy(_library(component.fmu, component.description, unpacked(component.fmu)))
     fmu.instanceName = component.name
     try:
         fmu.instantiate(callbacks=log.callbacks, loggingOn=True)
@@ -155,7 +171,9 @@ def running(component: Component, log: Log) -> Iterator[Instance]:
         fmu.fmi2FreeInstance(fmu.component)
 
 
+#: Libraries by the folders into which their FMUs are unpacked, for runs in several threads.
 _libraries: dict[Path, FMU2Slave] = {}
+_LOCK = Lock()
 
 
 def _library(fmu: Path, description: ModelDescription, folder: Path) -> FMU2Slave:

@@ -67,7 +67,9 @@ def held_interrupts(
         yield outer
         return
     interrupts = Interrupts(announce)
-    before = {number: signal.signal(number, interrupts.take) for number in _STOPS}
+    # What is ignored stays so: nohup, or a shell's background.
+    heeded = [n for n in _STOPS if signal.getsignal(n) not in (signal.SIG_IGN, None)]
+    before = {number: signal.signal(number, interrupts.take) for number in heeded}
     try:
         yield interrupts
     finally:

@@ -43,11 +43,13 @@ class Ending:
     Attributes:
         failure: why it ended early, or None.
         messages: what the FMUs logged with status warning or worse.
+        signals: to stop that have come meanwhile.
 
     """
 
     failure: str | None = None
     messages: tuple[str, ...] = ()
+    signals: tuple[int, ...] = ()
 
 
 class Observer(Protocol):

@@ -16,8 +16,13 @@ from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 
-#: Kinds of values that can be connected and recorded.
-_KINDS = {"Real": fmi2Real, "Integer": fmi2Integer, "Boolean": fmi2Boolean}
+#: Kinds of values that can be connected and recorded, with FMI's functions and types for them.
+KINDS = {
+    "Real": ("Real", fmi2Real),
+    "Integer": ("Integer", fmi2Integer),
+    "Enumeration": ("Integer", fmi2Integer),
+    "Boolean": ("Boolean", fmi2Boolean),
+}
 
 
 class Row:
@@ -33,12 +38,12 @@ class Row:
     """
 
     def __init__(self, system: System, instances: Mapping[str, Instance]) -> None:
-        """Lay out the row, tie the instances to it, and enter the inputs that are set."""
+        """Lay out the row, tie the instances to it, and enter the inputs' values at the start."""
         groups = [
             (instance, causality, kind, ports)
             for name, instance in instances.items()
             for causality in ("input", "output")
-            for kind in _KINDS
+            for kind in KINDS
             if (ports := _ports(system.components[name], causality, kind))
         ]
         self.values = np.zeros(sum(len(ports) for *_, ports in groups))
@@ -53,6 +58,8 @@ class Row:
                 instance.get_outputs.append(block.getter(instance))
             for i, port in enumerate(ports, start=first):
                 self.columns[PortName(instance.name, port.name)] = i
+                start = system.components[instance.name].start(port.name)
+                self.values[i] = 0.0 if start is None else float(start)
         for target, value in system.parameters.items():
             if target in self.columns:
                 self.values[self.columns[target]] = float(value)
@@ -76,16 +83,15 @@ class _Block:
         """Prepare the arrays that every call uses.
 
         Args:
-            kind: one of :data:`_KINDS`.
+            kind: one of :data:`KINDS`.
             references: value references.
             row: the part of the row of all values where the values are, a view.
 
         """
-        self._kind = kind
+        self._kind, c_type = KINDS[kind]
         self._row = row
         self._n = c_size_t(len(references))
         self._references = (fmi2ValueReference * len(references))(*references)
-        c_type = _KINDS[kind]
         if kind == "Real":
             self._values = (c_type * len(references)).from_buffer(row)
         else:

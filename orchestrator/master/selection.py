@@ -17,14 +17,7 @@ class Every:
     """Chooses one of the times that come for each interval."""
 
     def __init__(self, interval: float) -> None:
-        """Start before the first time.
-
-        Raises:
-            InputError: the interval [s] is not positive.
-
-        """
-        if not interval > 0.0:
-            raise InputError(f"interval {interval:g} s must be positive")
+        """Start before the first time; the interval is in seconds."""
         self._interval, self._count = interval, -1.0
 
     def chosen(self, times: np.ndarray) -> np.ndarray:
@@ -34,6 +27,17 @@ class Every:
         grown: np.ndarray = np.diff(counts, prepend=self._count) > 0.0
         self._count = float(counts[-1])
         return grown
+
+
+def check_interval(interval: float) -> None:
+    """Check before a run that its interval can be kept.
+
+    Raises:
+        InputError: it is not positive.
+
+    """
+    if not interval > 0.0:
+        raise InputError(f"interval {interval:g} s must be positive")
 
 
 class Selection:
@@ -54,12 +58,17 @@ class Selection:
 
         """
         self._observer, self._columns = observer, columns
-        self._every = None if interval is None else Every(interval)
+        if interval is not None:
+            check_interval(interval)
+        self._interval = interval
+        self._every: Every | None = None
         self._last = np.empty((0, 0))
 
     def begin(self, header: Header) -> None:
         """Find out where the columns are."""
         kept = header.columns if self._columns is None else tuple(self._columns)
+        if self._interval is not None and self._interval > header.experiment.step:
+            self._every = Every(self._interval)
         self._places = [0, *(1 + header.columns.index(name) for name in kept)]
         self._observer.begin(replace(header, columns=kept))
 

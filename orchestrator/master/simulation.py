@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, reason
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.instance import Instance, Log, running
 from orchestrator.master.interrupts import Interrupts, held_interrupts
@@ -46,15 +46,31 @@ def simulate(system: System, experiment: Experiment, observers: Sequence[Observe
             row = Row(system, instances)
             _initialise(system, instances, row, experiment, log)
             header = Header(tuple(map(str, row.columns)), experiment, _parameters(instances))
-        for observer in observers:
-            observer.begin(header)
         plan = schedule(system, experiment.order, instances, row)
-        blocks = Blocks(len(row.values), observers)
-        failure = _advance(experiment, plan, row.values, blocks, interrupts, log)
-        ending = Ending(failure, tuple(log.messages))
-        for observer in observers:
-            observer.end(ending)
+        with _told(header, observers) as tell:
+            blocks = Blocks(len(row.values), observers)
+            failure = _advance(experiment, plan, row.values, blocks, interrupts, log)
+            if failure is None:
+                for instance in instances.values():
+                    instance.fmu.terminate()
+            ending = Ending(failure, log.messages, tuple(interrupts.signals))
+            tell(ending)
         return ending
+
+
+def completed(system: System, experiment: Experiment, observers: Sequence[Observer] = ()) -> None:
+    """Run a system of which nothing less than all rows will do.
+
+    Raises:
+        InputError: it cannot be run, or not to its end.
+        KeyboardInterrupt: somebody wants it to stop.
+
+    """
+    ending = simulate(system, experiment, observers)
+    if ending.signals:
+        raise KeyboardInterrupt
+    if ending.failure is not None:
+        raise InputError(f"{system.name} {ending.failure}")
 
 
 def _initialise(
@@ -129,7 +145,7 @@ def _advance(
                 failure = f"interrupted at t = {end:g} s"
                 break
     except FMICallException as error:
-        failure = f"stopped at t = {t:g} s: {'; '.join(log.messages[-1:]) or error}"
+        failure = f"stopped at t = {t:g} s: {log.last or error}"
     blocks.hand_over()
     return failure
 
@@ -140,4 +156,24 @@ def _explained(log: Log) -> Iterator[None]:
     try:
         yield
     except FMICallException as error:
-        raise InputError("; ".join(log.messages[-1:]) or str(error)) from error
+        raise InputError(log.last or str(error)) from error
+
+
+@contextmanager
+def _told(header: Header, observers: Sequence[Observer]) -> Iterator[Callable[[Ending], None]]:
+    """Tell observers of the beginning, and of the end even where one of them fails."""
+    begun: list[Observer] = []
+
+    def tell(ending: Ending) -> None:
+        while begun:
+            begun.pop(0).end(ending)
+
+    try:
+        for observer in observers:
+            observer.begin(header)
+            begun.append(observer)
+        yield tell
+    except BaseException as error:
+        with suppress(Exception):
+            tell(Ending(f"stopped: {reason(error)}"))
+        raise

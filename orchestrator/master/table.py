@@ -80,7 +80,7 @@ class Table:
 
     def __contains__(self, column: str) -> bool:
         """Whether there is a column `component.port`."""
-        return column in self._index
+        return column == "time" or column in self._index
 
     def __getitem__(self, column: str) -> np.ndarray:
         """The values of one column.
@@ -92,7 +92,7 @@ class Table:
         if column == "time":
             return self.time
         if column not in self._index:
-            raise KeyError(f"no column {column!r}{did_you_mean(column, self._index)}")
+            raise KeyError(f"no column {column!r}{did_you_mean(str(column), self._index)}")
         return self.rows[:, self._index[column]]
 
     @property

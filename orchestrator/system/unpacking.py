@@ -9,10 +9,14 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
+from threading import Lock
 from typing import NamedTuple
 from zipfile import BadZipFile, ZipFile
 
 from orchestrator.errors import InputError, reason
+
+#: Runs in several threads share what is unpacked.
+_LOCK = Lock()
 
 
 class Version(NamedTuple):
@@ -38,7 +42,8 @@ def unpacked(archive: Path) -> Path:
 
     """
     try:
-        return _unpacked(version_of(archive))
+        with _LOCK:
+            return _unpacked(version_of(archive))
     except (OSError, BadZipFile, RuntimeError, NotImplementedError) as error:
         raise InputError(f"{archive}: cannot be opened: {reason(error)}") from error
 

@@ -37,6 +37,8 @@ def read_ssp(archive: Path) -> System:
                 f"{archive}: {element.name}: only a flat system of FMUs is supported, no nested "
                 "systems or signal dictionaries"
             )
+        if not (folder / element.source).is_file():
+            raise InputError(f"{archive}: holds no {element.source} for {element.name}")
         components[element.name] = read_component(element.name, folder / element.source)
     stop_time, step = _default_experiment(folder / STRUCTURE)
     found = System(
