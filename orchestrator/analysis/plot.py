@@ -52,6 +52,8 @@ def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Fig
         InputError: a pattern matches no column.
 
     """
+    if not all(isinstance(pattern, str) for pattern in patterns):
+        raise InputError(f"patterns are texts such as plant.y.*, not {list(patterns)!r}")
     names = list(dict.fromkeys(name for _, table in runs for name in table.columns))
     if not patterns:
         patterns = [pattern for pattern in DEFAULT if wanted(names, [pattern])]

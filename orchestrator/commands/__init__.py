@@ -3,7 +3,8 @@
 ==================  ==================================================================
 module              commands
 ==================  ==================================================================
-:mod:`.main`        the parser and the exit status
+:mod:`.main`        the entry point
+:mod:`.parser`      all commands, and the exit status
 :mod:`.options`     options that several commands have
 :mod:`.build`       build, list, gains
 :mod:`.run`         run

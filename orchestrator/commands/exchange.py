@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.commands.options import FAILED, OK, add_out, add_set, add_system, assignments
-from orchestrator.errors import InputError, reason
+from orchestrator.errors import InputError
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.exchange.verify import verify
-from orchestrator.experiments.preparation import DEFAULT_STEP, Request, loaded, prepare
+from orchestrator.experiments.folder import replaced
+from orchestrator.experiments.preparation import DEFAULT_STEP, Request, load, loaded, prepare
 from orchestrator.system.container import write_container
 from orchestrator.system.osp import write_osp
 from orchestrator.system.ssp.writing import write_ssp
@@ -86,19 +87,15 @@ def _export(options: argparse.Namespace) -> int:
         step=experiment.step,
     )
     folder = options.out or Path("exports", prepared.scenario.name)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for path in FORMATS[options.format](system, folder):
-            print(path)
-    except OSError as error:
-        raise InputError(
-            f"cannot write into {folder}: {reason(error)}; choose --out DIR"
-        ) from error
+    with replaced(folder) as unfinished:
+        written = FORMATS[options.format](system, unfinished)
+    for path in written:
+        print(folder / path.relative_to(unfinished))
     return OK
 
 
 def _verify(options: argparse.Namespace) -> int:
-    _, system = loaded(options.scenario)
+    system = load(options.scenario)
     print(verify(options.table, system.with_parameters(assignments(options)), options.tolerance))
     return OK
 
@@ -107,7 +104,7 @@ def _hosts(options: argparse.Namespace) -> int:
     unknown = set(options.host) - HOSTS.keys()
     if unknown:
         raise InputError(f"no host {', '.join(sorted(unknown))}; there are {', '.join(HOSTS)}")
-    _, system = loaded(options.scenario)
+    system = load(options.scenario)
     step = system.step or DEFAULT_STEP
     verdicts = compare(system, options.host or list(HOSTS), options.steps, step)
     print(f"{'host':13} {'package':34} {'max deviation':>14} {'steps/s':>8}  worst port")

@@ -1,49 +1,20 @@
-"""The parser of `auv-fmu` and its exit status."""
+"""The entry point of `auv-fmu`."""
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
-from importlib.metadata import version
-
-from orchestrator.commands import build, exchange, look, new, paper, run, upkeep
-from orchestrator.commands.options import BAD_INPUT, FAILED, INTERRUPTED, say
-from orchestrator.errors import InputError
+from importlib import import_module
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
-    options = parser().parse_args(arguments)
-    options.command = ["auv-fmu", *(sys.argv[1:] if arguments is None else arguments)]
     try:
-        return int(options.action(options))
-    except InputError as error:
-        say(str(error))
-        return BAD_INPUT
+        # Half a second of imports, in which Ctrl-C must find an answer, too.
+        return int(import_module("orchestrator.commands.parser").dispatch(arguments))
     except KeyboardInterrupt:
-        say("interrupted")
-        return INTERRUPTED
-    except BrokenPipeError:
-        # The reader of our output has gone; nothing more can be told to anybody.
-        sys.stderr.close()
-        return FAILED
-
-
-def parser() -> argparse.ArgumentParser:
-    """The parser of all commands."""
-    parser = argparse.ArgumentParser(
-        prog="auv-fmu",
-        description="Co-simulate an autonomous underwater vehicle with limited torque and "
-        "without velocity sensors, from FMI 2.0 components.",
-        epilog="Exit status: 0; 1 if a simulation failed, with the rows it had kept; 2 for bad "
-        "usage or input.",
-    )
-    parser.add_argument("--version", action="version", version=version("auv-fmu"))
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for group in (build, run, look, new, paper, exchange, upkeep):
-        group.add_to(commands)
-    return parser
+        print("auv-fmu: interrupted", file=sys.stderr)
+        return 130
 
 
 if __name__ == "__main__":

@@ -61,7 +61,9 @@ def _run(options: argparse.Namespace) -> int:
     finished = run_into(folder, runs, files, options.command, say)
     for run in finished:
         _print_summary(run.metrics)
-    print(f"written to {folder}{os.sep}")
+    print(f"written to {finished[0].folder}{os.sep}")
+    if finished[0].folder != folder:
+        say(f"{folder} keeps the whole result that was there before")
     return max(status(run.name, run.ending) for run in finished)
 
 

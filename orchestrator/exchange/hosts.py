@@ -24,7 +24,7 @@ from fmpy.ssp.simulation import simulate_ssp
 
 from orchestrator.errors import InputError, last_line
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.simulation import simulate
+from orchestrator.master.simulation import completed
 from orchestrator.master.table import Table
 from orchestrator.system.container import write_container
 from orchestrator.system.osp import write_osp
@@ -195,7 +195,7 @@ def compare(system: System, hosts: Sequence[str], steps: int, step: float) -> li
 
     """
     expected = Table()
-    simulate(system, Experiment(steps * step, step, "jacobi"), [expected])
+    completed(system, Experiment(steps * step, step, "jacobi"), [expected])
     names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
     table = expected.group(*names)[1:]
     return [_verdict(system, host, steps, step, names, table) for host in hosts]

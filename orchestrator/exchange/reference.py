@@ -16,7 +16,7 @@ from fmpy.util import write_csv
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.files import CsvFile
-from orchestrator.master.simulation import simulate
+from orchestrator.master.simulation import completed
 from orchestrator.system.component import Component, read_component
 
 #: Length of the reference runs [s] and their step [s].
@@ -72,7 +72,7 @@ def write_reference(dist: Path, folder: Path) -> list[Path]:
         written.append(_write_options(stem))
     written.append(folder / "auv_ref.csv")
     jacobi = Experiment(STOP_TIME, STEP, "jacobi")
-    simulate(closed_loop(dist), jacobi, [CsvFile(written[-1])])
+    completed(closed_loop(dist), jacobi, [CsvFile(written[-1])])
     written.append(_write_options(folder / "auv"))
     return written
 

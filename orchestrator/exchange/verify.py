@@ -11,7 +11,7 @@ import numpy as np
 from orchestrator.errors import InputError
 from orchestrator.experiments.preparation import DEFAULT_STEP
 from orchestrator.master.experiment import ORDERS, Experiment
-from orchestrator.master.simulation import simulate
+from orchestrator.master.simulation import completed
 from orchestrator.master.table import Table
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
@@ -40,6 +40,8 @@ def verify(path: Path, system: System, tolerance: float) -> str:
             text names the port that differs first.
 
     """
+    if not tolerance >= 0.0:
+        raise InputError(f"tolerance {tolerance:g} must not be negative")
     time, columns = _read(path)
     stop_time = float(time[-1])
     if not stop_time > 0.0:
@@ -49,16 +51,16 @@ def verify(path: Path, system: System, tolerance: float) -> str:
         for component in system.components.values()
         for variable in component.having("output")
     }
+    # Inputs are left out: tools write them before or after the exchange.
+    shared = {name: column for name, column in columns.items() if name in outputs}
+    if not shared:
+        raise InputError(
+            f"{path}: no column is named after an output; they are named as {min(outputs)}"
+        )
     complaints = []
     for order in ORDERS:
         ours = Table()
-        simulate(system, Experiment(stop_time, system.step or DEFAULT_STEP, order), [ours])
-        # Inputs are left out: tools write them before or after the exchange.
-        shared = {name: column for name, column in columns.items() if name in outputs}
-        if not shared:
-            raise InputError(
-                f"{path}: no column is named after an output; they are named as {min(outputs)}"
-            )
+        completed(system, Experiment(stop_time, system.step or DEFAULT_STEP, order), [ours])
         complaint = _first_difference(time, shared, ours, tolerance)
         if complaint is None:
             return f"{len(shared)} ports agree over {stop_time:g} s, in {order} order"

@@ -30,6 +30,9 @@ DEFAULT_FOLDER = Path("fmus", "dist")
 #: The archive of the closed loop, and what the FMUs beside it were built from.
 ARCHIVE, MANIFEST = "auv.ssp", "build.json"
 
+#: Names the FMUs in a folder of the cache.
+_CONTENTS = "contents.txt"
+
 #: Packages that the FMUs are made of.
 _SOURCES = ("auv_fmu", "fmus", "pythonfmu")
 
@@ -111,7 +114,7 @@ def current_fmus() -> Path:
     """
     cache_folder = user_cache_path("auv-fmu", appauthor=False) / "fmus"
     folder = cache_folder / _fingerprint()
-    if folder.is_dir():
+    if _is_whole(folder):
         return folder
     try:
         cache_folder.mkdir(parents=True, exist_ok=True)
@@ -122,15 +125,25 @@ def current_fmus() -> Path:
             "that can be written"
         ) from error
     try:
-        run_fmus("packaging.build", partial)
+        names = [path.name for path in run_fmus("packaging.build", partial)]
+        (partial / _CONTENTS).write_text("\n".join(names), encoding="utf-8")
+        # What somebody has cleaned away in part is made anew.
+        rmtree(folder, ignore_errors=True)
         partial.rename(folder)
     except OSError:
         # Another process was first; its folder holds the same.
-        if not folder.is_dir():
+        if not _is_whole(folder):
             raise
     finally:
         rmtree(partial, ignore_errors=True)
     return folder
+
+
+def _is_whole(folder: Path) -> bool:
+    contents = folder / _CONTENTS
+    return contents.is_file() and all(
+        (folder / name).is_file() for name in contents.read_text(encoding="utf-8").splitlines()
+    )
 
 
 def _fingerprint() -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
@@ -127,7 +128,7 @@ class Result(Table):
         return plot([(self._prepared.scenario.name, self)], patterns)
 
     def save(self, folder: str | Path, format: str = "csv") -> Path:  # noqa: A002
-        """Write table, metrics.json and run.json, as the command line does.
+        """Write the table, metrics.json and run.json; `auv-fmu plot` and `view` take the folder.
 
         Args:
             folder: made if it does not exist; an earlier result in it is replaced.
@@ -184,16 +185,24 @@ def simulate(
 
     Raises:
         ValueError: a name, a value or a file is not usable; the text says what to change.
+        KeyboardInterrupt: Ctrl-C, when the step has ended that it came in.
 
     """
     if isinstance(system, System):
         scenario = Scenario(system.name)
     else:
         scenario, system = loaded(str(system))
+    if not isinstance(parameters, Mapping | None):
+        raise InputError(f"parameters: a mapping by component.parameter, not {parameters!r}")
     changes: dict[PortName, object] = {
-        port_name(name): value for name, value in (parameters or {}).items()
+        port_name(str(name)): value for name, value in (parameters or {}).items()
     }
     prepared = prepare(scenario, system, Request(stop_time, step, order, changes))
     result = Result(prepared)
-    run(prepared.system, prepared.experiment, [result, *([Progress(scenario.name)] * progress)])
+    ending = run(
+        prepared.system, prepared.experiment, [result, *([Progress(scenario.name)] * progress)]
+    )
+    for number in ending.signals:
+        # Held back while the FMUs computed; now it does what it does elsewhere.
+        signal.raise_signal(number)
     return result

@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -19,14 +19,15 @@ from orchestrator.analysis.sensors import velocities_reaching
 from orchestrator.analysis.signals import CONTROLLER
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
-from orchestrator.experiments.folder import replaced
+from orchestrator.experiments.folder import place_of, replaced
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.experiments.record import write_record
 from orchestrator.master.files import FORMATS
 from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.observer import Ending, Observer
 from orchestrator.master.progress import Progress
-from orchestrator.master.selection import Selection, matching
+from orchestrator.master.row import KINDS
+from orchestrator.master.selection import Selection, check_interval, matches, matching
 from orchestrator.master.simulation import simulate
 from orchestrator.system.structure import System
 
@@ -51,8 +52,9 @@ class Files:
 
 @dataclass(frozen=True)
 class Finished:
-    """A run whose files are written: what metrics.json holds, and how it has ended."""
+    """A run whose files are written: where, what metrics.json holds, and how it has ended."""
 
+    folder: Path
     name: str
     metrics: dict[str, Any]
     ending: Ending
@@ -78,7 +80,12 @@ def run_into(
         InputError: a run cannot be made, or its files cannot be written.
 
     """
-    tables = [selected_columns(prepared.system, files.columns) for prepared in runs]
+    if files.interval is not None:
+        check_interval(files.interval)
+    tables = [
+        selected_columns(prepared.system, files.columns, is_companion=i > 0)
+        for i, prepared in enumerate(runs)
+    ]
     started = datetime.now(UTC)
     with (
         held_interrupts(_answer) as interrupts,
@@ -110,7 +117,8 @@ def run_into(
         # The record of the first names the files of all, so it comes last.
         for target, prepared, finished, seen in reversed(done):
             write_record(target, prepared, seen.header, finished.ending, command, started)
-        return [finished for _, _, finished, _ in done]
+        place = place_of(unfinished, folder)
+        return [replace(finished, folder=place) for _, _, finished, _ in done]
 
 
 def _answer(interrupts: Interrupts) -> None:
@@ -139,7 +147,7 @@ def _run(
     ending = simulate(system, prepared.experiment, observers)
     values = metrics_json(metrics, prepared)
     write_metrics(folder, values)
-    return Finished(scenario.name, values, ending), seen
+    return Finished(folder, scenario.name, values, ending), seen
 
 
 def metrics_json(metrics: Metrics, prepared: Prepared) -> dict[str, Any]:
@@ -155,12 +163,13 @@ def write_metrics(folder: Path, values: dict[str, Any]) -> None:
     (folder / "metrics.json").write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
 
 
-def selected_columns(system: System, wanted: str) -> list[str] | None:
+def selected_columns(system: System, wanted: str, is_companion: bool = False) -> list[str] | None:
     """The columns of a table.
 
     Args:
         system: that is run.
         wanted: `all`, `outputs`, or patterns with commas between them.
+        is_companion: whether patterns may match nothing, because they are meant for another run.
 
     Raises:
         InputError: a pattern matches no column.
@@ -174,11 +183,13 @@ def selected_columns(system: System, wanted: str) -> list[str] | None:
         for component in system.components.values()
         for causality in (("output",) if outputs else ("input", "output"))
         for variable in component.having(causality)
-        if variable.type != "String"
+        if variable.type in KINDS
     ]
     if outputs:
         return names
     patterns = [pattern.strip() for pattern in wanted.split(",") if pattern.strip()]
     if not patterns:
         raise InputError("--columns: name columns, or write all or outputs")
+    if is_companion:
+        return [name for name in names if any(matches(name, pattern) for pattern in patterns)]
     return matching(names, patterns)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -36,6 +37,11 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
     chosen, wires = wiring["components"], wiring["wires"]
     if scenario is not None:
         chosen = chosen | scenario.components
+        for name in chosen:
+            if not re.fullmatch(r"\w+", name):
+                raise InputError(
+                    f"{scenario.name}: component {name!r}: write letters, digits and _ alone"
+                )
         for target in scenario.wires.keys() - wires.keys():
             if scenario.wires[target] is False:
                 raise InputError(

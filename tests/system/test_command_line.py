@@ -241,6 +241,8 @@ def test_animation_is_written(workplace):
         (["run", "fig4", "--set", "plant.noise.seed=4294967297"], "must be at most"),
         (["run", "fig4", "--set", "controller.K1=20"], "did you mean K1[1]"),
         (["run", "fig4", "--interval", "0"], "must be positive"),
+        (["run", "named.toml"], "letters, digits and _ alone"),
+        (["verify", "broken.ssp", "--tolerance", "nan"], "must not be negative"),
         (["run", "fig4", "--columns", "plant.tua.*"], "no column matches"),
         (["run", "unwired.toml"], "no wire 'plant.tua' to remove; did you mean plant.tau"),
         (["run", "fig4", "--stop-time", "0.1", "--out", "taken"], "cannot write into"),
@@ -263,6 +265,7 @@ def test_bad_input_is_one_line_and_status_2(workplace, capsys, arguments, reason
     (workplace / "wires.toml").write_text('[wires]\n"plant.tau" = 5')
     (workplace / "only.toml").write_text('only = ["pilot"]')
     (workplace / "bool.toml").write_text("stop_time = true")
+    (workplace / "named.toml").write_text('[components]\n"a.b" = "AuvPlant"')
     (workplace / "unwired.toml").write_text('[wires]\n"plant.tua" = false')
     (workplace / "compare.toml").write_text('stop_time = 0.1\ncompare = "nosuch"')
     (workplace / "taken" / "result.csv").mkdir(parents=True)

@@ -169,6 +169,40 @@ def python(code: str, *arguments: object, folder: Path) -> subprocess.CompletedP
     )  # fmt: skip
 
 
+def test_runs_in_several_threads_share_what_is_loaded(dist: Path, tmp_path: Path):
+    """Six threads from a cold start; one folder for each FMU and the archive."""
+    code = """
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from tempfile import gettempdir
+from orchestrator import load, simulate
+system = load(sys.argv[1])
+with ThreadPoolExecutor(6) as pool:
+    runs = list(pool.map(lambda _: simulate(system, stop_time=0.5), range(6)))
+assert all((run.rows == runs[0].rows).all() for run in runs)
+[folder] = Path(gettempdir()).iterdir()
+print(len(list(folder.iterdir())))
+"""
+    process = python(code, dist / "auv.ssp", folder=tmp_path)
+    assert process.stdout == "5\n", process.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_ctrl_c_ends_a_script_that_simulates(dist: Path, tmp_path: Path):
+    code = """
+import os, signal, sys, threading
+from orchestrator import load, simulate
+system = load(sys.argv[1])
+threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+for _ in range(1000):
+    simulate(system, stop_time=20.0)
+"""
+    process = python(code, dist / "auv.ssp", folder=tmp_path)
+    assert "KeyboardInterrupt" in process.stderr
+    assert process.returncode != 0
+
+
 def test_nothing_is_left_in_the_temporary_folder(dist: Path, tmp_path: Path):
     process = python(_RUNS_AND_FAILS, dist / "auv.ssp", folder=tmp_path)
     assert process.returncode == 0, process.stderr

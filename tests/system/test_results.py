@@ -42,6 +42,22 @@ def test_interval_and_columns_choose_from_the_same_numbers():
     assert Path("some/metrics.json").read_text() == Path("all/metrics.json").read_text()
 
 
+def test_a_companion_without_a_column_does_without_it():
+    arguments = ["--stop-time", "0.1", "--no-figures", "--columns", "controller.y_hat,plant.y"]
+    assert main(["run", "fig5", *arguments]) == 0
+    assert "controller.y_hat.x" in read_columns(Path("results/fig5/result.csv"))
+    assert read_columns(Path("results/fig5/fig5-pd/result.csv")) == tuple(
+        f"plant.y.{k}" for k in "xyz"
+    )
+
+
+def test_our_own_table_is_verified_with_the_step_of_its_scenario(capsys):
+    Path("fine.toml").write_text("stop_time = 0.5\nstep = 0.01\n")
+    assert main(["run", "fine.toml", "--no-figures"]) == 0
+    assert main(["verify", "results/fine/result.csv", "--scenario", "fine.toml"]) == 0
+    assert "agree over 0.5 s" in capsys.readouterr().out
+
+
 def test_outputs_alone():
     arguments = ["--stop-time", "0.1", "--no-figures", "--columns", "outputs"]
     assert main(["run", "fig4", *arguments]) == 0

@@ -13,12 +13,14 @@ from orchestrator.errors import InputError
 from orchestrator.experiments.folder import RECORD, replaced
 
 
-def write(folder: Path, *names: str, text: str = "new") -> None:
+def write(folder: Path, *names: str, text: str = "new", failure: str | None = None) -> None:
     with replaced(folder) as unfinished:
         for name in names:
             (unfinished / name).parent.mkdir(exist_ok=True)
             (unfinished / name).write_text(text)
-        (unfinished / RECORD).write_text(json.dumps({"files": [*names, RECORD]}))
+        (unfinished / RECORD).write_text(
+            json.dumps({"files": [*names, RECORD], "failure": failure})
+        )
 
 
 def write_half(folder: Path, error: BaseException) -> None:
@@ -99,3 +101,28 @@ def test_an_edited_record_does_not_lead_out_of_the_folder(tmp_path: Path):
     (tmp_path / "r" / RECORD).write_text(json.dumps({"files": ["../precious", "/etc/hostname"]}))
     write(tmp_path / "r", "a.csv")
     assert (tmp_path / "precious").is_file()
+
+
+def test_a_run_that_came_to_no_end_stands_beside_a_whole_one_until_the_next(tmp_path: Path):
+    write(tmp_path / "r", "a.csv", text="whole")
+    write(tmp_path / "r", "a.csv", "below/b.csv", text="half", failure="interrupted")
+    assert (tmp_path / "r" / "a.csv").read_text() == "whole"
+    assert (tmp_path / "r" / "incomplete" / "a.csv").read_text() == "half"
+    write(tmp_path / "r", "a.csv")
+    assert files(tmp_path / "r") == {"a.csv", RECORD}
+    assert not (tmp_path / "r" / "incomplete").exists()
+
+
+def test_a_run_that_came_to_no_end_takes_the_place_of_another_such(tmp_path: Path):
+    write(tmp_path / "r", "a.csv", text="half", failure="interrupted")
+    write(tmp_path / "r", "a.csv", failure="stopped")
+    assert (tmp_path / "r" / "a.csv").read_text() == "new"
+
+
+def test_a_folder_in_the_way_changes_nothing(tmp_path: Path):
+    write(tmp_path / "r", "a.csv", text="old")
+    (tmp_path / "r" / "z.csv").mkdir()
+    with pytest.raises(InputError, match=r"z\.csv is a folder"):
+        write(tmp_path / "r", "a.csv", "z.csv")
+    assert (tmp_path / "r" / "a.csv").read_text() == "old"
+    assert (tmp_path / "r" / RECORD).is_file()

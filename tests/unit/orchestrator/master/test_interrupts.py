@@ -49,3 +49,14 @@ def test_other_threads_hold_nothing():
     thread.start()
     thread.join()
     assert not found[0]
+
+
+def test_what_is_ignored_stays_ignored():
+    """nohup ignores SIGHUP."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with held_interrupts() as interrupts:
+            os.kill(os.getpid(), signal.SIGHUP)
+            assert not interrupts
+    finally:
+        signal.signal(signal.SIGHUP, before)
