@@ -34,9 +34,9 @@ class _Division(NamedTuple):
 
     @property
     def mean(self) -> np.ndarray:
-        """The mean row; its time is the middle of the division."""
-        mean: np.ndarray = self.integral / (self.pairs[-1, 1, 0] - self.pairs[0, 0, 0])
-        return mean
+        """The mean row, at the time at which the division ends."""
+        start, end = self.pairs[0, 0, 0], self.pairs[-1, 1, 0]
+        return np.append(end, self.integral[1:] / (end - start))
 
 
 class VisibleRows(Table):
@@ -46,6 +46,12 @@ class VisibleRows(Table):
     largest, so the envelope of noise and chatter stays, and with each row the one before it, so
     that steps stay whole. Neighbouring divisions are merged when there are too many. So memory does
     not grow with the length of the run, and nobody has to know before how long it will be.
+
+    Attributes:
+        means: of a longer run, for the rows that are kept are its extremes and no sample of it: a
+            row at the start, and at the end of each division the mean over it of all signals,
+            linear between their rows. None: all rows are kept.
+
     """
 
     def __init__(self, watched: Collection[str] = DRAWN) -> None:
@@ -57,6 +63,7 @@ class VisibleRows(Table):
         """
         super().__init__()
         self._watched_names = watched
+        self.means: Table | None = None
 
     def begin(self, header: Header) -> None:
         """Make room for a run that is kept whole."""
@@ -64,7 +71,7 @@ class VisibleRows(Table):
         self._watched = [
             i for i, name in enumerate(header.columns, 1) if name in self._watched_names
         ]
-        self._means: Table = self
+        self.means = None
         self._divisions: list[_Division] = []
         self._last = np.empty((0, 1 + len(header.columns)))
         self._per_division, self._in_last = _WHOLE // _DIVISIONS, 0
@@ -77,7 +84,8 @@ class VisibleRows(Table):
             super().take(rows)
             return
         else:
-            rows = np.vstack((self.rows[:1], self.rows, rows))
+            rows = np.vstack((self.rows, rows))
+            rows = np.vstack((rows[:1], rows))
             self._rows, self._n = rows[:0].copy(), 0
         self._last = rows[-1:].copy()
         pairs = sliding_window_view(rows, 2, axis=0).swapaxes(1, 2)
@@ -95,17 +103,9 @@ class VisibleRows(Table):
             rows = pairs.reshape(-1, pairs.shape[-1])
             _, first = np.unique(rows[:, 0], return_index=True)
             self._rows, self._n = rows[first], len(first)
-            means = np.array([division.mean for division in self._divisions])
-            self._means = Table.of(self.header, means, ending)
+            means = [self._rows[0], *(division.mean for division in self._divisions)]
+            self.means = Table.of(self.header, np.array(means), ending)
             self._divisions = []
-
-    @property
-    def means(self) -> Table:
-        """Rows of which means can be taken: all, or, of a longer run, the means of its divisions.
-
-        The rows that are kept of a longer run are no sample of it: they are its extremes.
-        """
-        return self._means
 
     def _add(self, pairs: np.ndarray) -> None:
         """Put rows, each behind the one before it, into the last division, or into a new one."""

@@ -21,7 +21,7 @@ _NEGLIGIBLE = 1e-3
 _WINDOW = 0.01
 
 
-#: The times and values of a signal, from a table; linear in its rows.
+#: Times and values of a signal, linear in the rows of the table that it is taken from.
 Signal = Callable[[Table], tuple[np.ndarray, np.ndarray]]
 
 
@@ -38,8 +38,11 @@ def draw_signal(axes: Axes, table: Table, signal: Signal, **line: Any) -> bool:
         return False
     # Below all lines, whichever is drawn first.
     axes.plot(time, values, color=line["color"], linewidth=0.5, alpha=0.35, zorder=1.5)
-    means = table.means if isinstance(table, VisibleRows) else table
-    time, values = signal(means)
+    if isinstance(table, VisibleRows) and table.means is not None:
+        # Extremes have another mean; means hold from the end of one division to that of the next.
+        ends, means = signal(table.means)
+        time = np.repeat(np.append(table.time[0], ends), 2)[1:-1]
+        values = np.repeat(means, 2)
     axes.plot(time, moving_mean(time, values, mean_window(table.time)), **line)
     return True
 
