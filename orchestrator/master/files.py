@@ -111,7 +111,8 @@ def read_rows(path: Path) -> Iterator[np.ndarray]:
         if path.suffix == ".parquet":
             with _parquet(path) as file:
                 for batch in file.iter_batches(_ROWS):
-                    yield np.column_stack([column.to_numpy() for column in batch.columns])
+                    columns = [column.to_numpy(zero_copy_only=False) for column in batch.columns]
+                    yield np.column_stack(columns).astype(float, copy=False)
         else:
             with path.open(encoding="utf-8-sig") as lines:
                 width = 1 + len(_behind_time(next(csv.reader(lines), ())))

@@ -67,6 +67,16 @@ def test_tables_of_other_tools_are_read(tmp_path: Path, text: str):
     np.testing.assert_array_equal(np.vstack(list(read_rows(path))), [[0, 1], [1, 2]])
 
 
+def test_parquet_of_other_tools_is_read_where_it_holds_numbers(tmp_path: Path):
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    path = tmp_path / "other.parquet"
+    parquet.write_table(arrow.table({"time": [0, 1], "a.b": [True, None]}), path)
+    np.testing.assert_array_equal(np.vstack(list(read_rows(path))), [[0, 1], [1, np.nan]])
+    parquet.write_table(arrow.table({"time": [0, 1], "a.b": ["x", "y"]}), path)
+    with pytest.raises(InputError, match=r"not a table of a run: .*'x'"):
+        list(read_rows(path))
+
+
 def test_a_table_without_rows_has_none(tmp_path: Path):
     path = tmp_path / "empty.csv"
     path.write_text("time,a.b\n\n")
