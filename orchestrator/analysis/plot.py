@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from io import BytesIO
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -83,6 +85,10 @@ def group_of(column: str) -> str:
     return column
 
 
+def _column(name: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
+    return table.time, table[name]
+
+
 def _draw_panel(
     axes: Axes, group: str, unit: str, members: Sequence[str], runs: Sequence[tuple[str, Table]]
 ) -> bool:
@@ -100,9 +106,13 @@ def _draw_panel(
             colour = (j if len(members) > 1 else i) % len(COLOURS)
             style = (i if len(runs) > 1 else j) % len(STYLES)
             has_means |= draw_signal(
-                axes, table.time, table[member], color=COLOURS[colour], linestyle=STYLES[style],
+                axes,
+                table,
+                partial(_column, member),
+                color=COLOURS[colour],
+                linestyle=STYLES[style],
                 label=", ".join(texts),
-            )  # fmt: skip
+            )
     name = group if len(members) > 1 else members[0]
     axes.set_ylabel(f"{name}\n[{unit}]" if unit else name)
     if len(members) * len(runs) > 1:

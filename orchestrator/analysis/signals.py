@@ -13,6 +13,7 @@ import numpy as np
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import control_point
 from auv_fmu.vehicle import Vehicle
+from orchestrator.errors import InputError
 from orchestrator.master.table import Table
 from orchestrator.system.names import PortName
 
@@ -87,9 +88,16 @@ def unit_of(column: str) -> str:
 
 
 def parameter(table: Table, name: str) -> float:
-    """The value of a Real parameter `component.name` in a run."""
+    """The value of a Real parameter `component.name` in a run.
+
+    Raises:
+        InputError: the record of the run holds something else.
+
+    """
     component, port = name.split(".", 1)
-    value: float = table.parameters[PortName(component, port)]
+    value = table.parameters[PortName(component, port)]
+    if not isinstance(value, int | float):
+        raise InputError(f"{name} is {value!r}, not a number")
     return value
 
 

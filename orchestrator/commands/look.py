@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -66,8 +67,8 @@ def _add_file(parser: argparse.ArgumentParser, text: str, default: Path | None =
 def _plot(options: argparse.Namespace) -> int:
     if options.out.suffix not in _PLOTS:
         raise InputError(f"{options.out}: write a {', '.join(_PLOTS)}")
-    paths = [Path(text) for text in options.what if Path(text).exists()]
-    patterns = [text for text in options.what if not Path(text).exists()]
+    paths = [Path(text) for text in options.what if _is_there(text)]
+    patterns = [text for text in options.what if not _is_there(text)]
     if not paths:
         raise InputError(f"{patterns[0]}: no such result; give the folder or the table of a run")
     runs = [read_result(path, lambda columns: wanted(columns, patterns)) for path in paths]
@@ -78,13 +79,20 @@ def _plot(options: argparse.Namespace) -> int:
     return OK
 
 
+def _is_there(text: str) -> bool:
+    """Whether there is such a file or folder; not if the text cannot be the name of one."""
+    with suppress(OSError):
+        return Path(text).exists()
+    return False
+
+
 def _view(options: argparse.Namespace) -> int:
     file = table_in(options.result)
     out = options.out or file.with_name("view.html")
     if out.suffix != ".html":
         raise InputError(f"{out}: write a .html")
     name, table = read_result(file)
-    title = read_record(file.parent).get("title") or name
+    title = str(read_record(file).get("title") or name)
     try:
         text = page(title, table)
     except InputError as error:
@@ -118,6 +126,6 @@ def _write(path: Path, write: Callable[[Path], object]) -> None:
     except OSError as error:
         raise InputError(f"cannot write {path}: {reason(error)}; choose --out FILE") from error
     finally:
-        if unfinished.exists():
-            unfinished.unlink()
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
     print(path)

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Sequence
+from math import inf
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from orchestrator.analysis.visible import VisibleRows
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, reason
 from orchestrator.experiments.folder import RECORD
 from orchestrator.experiments.record import read_header
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.files import FORMATS, count_rows, read_columns, read_rows
+from orchestrator.master.files import FORMATS, read_columns, read_rows
 from orchestrator.master.observer import Ending, Header
 from orchestrator.master.table import Table
 
@@ -33,14 +36,13 @@ def read_result(path: Path, watched: Choice | None = None) -> tuple[str, Table]:
 
     """
     file = table_in(path)
-    record = read_record(file.parent)
-    columns, n = read_columns(file), count_rows(file)
-    if n < 1:
+    record = read_record(file)
+    columns, blocks = read_columns(file), read_rows(file)
+    first = next(blocks, None)
+    if first is None:
         raise InputError(f"{file}: has no rows")
-    table = VisibleRows(n=n) if watched is None else VisibleRows(watched(columns), n)
-    blocks = read_rows(file)
-    first = next(blocks)
-    table.begin(_header(record, columns, first))
+    table = VisibleRows() if watched is None else VisibleRows(watched(columns))
+    table.begin(_header(record, columns, first, file))
     table.take(first)
     for rows in blocks:
         table.take(rows)
@@ -55,37 +57,42 @@ def table_in(path: Path) -> Path:
         InputError: there is none.
 
     """
-    if path.is_file():
-        return path
-    for ending in FORMATS:
-        file = path / f"result.{ending}"
-        if file.is_file():
-            return file
+    try:
+        for file in (path, *(path / f"result.{ending}" for ending in FORMATS)):
+            if file.is_file():
+                return file
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {reason(error)}") from error
     raise InputError(f"{path}: holds no result.csv or result.parquet")
 
 
-def read_record(folder: Path) -> dict[str, Any]:
-    """The record in a folder; empty if there is none.
+def read_record(table: Path) -> dict[str, Any]:
+    """The record of the run that has written a table; empty if none beside it names the table.
 
     Raises:
         InputError: it is broken.
 
     """
-    file = folder / RECORD
+    file = table.with_name(RECORD)
     if not file.is_file():
         return {}
     try:
         record = json.loads(file.read_text(encoding="utf-8"))
+        if table.name not in record["files"]:
+            return {}
         read_header(record, ())
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{file}: not the record of a run") from error
     return dict(record)
 
 
-def _header(record: dict[str, Any], columns: tuple[str, ...], rows: Any) -> Header:
+def _header(
+    record: dict[str, Any], columns: tuple[str, ...], rows: np.ndarray, file: Path
+) -> Header:
+    """The header of a table, with its first rows; where no record tells the step, the first is."""
     if record:
         return read_header(record, columns)
     step = float(rows[1, 0] - rows[0, 0]) if len(rows) > 1 else 1.0
-    if not step > 0.0:
-        raise InputError("the times of a table must grow")
+    if not 0.0 < step < inf:
+        raise InputError(f"{file}: times must grow")
     return Header(columns, Experiment(step, step))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
@@ -95,28 +95,9 @@ def read_columns(path: Path) -> tuple[str, ...]:
     with _explained(path):
         if path.suffix == ".parquet":
             with _parquet(path) as file:
-                first, *names = file.schema_arrow.names
-        else:
-            with path.open(encoding="utf-8") as lines:
-                first, *names = lines.readline().rstrip("\n").split(",")
-        if first != "time":
-            raise ValueError(f"its first column is {first!r}, not 'time'")
-    return tuple(names)
-
-
-def count_rows(path: Path) -> int:
-    """How many rows a file has.
-
-    Raises:
-        InputError: the file is no table of a run.
-
-    """
-    with _explained(path):
-        if path.suffix == ".parquet":
-            with _parquet(path) as file:
-                return int(file.metadata.num_rows)
-        with path.open("rb") as lines:
-            return sum(block.count(b"\n") for block in iter(lambda: lines.read(1 << 20), b"")) - 1
+                return _behind_time(file.schema_arrow.names)
+        with path.open(encoding="utf-8-sig") as lines:
+            return _behind_time(next(csv.reader(lines), ()))
 
 
 def read_rows(path: Path) -> Iterator[np.ndarray]:
@@ -130,12 +111,26 @@ def read_rows(path: Path) -> Iterator[np.ndarray]:
         if path.suffix == ".parquet":
             with _parquet(path) as file:
                 for batch in file.iter_batches(_ROWS):
-                    yield np.column_stack([column.to_numpy() for column in batch.columns])
+                    columns = [column.to_numpy(zero_copy_only=False) for column in batch.columns]
+                    yield np.column_stack(columns).astype(float, copy=False)
         else:
-            with path.open(encoding="utf-8") as lines:
-                next(lines, None)
-                while block := list(islice(lines, _ROWS)):
-                    yield np.loadtxt(block, delimiter=",", ndmin=2)
+            with path.open(encoding="utf-8-sig") as lines:
+                width = 1 + len(_behind_time(next(csv.reader(lines), ())))
+                filled = (line for line in lines if line.strip())
+                while block := list(islice(filled, _ROWS)):
+                    rows = np.loadtxt(block, delimiter=",", comments=None, quotechar='"', ndmin=2)
+                    if rows.shape[1] != width:
+                        raise ValueError(f"rows of {rows.shape[1]} values below {width} names")
+                    yield rows
+
+
+def _behind_time(names: Sequence[str]) -> tuple[str, ...]:
+    if not names:
+        raise ValueError("it is empty")
+    first, *others = names
+    if first != "time":
+        raise ValueError(f"its first column is {first!r}, not 'time'")
+    return tuple(others)
 
 
 def _parquet(path: Path) -> Any:
@@ -156,5 +151,5 @@ def _explained(path: Path) -> Iterator[None]:
         raise
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {reason(error)}") from error
-    except ValueError as error:
+    except (ValueError, csv.Error) as error:
         raise InputError(f"{path}: not a table of a run: {reason(error)}") from error

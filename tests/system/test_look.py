@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 from pathlib import Path
@@ -10,6 +11,7 @@ from shutil import which
 import pytest
 
 from orchestrator.commands.main import main
+from orchestrator.experiments.stored import read_result
 
 BROWSER = which("chromium") or which("chromium-browser") or which("google-chrome")
 
@@ -52,6 +54,8 @@ def test_plots_need_no_record(results, tmp_path):
         (["plot", "plant.y"], "plant.y: no such result"),
         (["plot", "{noisy}", "--out", "plot.txt"], "write a .png, .svg, .pdf"),
         (["plot", "."], "holds no result"),
+        (["plot", 300 * "a"], "no such result"),
+        (["view", 300 * "a"], "File name too long"),
         (["view", "nowhere"], "nowhere: holds no result"),
         (["view", "{noisy}", "--out", "page.txt"], "write a .html"),
         (["animate", "fig4", "--stop-time", "0.1", "--out", "film.avi"], "write a .gif"),
@@ -68,6 +72,54 @@ def test_bad_input_is_one_line_and_status_2(
     assert reason in error
     assert error.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("", "it is empty"),
+        ("time,a.b\n\n", "has no rows"),
+        ("time,a.b\n1,2\n0,1\n", "times must grow"),
+        ("time,a.b\n0,1,2\n1,2,3\n", "rows of 3 values below 2 names"),
+    ],
+)
+def test_what_is_no_table_is_refused_in_one_line(tmp_path, capsys, text, why):
+    table = tmp_path / "odd.csv"
+    table.write_text(text)
+    assert main(["plot", str(table), "a.b", "--out", str(tmp_path / "plot.png")]) == 2
+    error = capsys.readouterr().err
+    assert "odd.csv" in error
+    assert why in error
+    assert error.count("\n") == 1
+
+
+def test_table_without_a_newline_at_its_end_is_drawn(tmp_path):
+    table = tmp_path / "other.csv"
+    table.write_text('"time","a.b"\n0,1\n1,2')
+    assert main(["plot", str(table), "a.b", "--out", str(tmp_path / "plot.png")]) == 0
+
+
+def test_record_that_does_not_name_a_table_is_not_its_record(results, tmp_path):
+    """Another table beside the record: nothing is known of its parameters."""
+    for name in ("result.csv", "other.csv"):
+        (tmp_path / name).write_bytes((results / "quiet" / "result.csv").read_bytes())
+    (tmp_path / "run.json").write_bytes((results / "quiet" / "run.json").read_bytes())
+    assert read_result(tmp_path)[1].parameters
+    name, table = read_result(tmp_path / "other.csv")
+    assert name == "other"
+    assert not table.parameters
+
+
+def test_parameter_of_a_wrong_kind_is_told(results, tmp_path, capsys):
+    pytest.importorskip("plotly")
+    (tmp_path / "result.csv").write_bytes((results / "quiet" / "result.csv").read_bytes())
+    record = json.loads((results / "quiet" / "run.json").read_text())
+    record["parameters"]["plant.ell"] = "long"
+    (tmp_path / "run.json").write_text(json.dumps(record))
+    assert main(["view", str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert "plant.ell is 'long', not a number" in error
+    assert error.count("\n") == 1
 
 
 def test_animation_is_written_with_step_and_order(tmp_path):

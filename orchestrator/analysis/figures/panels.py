@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -153,16 +154,19 @@ def draw_commands(
     has_means = False
     for k, axes, unit in zip(range(3), panels, _ACTUATOR_UNITS, strict=True):
         for i, (run, colour) in enumerate(shown):
-            command = run.result.step_values(COMMANDED[k])[:, 0]
-            # A command is held until the next one, the last until the end of the run.
-            time = np.append(run.result.step_start, run.result.time[-1])
-            command = np.append(command, command[-1])
-            has_means |= draw_signal(axes, time, command, **_line(i, run, colour))
+            command = partial(_command, COMMANDED[k])
+            has_means |= draw_signal(axes, run.result, command, **_line(i, run, colour))
         axes.set_ylabel(rf"$\tau_{ACTUATORS[k]}$ [{unit}]")
         if limited:
             _show_limits(axes, k, [run for run, _ in shown], limited[0], unit)
     title(panels[0], name)
     over_time(panels, runs, has_means)
+
+
+def _command(column: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
+    """A command is held until the next one, the last until the end of the run."""
+    command = table.step_values(column)[:, 0]
+    return np.append(table.step_start, table.time[-1]), np.append(command, command[-1])
 
 
 def _show_limits(axes: Axes, k: int, runs: Sequence[Drawn], limited: Table, unit: str) -> None:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+
+from orchestrator.analysis.visible import VisibleRows
+from orchestrator.master.table import Table
 
 #: A signal chatters if it turns around at more than this share of its rows ...
 _TURNS = 0.2
@@ -17,19 +21,29 @@ _NEGLIGIBLE = 1e-3
 _WINDOW = 0.01
 
 
-def draw_signal(axes: Axes, time: np.ndarray, values: np.ndarray, **line: Any) -> bool:
+#: Times and values of a signal, linear in the rows of the table that it is taken from.
+Signal = Callable[[Table], tuple[np.ndarray, np.ndarray]]
+
+
+def draw_signal(axes: Axes, table: Table, signal: Signal, **line: Any) -> bool:
     """A line; of a signal that chatters a pale one, and its mean upon it.
 
     Returns:
         Whether there is a mean.
 
     """
+    time, values = signal(table)
     if not chatters(values):
         axes.plot(time, values, **line)
         return False
     # Below all lines, whichever is drawn first.
     axes.plot(time, values, color=line["color"], linewidth=0.5, alpha=0.35, zorder=1.5)
-    axes.plot(time, moving_mean(time, values, mean_window(time)), **line)
+    if isinstance(table, VisibleRows) and table.means is not None:
+        # Extremes have another mean; means hold from the end of one division to that of the next.
+        ends, means = signal(table.means)
+        time = np.repeat(np.append(table.time[0], ends), 2)[1:-1]
+        values = np.repeat(means, 2)
+    axes.plot(time, moving_mean(time, values, mean_window(table.time)), **line)
     return True
 
 

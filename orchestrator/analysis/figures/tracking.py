@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from orchestrator.analysis.figures.panels import COMMANDS, PATH, over_time, titl
 from orchestrator.analysis.figures.signal import draw_signal
 from orchestrator.analysis.figures.style import COLOURS, STYLES, Drawn, having, plain
 from orchestrator.analysis.signals import AXES, DY, DY_HAT, THETA_HAT, THETA_UNITS, tracking_error
+from orchestrator.master.table import Table
 
 
 def draw_lines(
@@ -62,13 +64,12 @@ def _estimates(cell: Cell, runs: Sequence[Drawn]) -> None:
 def _velocity(cell: Cell, runs: Sequence[Drawn]) -> None:
     """True and estimated velocity of the control point."""
     run, _ = next(having(runs, (DY_HAT, ())))
-    time, estimates = run.result.step_start, run.result.step_values(*DY_HAT)
+    time, true = run.result.step_start, run.result.start_values(*DY)
     panels = cell.stack(3)
     has_means = False
-    for k, axes, truth, estimate in zip(
-        AXES, panels, run.result.start_values(*DY).T, estimates.T, strict=True
-    ):
-        has_means |= draw_signal(axes, time, estimate, color=COLOURS[1], label="estimated")
+    for k, axes, truth, column in zip(AXES, panels, true.T, DY_HAT, strict=True):
+        estimate = partial(_estimated, column)
+        has_means |= draw_signal(axes, run.result, estimate, color=COLOURS[1], label="estimated")
         axes.plot(time, truth, color=COLOURS[0], linestyle="--", label="true, never measured")
         axes.set_ylabel(rf"$\dot{{y}}_{k}$ [m/s]")
     title(panels[0], "velocity of the control point")
@@ -78,14 +79,23 @@ def _velocity(cell: Cell, runs: Sequence[Drawn]) -> None:
 def _velocity_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
     """Estimated less true velocity of the control point."""
     run, _ = next(having(runs, (DY_HAT, ())))
-    errors = run.result.step_values(*DY_HAT) - run.result.start_values(*DY)
     panels = cell.stack(3)
     has_means = False
-    for k, axes, error in zip(AXES, panels, errors.T, strict=True):
-        has_means |= draw_signal(axes, run.result.step_start, error, color=COLOURS[1])
+    for k, axes, estimate, truth in zip(AXES, panels, DY_HAT, DY, strict=True):
+        error = partial(_velocity_error, estimate, truth)
+        has_means |= draw_signal(axes, run.result, error, color=COLOURS[1])
         axes.set_ylabel(rf"$\Delta \dot{{y}}_{k}$ [m/s]")
     title(panels[0], "estimated less true")
     over_time(panels, [run], has_means)
+
+
+def _estimated(column: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
+    return table.step_start, table.step_values(column)[:, 0]
+
+
+def _velocity_error(estimate: str, truth: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
+    time, estimated = _estimated(estimate, table)
+    return time, estimated - table.start_values(truth)[:, 0]
 
 
 ERRORS = Panel("tracking errors", signals.TRACKING, _errors, 3.4)

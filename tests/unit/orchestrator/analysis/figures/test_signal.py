@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.figure import Figure
 
-from orchestrator.analysis.figures.signal import chatters, moving_mean
+from orchestrator.analysis.figures.signal import chatters, draw_signal, moving_mean
+from orchestrator.analysis.visible import VisibleRows
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.observer import Ending, Header
 
 TIME = 0.02 * np.arange(5001)
 
@@ -41,3 +45,26 @@ def test_mean_of_a_sine_is_smaller_by_the_known_factor():
     inside = (time > w) & (time < 99.0)
     expected = np.sinc(f * w) * np.sin(2 * np.pi * f * time)
     np.testing.assert_allclose(mean[inside], expected[inside], atol=5e-3)
+
+
+def test_mean_that_is_drawn_of_a_long_run_is_that_of_all_its_rows():
+    """Spikes upwards on a slow sine, 2000 s: a spike of 100 in every ten rows adds 10 to it."""
+    n, w = 100_001, 20.0
+    time = 0.02 * np.arange(n)
+    slow = np.sin(2 * np.pi * time / 400.0)
+    noise = np.random.default_rng(4).normal(size=n)
+    values = slow + noise + np.where(np.arange(n) % 10 == 0, 100.0, 0.0)
+    seen = VisibleRows({"a.x"})
+    seen.begin(Header(("a.x",), Experiment(2000.0, 0.02)))
+    seen.take(np.column_stack((time, values)))
+    seen.end(Ending())
+    axes = Figure().subplots()
+    assert draw_signal(axes, seen, lambda table: (table.time, table["a.x"]), color="black")
+    band, mean = axes.lines
+    assert np.ptp(band.get_ydata()) > 100.0
+    t, drawn = np.asarray(mean.get_xdata()), np.asarray(mean.get_ydata())
+    assert (t[0], t[-1]) == (0.0, 2000.0)
+    inside = (t > w) & (t < 2000.0 - w)
+    expected = 10.0 + np.sinc(w / 400.0) * np.sin(2 * np.pi * t / 400.0)
+    # The mean of 1000 rows of noise is 0.03 wide.
+    np.testing.assert_allclose(drawn[inside], expected[inside], atol=0.2)
