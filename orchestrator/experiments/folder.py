@@ -132,11 +132,14 @@ def _remove(folder: Path) -> None:
 
 def _publish(unfinished: Path, folder: Path) -> None:
     files = sorted(path.relative_to(unfinished) for path in unfinished.rglob("*") if path.is_file())
-    earlier = files_of(folder)
+    # What is no result of a run, such as an export, takes no run's place.
+    is_result = Path(RECORD) in files
+    earlier = files_of(folder) if is_result else set()
     for file in files:
         if (folder / file).is_dir():
             raise IsADirectoryError(f"{folder / file} is a folder")
-    (folder / RECORD).unlink(missing_ok=True)
+    if is_result:
+        (folder / RECORD).unlink(missing_ok=True)
     for file in sorted(files, key=lambda file: file == Path(RECORD)):
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
         (unfinished / file).replace(folder / file)

@@ -51,8 +51,7 @@ def simulate(system: System, experiment: Experiment, observers: Sequence[Observe
             blocks = Blocks(len(row.values), observers)
             failure = _advance(experiment, plan, row.values, blocks, interrupts, log)
             if failure is None:
-                for instance in instances.values():
-                    instance.fmu.terminate()
+                _terminate(instances)
             ending = Ending(failure, log.messages, tuple(interrupts.signals))
             tell(ending)
         return ending
@@ -117,6 +116,13 @@ def _parameters(instances: Mapping[str, Instance]) -> dict[PortName, object]:
         for name, instance in instances.items()
         for parameter, value in instance.parameters().items()
     }
+
+
+def _terminate(instances: Mapping[str, Instance]) -> None:
+    """Let FMUs end what they have begun; the rows are there whether they can or not."""
+    for instance in instances.values():
+        with suppress(FMICallException):
+            instance.fmu.terminate()
 
 
 def _advance(

@@ -126,3 +126,11 @@ def test_a_folder_in_the_way_changes_nothing(tmp_path: Path):
         write(tmp_path / "r", "a.csv", "z.csv")
     assert (tmp_path / "r" / "a.csv").read_text() == "old"
     assert (tmp_path / "r" / RECORD).is_file()
+
+
+def test_what_is_no_result_takes_the_place_of_none(tmp_path: Path):
+    """An export into the folder of a run."""
+    write(tmp_path / "r", "a.csv", text="whole")
+    with replaced(tmp_path / "r") as unfinished:
+        (unfinished / "fig4.ssp").write_text("exported")
+    assert files(tmp_path / "r") == {"a.csv", RECORD, "fig4.ssp"}
