@@ -15,8 +15,8 @@ from orchestrator.master.table import Table
 #: Runs of no more rows than this are kept whole.
 _WHOLE = 20_000
 
-#: Times into which a longer run is divided, at least: finer than what a figure resolves.
-_DIVISIONS = 400
+#: Times into which a longer run is divided, at least, and less than twice as many at most.
+_DIVISIONS = 200
 
 
 class _Division(NamedTuple):
@@ -84,8 +84,8 @@ class VisibleRows(Table):
             super().take(rows)
             return
         else:
-            rows = np.vstack((self.rows, rows))
-            rows = np.vstack((rows[:1], rows))
+            first = self.rows[:1] if self._n else rows[:1]
+            rows = np.vstack((first, self.rows, rows))
             self._rows, self._n = rows[:0].copy(), 0
         self._last = rows[-1:].copy()
         pairs = sliding_window_view(rows, 2, axis=0).swapaxes(1, 2)

@@ -16,7 +16,7 @@ from orchestrator.analysis.certificates import CertificatesFile
 from orchestrator.analysis.figures import Drawn, draw
 from orchestrator.analysis.metrics import Metrics
 from orchestrator.analysis.sensors import velocities_reaching
-from orchestrator.analysis.signals import CONTROLLER
+from orchestrator.analysis.signals import CONTROLLER, THETA_HAT
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
 from orchestrator.experiments.folder import place_of, replaced
@@ -135,7 +135,9 @@ def _run(
     folder: Path, prepared: Prepared, files: Files, columns: Sequence[str] | None
 ) -> tuple[Finished, VisibleRows]:
     scenario, system = prepared.scenario, prepared.system
-    metrics, seen = Metrics(), VisibleRows()
+    metrics = Metrics()
+    # Without figures the cautions alone look at what was seen.
+    seen = VisibleRows() if files.figures else VisibleRows(THETA_HAT[:1])
     table = FORMATS[files.format](folder / f"result.{files.format}")
     observers: list[Observer] = [
         Selection(table, files.interval, columns),

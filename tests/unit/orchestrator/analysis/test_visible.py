@@ -13,7 +13,7 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.observer import Ending, Header
 
 #: Rows of runs that are kept whole, and how many divisions they are first divided into.
-WHOLE, DIVISIONS = 20_000, 400
+WHOLE, DIVISIONS = 20_000, 200
 
 
 def seen_of(rows: np.ndarray, block: int, watched: Collection[str] = ("a", "b", "c")):
@@ -75,7 +75,7 @@ def test_short_runs_are_kept_whole(n):
 def test_an_interrupted_run_is_resolved_as_finely_as_a_complete_one():
     """Of a run of a million steps 30,000 were made: hundreds of divisions, not ten."""
     seen = seen_of(random_rows(1, 30_000), 512)
-    assert len(np.unique(seen.time // 75)) == 400
+    assert len(np.unique(seen.time // 150)) == 200
 
 
 def test_means_are_those_of_all_rows():
@@ -86,8 +86,8 @@ def test_means_are_those_of_all_rows():
     seen = seen_of(rows, 512)
     assert seen["a"].mean() > 14.0
     means = seen.means
-    # 100,000 rows in divisions of 200, the first row at the start of the first.
-    ends = np.append(0, np.arange(199, n, 200))
+    # 100,000 rows in divisions of 400, the first row at the start of the first.
+    ends = np.append(0, np.arange(399, n, 400))
     np.testing.assert_array_equal(means.time, ends)
     np.testing.assert_allclose(means["a"][1:], 10.0, atol=0.5)
     for column, name in enumerate("abc", 1):
