@@ -36,7 +36,7 @@ from orchestrator.analysis.signals import (
     vehicle,
 )
 from orchestrator.master.observer import Ending, Header
-from orchestrator.master.selection import Every
+from orchestrator.master.selection import every
 from orchestrator.master.table import Table
 from orchestrator.system.names import port_name
 
@@ -109,13 +109,11 @@ class CertificatesFile:
         """
         self._path = path
         self._interval = interval
-        self._every: Every | None = None
         self._file: Any = None
 
     def begin(self, header: Header) -> None:
         """Find out whether there will be certificates."""
-        if self._interval is not None and self._interval > header.experiment.step:
-            self._every = Every(self._interval)
+        self._every = every(self._interval, header)
         self._header = header
         self._last = np.empty((0, 1 + len(header.columns)))
         self._is_possible = not missing_for_certificates(Table.of(header, self._last))

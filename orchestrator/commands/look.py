@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -17,6 +16,7 @@ from orchestrator.analysis.view import page
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.commands.options import OK, add_experiment, add_set, add_system, request, status
 from orchestrator.errors import InputError, reason
+from orchestrator.experiments.folder import whole
 from orchestrator.experiments.preparation import loaded, prepare
 from orchestrator.experiments.record import add_to_record
 from orchestrator.experiments.stored import read_record, read_result, table_in
@@ -118,14 +118,10 @@ def _animate(options: argparse.Namespace) -> int:
 
 def _write(path: Path, write: Callable[[Path], object]) -> None:
     """Write a file whole or not at all, and say where it is."""
-    unfinished = path.with_name(f".unfinished-{os.getpid()}{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write(unfinished)
-        unfinished.replace(path)
+        with whole(path) as partial:
+            write(partial)
     except OSError as error:
         raise InputError(f"cannot write {path}: {reason(error)}; choose --out FILE") from error
-    finally:
-        with suppress(OSError):
-            unfinished.unlink(missing_ok=True)
     print(path)

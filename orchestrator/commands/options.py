@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 from orchestrator.errors import InputError
@@ -15,9 +14,6 @@ from orchestrator.system.names import PortName, port_name
 
 #: Exit status: done, a simulation failed, bad usage or input, ended by the user.
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-
-#: An action of a command: takes the parsed options and gives the exit status.
-Action = Callable[[argparse.Namespace], int]
 
 
 def say(text: str) -> None:

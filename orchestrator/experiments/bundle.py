@@ -15,12 +15,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
-from uuid import uuid4
 
 from platformdirs import user_cache_path
 
 from orchestrator.errors import InputError, last_line, reason
 from orchestrator.experiments.bill_of_materials import BILL, CHECKSUMS, bill, checksums
+from orchestrator.experiments.folder import whole
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.system.ssp.writing import ssp_bytes
 
@@ -65,12 +65,10 @@ def build(folder: Path, loader: str | None = None) -> list[Path]:
 
 
 def _write_if_changed(path: Path, content: bytes) -> list[Path]:
-    """Write a file at once, so that another run never sees half of it."""
     if path.is_file() and path.read_bytes() == content:
         return []
-    partial = path.with_name(f".{path.name}.{uuid4().hex}")
-    partial.write_bytes(content)
-    partial.replace(path)
+    with whole(path) as partial:
+        partial.write_bytes(content)
     return [path]
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
 from typing import Any
+from uuid import uuid4
 
 from orchestrator.errors import InputError, reason
 
@@ -82,6 +83,22 @@ def replaced(folder: Path) -> Iterator[Path]:
             with suppress(OSError):
                 # Fails where there is something in it.
                 folder.rmdir()
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """A file to write instead of another, whose place it takes at the end.
+
+    An exception in the context leaves the other as it was.
+    """
+    # Ends as the other does: some writers tell the format by that.
+    partial = path.with_name(f".partial-{uuid4().hex}{path.suffix}")
+    try:
+        yield partial
+        partial.replace(path)
+    finally:
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
 
 
 @contextmanager

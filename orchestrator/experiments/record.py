@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import platform
 import sys
 from collections.abc import Sequence
@@ -13,7 +12,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from orchestrator.experiments.folder import RECORD
+from orchestrator.experiments.folder import RECORD, whole
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observer import Ending, Header
@@ -84,9 +83,8 @@ def add_to_record(file: Path) -> None:
     except (OSError, ValueError, KeyError, TypeError):
         # Beside a table that no run of ours has left.
         return
-    unfinished = path.with_name(f".{RECORD}.{os.getpid()}")
-    unfinished.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
-    unfinished.replace(path)
+    with whole(path) as partial:
+        partial.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
 
 
 def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:

@@ -11,7 +11,7 @@ outputs of a component are read as soon as it was stepped.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,21 +49,17 @@ def stages(system: System, order: str) -> list[list[str]]:
 
 
 def schedule(
-    system: System, order: str, instances: Mapping[str, Instance], row: Row
+    system: System, plan: Sequence[Sequence[str]], instances: Mapping[str, Instance], row: Row
 ) -> list[Stage]:
     """The stages of every step.
 
     Args:
         system: whose connections say what feeds what.
-        order: one of :data:`orchestrator.master.experiment.ORDERS`.
+        plan: its components in :func:`stages`.
         instances: of all components.
         row: that they are tied to.
 
-    Raises:
-        InputError: direct feedthroughs form a loop.
-
     """
-    plan = stages(system, order)
     stage_of = {name: i for i, names in enumerate(plan) for name in names}
     gathered: list[list[Connection]] = [[] for _ in plan]
     for connection in system.connections:

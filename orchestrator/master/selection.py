@@ -29,6 +29,14 @@ class Every:
         return grown
 
 
+def every(interval: float | None, header: Header) -> Every | None:
+    """What chooses the times of a run for an interval [s]; None: all are kept."""
+    # An interval that is no longer than the step keeps all.
+    if interval is None or interval <= header.experiment.step:
+        return None
+    return Every(interval)
+
+
 def check_interval(interval: float) -> None:
     """Check before a run that its interval can be kept.
 
@@ -61,14 +69,12 @@ class Selection:
         if interval is not None:
             check_interval(interval)
         self._interval = interval
-        self._every: Every | None = None
         self._last = np.empty((0, 0))
 
     def begin(self, header: Header) -> None:
         """Find out where the columns are."""
         kept = header.columns if self._columns is None else tuple(self._columns)
-        if self._interval is not None and self._interval > header.experiment.step:
-            self._every = Every(self._interval)
+        self._every = every(self._interval, header)
         self._places = [0, *(1 + header.columns.index(name) for name in kept)]
         self._observer.begin(replace(header, columns=kept))
 

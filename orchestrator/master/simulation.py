@@ -35,7 +35,7 @@ def simulate(system: System, experiment: Experiment, observers: Sequence[Observe
 
     """
     system.check()
-    stages(system, experiment.order)
+    plan = stages(system, experiment.order)
     log = Log()
     with held_interrupts() as interrupts, ExitStack() as stack:
         with _explained(log):
@@ -46,10 +46,10 @@ def simulate(system: System, experiment: Experiment, observers: Sequence[Observe
             row = Row(system, instances)
             _initialise(system, instances, row, experiment, log)
             header = Header(tuple(map(str, row.columns)), experiment, _parameters(instances))
-        plan = schedule(system, experiment.order, instances, row)
+        steps = schedule(system, plan, instances, row)
         with _told(header, observers) as tell:
             blocks = Blocks(len(row.values), observers)
-            failure = _advance(experiment, plan, row.values, blocks, interrupts, log)
+            failure = _advance(experiment, steps, row.values, blocks, interrupts, log)
             if failure is None:
                 _terminate(instances)
             ending = Ending(failure, log.messages, tuple(interrupts.signals))

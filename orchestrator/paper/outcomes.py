@@ -12,7 +12,6 @@ from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 from zipfile import BadZipFile
 
 import numpy as np
@@ -21,6 +20,7 @@ import orchestrator
 from orchestrator.analysis.metrics import Metrics
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
+from orchestrator.experiments.folder import whole
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.experiments.record import PACKAGES, digest_of
 from orchestrator.experiments.run import metrics_json
@@ -178,11 +178,9 @@ def _write(file: Path, outcome: Outcome) -> None:
         "messages": outcome.table.ending.messages,
     }
     file.parent.mkdir(parents=True, exist_ok=True)
-    partial = file.with_name(f".{uuid4().hex}")
-    with partial.open("wb") as stream:
+    with whole(file) as partial:
         # A column together: one that is constant then takes no room.
-        np.savez_compressed(stream, text=json.dumps(text), columns=outcome.table.rows.T)
-    partial.replace(file)
+        np.savez_compressed(partial, text=json.dumps(text), columns=outcome.table.rows.T)
 
 
 def _read(file: Path) -> Outcome | None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.errors import InputError
-from orchestrator.experiments.folder import RECORD, replaced
+from orchestrator.experiments.folder import RECORD, replaced, whole
 
 
 def write(folder: Path, *names: str, text: str = "new", failure: str | None = None) -> None:
@@ -27,6 +27,12 @@ def write_half(folder: Path, error: BaseException) -> None:
     with replaced(folder) as unfinished:
         (unfinished / "a.csv").write_text("rows so far")
         raise error
+
+
+def write_half_a_file(path: Path) -> None:
+    with whole(path) as partial:
+        partial.write_text("half")
+        raise RuntimeError
 
 
 def files(folder: Path) -> set[str]:
@@ -134,3 +140,13 @@ def test_what_is_no_result_takes_the_place_of_none(tmp_path: Path):
     with replaced(tmp_path / "r") as unfinished:
         (unfinished / "fig4.ssp").write_text("exported")
     assert files(tmp_path / "r") == {"a.csv", RECORD, "fig4.ssp"}
+
+
+def test_a_file_changes_whole_or_not_at_all(tmp_path: Path):
+    path = tmp_path / "view.html"
+    with whole(path) as partial:
+        partial.write_text("old")
+    with pytest.raises(RuntimeError):
+        write_half_a_file(path)
+    assert path.read_text() == "old"
+    assert files(tmp_path) == {"view.html"}
