@@ -25,10 +25,10 @@ _REFUSALS = """\
 
 A value out of its range or not finite, a value reference that is not there or of another type, an
 output or a fixed parameter set during the run, a call out of order, a state that no run can have
-led to: such a call changes nothing, is logged with status fmi2Discard, and raises `fault`. PythonFMU
-answers it with fmi2OK, so the steps tell: **every fmi2DoStep after it ends with fmi2Discard and
-changes nothing until it is mended**, a value by a good value of the same variable, anything by
-fmi2Reset or by restoring a state.
+led to: such a call changes nothing, is logged with status fmi2Discard, and raises `fault`.
+PythonFMU answers it with fmi2OK, so the steps tell: **every fmi2DoStep after it ends with
+fmi2Discard and changes nothing until it is mended**, a value by a good value of the same variable,
+anything by fmi2Reset or by restoring a state.
 
 A step that cannot be taken, because its size is negative or not finite, or because its result would
 not be finite, ends with fmi2Discard and leaves everything as it was, noise included; the next good
