@@ -29,6 +29,9 @@ INSTANTIATED, INITIALISING, STEPPING, TERMINATED = MODES = (
 #: Different messages that an instance logs: a host may step on after a refusal for ever.
 MOST_MESSAGES = 100
 
+#: Characters of a message: some hosts have a buffer of 1 or 2 kB for them.
+_LONGEST_MESSAGE = 500
+
 #: What is refused, where it is neither a port nor a call: a reference that belongs to no port, and
 #: the initialisation with the values that there are.
 REFERENCE, INITIALISATION = "value reference", "initialisation"
@@ -79,8 +82,10 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         self._said.add(said)
         if len(self._said) == MOST_MESSAGES:
             message += "; what comes after this is not logged"
-        # FMI defines a log message as a format: a host would take a % for a directive.
-        self.log(message.replace("%", "%%"), status)
+        # PythonFMU ends the process over a message that is no UTF-8. And FMI defines a message as
+        # a format: a host would take a % for a directive.
+        text = message[:_LONGEST_MESSAGE].encode("utf-8", "backslashreplace").decode()
+        self.log(text.replace("%", "%%"), status)
 
     def _attempt(self, what: str, refused: str, action: Callable[[], None]) -> None:
         """Do something that is refused if it raises, and mended if it does not."""

@@ -32,7 +32,7 @@ from fmus.slave.callbacks import (
     Callbacks,
     explained,
 )
-from fmus.slave.shape import restored, summing
+from fmus.slave.shape import measuring
 from fmus.slave.state import Snapshot, checked, from_bytes, to_bytes, unusable
 
 #: A step may exceed `h_max` by this share without being split: hosts round their time.
@@ -40,6 +40,10 @@ ROUNDING = 1e-9
 
 #: Longest step of a component that has no internal steps [s].
 _NO_LIMIT = 1e300
+
+#: Largest norm of a state. No vehicle comes near it, and from a state below it a step with sane
+#: inputs is always finite: one wild sample must not be the end of a run.
+LARGEST_STATE = 1e100
 
 #: Why no step is taken in the other modes.
 _NOT_STEPPING = {
@@ -126,7 +130,11 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         }
         cls._unpack = staticmethod(unpacking(inputs, ports["input"], cls.group_of))
         cls._pack = staticmethod(packing(outputs, ports["output"]))
-        cls._sum = staticmethod(summing(cls._state_type))
+        cls._norm = staticmethod(measuring(cls._state_type))
+        cls._samples = cls.sample is not Component.sample
+        # PythonFMU looks methods up by names that miss Python's cache: the first class has them.
+        for name in ("do_step", "get_real", "set_real", "get_boolean"):
+            setattr(cls, name, getattr(cls, name))
         meant = {port.name for port in cls.parameter_set.ports}
         if {port.name for port in ports["parameter"]} - {H_MAX.name} != meant:
             raise TypeError(f"{cls.__name__}: not every parameter has a meaning, or a port")
@@ -223,19 +231,16 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         return True
 
     def _accept(self, state: State, values: list[float]) -> None:
-        """Take over state and outputs, if all of their numbers are finite."""
-        if not isfinite(self._sum(state) + sum(values)):
-            self._find_what_is_not_finite(state, values)
-        if not isfinite(sum(self.sample(values))):
+        """Take over state and outputs, if no number of theirs is out of bounds."""
+        if not self._norm(state) <= LARGEST_STATE:
+            raise Refusal(f"the state is not finite, or beyond {LARGEST_STATE:g}")
+        if not isfinite(sum(values)):
+            # What is finite may still be too large to be added up.
+            for reference, value in zip(self._store.output_references, values):
+                self._store.ports[reference].checked(value)
+        if self._samples and not isfinite(sum(self.sample(values))):
             raise Refusal("a sampled output is not finite")
         self._state, self._store.outputs = state, values
-
-    def _find_what_is_not_finite(self, state: State, values: list[float]) -> None:
-        """Refuse what is not finite, and not what is only too large to be added up."""
-        store = self._store
-        for reference, value in zip(store.output_references, values):
-            store.ports[reference].checked(value)
-        restored(self._state_type, state)
 
     def _internal_steps(self, current_time: float, step_size: float) -> int:
         if not isfinite(current_time) or not isfinite(step_size):
@@ -283,6 +288,8 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
             self._state, store.parameters = None, wanted["parameters"]
         else:
             meaning = self._meaning(wanted["parameters"])
+            if not self._norm(wanted["state"]) <= LARGEST_STATE:
+                raise Refusal(f"beyond {LARGEST_STATE:g}")
             self.check_state(wanted["state"])
             # Nothing of this instance has changed so far, and nothing can fail after this.
             self.restore_hidden_state(wanted["hidden"])

@@ -1,4 +1,4 @@
-"""The shape of a component's state, as its type says it: to be summed up, and to be restored.
+"""The shape of a component's state, as its type says it: how large it is, and how it is restored.
 
 A state is a NamedTuple of numbers, truth values, text, tuples and NamedTuples, any of which may be
 optional. What is of another type is left as it is.
@@ -7,7 +7,7 @@ optional. What is of another type is left as it is.
 from __future__ import annotations
 
 from itertools import count
-from math import inf
+from math import hypot, inf
 from typing import Any, Callable, Union, get_args, get_origin, get_type_hints
 
 from fmus.ports.port import Refusal
@@ -15,12 +15,12 @@ from fmus.ports.port import Refusal
 _SCALARS = (float, int, bool, str, type(None))
 
 
-def summing(kind: type) -> Callable[[Any], float]:
-    """A function that adds all floats of a state up: the sum is finite only if they all are.
+def measuring(kind: type) -> Callable[[Any], float]:
+    """A function that gives the Euclidean norm of all floats of a state: NaN if one is NaN.
 
     It runs once a step, and written out it costs a third of a loop.
     """
-    names, terms = (f"x{i}" for i in count()), []
+    names, floats = (f"x{i}" for i in count()), []
 
     def target(kind: Any) -> str:
         kinds = _elements(kind)
@@ -28,21 +28,21 @@ def summing(kind: type) -> Callable[[Any], float]:
             return f"({''.join(f'{target(k)}, ' for k in kinds)})"
         name = next(names)
         if kind is float:
-            terms.append(name)
+            floats.append(name)
         elif kind not in _SCALARS:
-            terms.append(f"total({name})")
+            floats.append(f"norm({name})")
         return name
 
-    scope: dict[str, Any] = {"total": _total}
-    text = f"def add(state):\n {target(kind)} = state\n return {' + '.join(terms) or 0.0}"
+    scope: dict[str, Any] = {"hypot": hypot, "norm": _norm}
+    text = f"def function(state):\n {target(kind)} = state\n return hypot({', '.join(floats)})"
     exec(text, scope)
-    add: Callable[[Any], float] = scope["add"]
-    return add
+    function: Callable[[Any], float] = scope["function"]
+    return function
 
 
-def _total(value: Any) -> float:
+def _norm(value: Any) -> float:
     if isinstance(value, (list, tuple)):
-        return sum(map(_total, value))
+        return hypot(*map(_norm, value))
     return value if isinstance(value, float) else 0.0
 
 
