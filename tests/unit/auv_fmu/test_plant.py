@@ -1,6 +1,7 @@
 """The plant: (1) and (2) with six degrees of freedom."""
 
 from math import cos, sin
+from random import Random
 
 import numpy as np
 import pytest
@@ -121,6 +122,11 @@ def test_vehicle_that_passes_the_vertical_keeps_a_unit_quaternion_and_does_not_j
 def test_noise_is_scaled_by_its_standard_deviation():
     assert plant.measure((1.0, 2.0, 3.0), (2.0, -3.0, 4.0), 0.5) == (2.0, 0.5, 5.0)
     assert plant.measure((1.0, 2.0, 3.0), (2.0, -3.0, 4.0), 0.0) == (1.0, 2.0, 3.0)
+
+
+@pytest.mark.parametrize(("seed", "same"), [(0, 0), (7, 7), (-1, 2**32 - 1), (-(2**31), 2**31)])
+def test_seed_is_a_32_bit_integer_read_without_its_sign(seed, same):
+    assert plant.white_noise(seed).gauss(0.0, 1.0) == Random(same).gauss(0.0, 1.0)
 
 
 @given(euler=vectors(angles, 3), position=vectors(speeds, 3))
