@@ -37,8 +37,11 @@ def settle(slave: type, module: dict[str, Any], found: dict[str, Any]) -> None:
     found.clear()
     # What is one reference short is given back, what has one too many is relieved of it.
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(module))
-    if sys.path and _resources_of(sys.path[0], module["__name__"]):
-        path = sys.path.pop(0)
+    # Other threads may have put other folders before it.
+    script = module["__name__"]
+    own = next((i for i, folder in enumerate(sys.path) if _resources_of(folder, script)), None)
+    if own is not None:
+        path = sys.path.pop(own)
         _release_interpreter(Path(path))
         same_but_ours = f"{path}/"
         if sys.getrefcount(path) == sys.getrefcount(same_but_ours) + 1:
@@ -48,7 +51,7 @@ def settle(slave: type, module: dict[str, Any], found: dict[str, Any]) -> None:
 def _resources_of(folder: str, script: str) -> bool:
     try:
         return Path(folder, "slavemodule.txt").read_text(encoding="utf-8").strip() == script
-    except OSError:
+    except (OSError, ValueError):
         return False
 
 
@@ -62,7 +65,8 @@ def _release_interpreter(resources: Path) -> None:
         return
     for library in resources.parent.glob("binaries/linux64/*.so"):
         try:
-            loaded = ctypes.CDLL(str(library), mode=os.RTLD_LAZY | os.RTLD_NOLOAD)
+            # Under the interpreter lock: a thread may be making another instance.
+            loaded = ctypes.PyDLL(str(library), mode=os.RTLD_LAZY | os.RTLD_NOLOAD)
             loaded.finalizePythonInterpreter()
         except (OSError, AttributeError):
             # Not the library that runs this instance, or one that has no such function.

@@ -98,7 +98,7 @@ def test_without_a_libpython_the_host_is_told_what_is_missing(dist: Path, tmp_pa
     subprocess.run(command, check=True)
     process = run(host, *unpacked(dist, tmp_path), LD_PRELOAD=str(shim))
     assert process.returncode == 4
-    assert "[hosted] status 3, logStatusError: no Python in this process" in process.stdout
+    assert "[hosted] status 3, logStatusError: fmi2Instantiate: no Python" in process.stdout
     assert "libpython3.9 to libpython3.13" in process.stdout
 
 
