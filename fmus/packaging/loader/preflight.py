@@ -51,10 +51,11 @@ def _check(resources: str, guid: str) -> None:
         # It tells what is wrong with a text, where an import may find the bytes of an older one.
         compile(text, f"{resources}/{script}.py", "exec")
         module = _imported(script, resources)
-        if not _has_slave(module):
-            raise ValueError(f"{resources}/{script}.py holds no slave")
-        setattr(module, _TEXT, Path(str(module.__file__)).read_bytes())
-    if getattr(module, _TEXT) != text:
+        if Path(str(module.__file__)).read_bytes() == text:
+            if not _has_slave(module):
+                raise ValueError(f"{resources}/{script}.py holds no slave")
+            setattr(module, _TEXT, text)
+    if vars(module).get(_TEXT) != text:
         raise ValueError(f"another module {script} is loaded in this process")
 
 
