@@ -50,8 +50,11 @@ class Instance(Protocol):
 
     name: str
     set_inputs: list[Callable[[], Any]]
-    do_step: Callable[[float, float, int], Any]
     get_outputs: list[Callable[[], Any]]
+
+    @property
+    def do_step(self) -> Callable[[float, float, int], Any]:
+        """FMI's doStep, to be called with time, step size and one."""
 
     def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
         """Say where its values are: a view of the row, with the inputs first, and its parts."""

@@ -34,6 +34,9 @@ from orchestrator.system.values import Value
 #: How long a call may take by default [s]: an FMU may fetch a licence or read maps first.
 STEP_TIMEOUT = 60.0
 
+#: How long a process may take to begin [s].
+_START = 60.0
+
 #: How often the wait for an FMU looks about [s], how long it still waits when the user wants to
 #: stop [s], and how long an FMU has to be freed when the run has failed [s].
 _GLANCE, _PATIENCE, _FAREWELL = 0.1, 1.0, 5.0
@@ -114,19 +117,22 @@ class IsolatedInstance:
         self.get_outputs: list[Callable[[], Any]] = [self._take_outputs]
         self._status, self._log = status, log
         self._timeout, self._interrupts = timeout, interrupts
-        self._doing, self._hangs = "instantiate", False
+        self._doing, self._hangs = "start", False
         connection.settimeout(min(timeout, _GLANCE))
         self._inputs, self._outputs = np.zeros(0), np.zeros(0)
         inputs, outputs = sizes(component)
         self._channel = Channel(connection, 2 + inputs, outputs, self._waited)
 
-    def instantiated(self) -> None:
-        """Wait for the process to have instantiated the FMU.
+    def wait(self) -> None:
+        """Wait for the process to begin, and to instantiate the FMU.
 
         Raises:
             InputError: it cannot be.
 
         """
+        # Before it begins nothing foreign is run, and a busy machine may take its time.
+        self._receive()
+        self._doing = "instantiate"
         self._receive()
 
     def tie(self, values: np.ndarray, _: Sequence[Part]) -> None:
@@ -150,7 +156,10 @@ class IsolatedInstance:
 
     def parameters(self) -> dict[str, Any]:
         """Values of all parameters, as the FMU reports them."""
-        return dict(self._ask("parameters"))
+        values = self._ask("parameters")
+        if not isinstance(values, dict):
+            raise self._nonsense()
+        return values
 
     def do_step(self, t: float, h: float, _: int) -> None:
         """Have a step begun, whose end the first of `get_outputs` waits for."""
@@ -166,14 +175,16 @@ class IsolatedInstance:
         try:
             self._ask("terminate")
             self.leave()
-            self._doing = "freeInstance"
-            status = self._status(self._timeout)
-            if status is None:
-                raise self._late()
+            self._doing, waited = "freeInstance", 0.0
+            while (status := self._status(_GLANCE)) is None:
+                waited += _GLANCE
+                self._waited(waited)
             if status:
                 raise self._lost()
         except ComponentFailed as error:
             self._log.take(fmi2Warning, str(error))
+        except KeyboardInterrupt:
+            self._log.take(fmi2Warning, f"{self.name}: interrupted in {self._doing}")
 
     def leave(self) -> None:
         """Want nothing more: the process frees the FMU and ends, if it can."""
@@ -206,10 +217,10 @@ class IsolatedInstance:
             return None if note is None else self._read(**note)
         except (EOFError, OSError) as error:
             raise self._lost() from error
+        except InputError:
+            raise
         except (ValueError, TypeError, RecursionError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise ComponentFailed(f"{self.name}: its process answers nonsense", True) from error
+            raise self._nonsense() from error
 
     def _read(
         self,
@@ -231,14 +242,17 @@ class IsolatedInstance:
         if self._interrupts and seconds >= _PATIENCE:
             self._hangs = True
             raise KeyboardInterrupt
-        if seconds >= self._timeout:
-            raise self._late()
+        if seconds >= (_START if self._doing == "start" else self._timeout):
+            raise self._late(seconds)
 
-    def _late(self) -> ComponentFailed:
+    def _late(self, seconds: float) -> ComponentFailed:
         self._hangs = True
         return ComponentFailed(
-            f"{self.name}: {self._doing} has not ended within {self._timeout:g} s", fatal=True
+            f"{self.name}: {self._doing} has not ended within {seconds:.3g} s", fatal=True
         )
+
+    def _nonsense(self) -> ComponentFailed:
+        return ComponentFailed(f"{self.name}: its process answers nonsense", fatal=True)
 
     def _lost(self) -> ComponentFailed:
         status = self._status(_FAREWELL)
@@ -249,7 +263,7 @@ class IsolatedInstance:
 
 def _end(status: int | None) -> str:
     if status is None:
-        return "is gone"
+        return "answers no more"
     if status >= 0:
         return f"exited with status {status}"
     name = signal.Signals(-status).name
@@ -286,7 +300,12 @@ class _Keeper:
         self._write(json.dumps(order).encode() + b"\n")
 
     def status(self, number: int, patience: float) -> int | None:
-        """Exit status of the process of a component, for which it waits some seconds."""
+        """Exit status of the process of a component, for which it waits some seconds.
+
+        Returns:
+            None: it has not ended.
+
+        """
         due = monotonic() + patience
         reports = self._process.stdout
         assert reports is not None
@@ -296,7 +315,8 @@ class _Keeper:
             if ready.poll(1000.0 * left):
                 text = os.read(reports.fileno(), 4096)
                 if not text:
-                    break
+                    # Its children die with the keeper.
+                    return -signal.SIGKILL
                 *lines, self._text = (self._text + text).split(b"\n")
                 for line in lines:
                     ended, exit_status = map(int, line.split())
@@ -357,7 +377,7 @@ def isolated(
             )
         try:
             for instance in instances:
-                instance.instantiated()
+                instance.wait()
             yield {instance.name: instance for instance in instances}
         finally:
             for instance in instances:

@@ -25,8 +25,8 @@ END = b"."
 #: What an FMU may write to its standard output and error [bytes]; more is not shown.
 _MOST_OUTPUT = 1 << 16
 
-#: What a pipe takes at once [bytes].
-_PIECE = 4096
+#: What a pipe holds, and what it takes at once if it takes anything [bytes].
+_PIPE, _PIECE = 1 << 16, 1 << 12
 
 #: How often it looks whether its parent is still there [ms].
 _PATIENCE = 500
@@ -76,17 +76,15 @@ class _Output:
         self._left = _MOST_OUTPUT
         os.set_blocking(descriptor, False)
 
-    def forward(self) -> bool:
-        """Show a piece of it, if it is not too much; whether there was one."""
+    def forward(self) -> None:
+        """Show what has come, if it is not too much."""
         with suppress(BlockingIOError):
-            piece = os.read(self._descriptor, _PIECE)
+            text = os.read(self._descriptor, _PIPE)
             if self._left > 0:
-                _show(piece[: self._left])
-                self._left -= len(piece)
+                _show(text[: self._left])
+                self._left -= len(text)
                 if self._left <= 0:
                     _show(f"\nauv-fmu: {self._name}: writes more than is shown\n".encode())
-            return bool(piece)
-        return False
 
 
 class _Children:
@@ -133,7 +131,7 @@ class _Children:
                     self._kill()
                     return there
                 if descriptor == self._ends:
-                    os.read(self._ends, _PIECE)
+                    os.read(self._ends, _PIPE)
                 elif event & select.POLLIN:
                     self._outputs[descriptor].forward()
                 else:
@@ -152,9 +150,7 @@ class _Children:
             _kill_group(pid)
             _, status = os.waitpid(pid, 0)
             for output in self._outputs.values():
-                for _ in range(_MOST_OUTPUT // _PIECE):
-                    if not output.forward():
-                        break
+                output.forward()
             number = self._numbers.pop(pid)
             with suppress(OSError):
                 os.write(1, b"%d %d\n" % (number, os.waitstatus_to_exitcode(status)))
@@ -172,6 +168,7 @@ def _kill_group(pid: int) -> None:
 def _show(text: bytes) -> None:
     """Write to the standard error, unless nobody takes it."""
     with suppress(OSError):
-        _, ready, _ = select.select([], [2], [], 0)
-        if ready:
-            os.write(2, text)
+        for first in range(0, len(text), _PIECE):
+            _, ready, _ = select.select([], [2], [], 0)
+            if ready:
+                os.write(2, text[first : first + _PIECE])

@@ -21,7 +21,7 @@ from orchestrator.system.structure import System
 
 
 def serve(name: str, fmu: Path, folder: Path, connection: socket.socket) -> None:
-    """Instantiate an FMU, and answer requests until there are no more.
+    """Say that it begins, instantiate an FMU, and answer requests until there are no more.
 
     Args:
         name: of the component.
@@ -35,6 +35,7 @@ def serve(name: str, fmu: Path, folder: Path, connection: socket.socket) -> None
     # Before the inputs: time and step size.
     channel, letters = Channel(connection, outputs, 2 + inputs), Letters()
     with suppress(EOFError, OSError):
+        channel.send()
         try:
             with loaded(component, letters, folder) as instance:
                 _Served(component, instance, channel, letters).answer_all()

@@ -150,7 +150,7 @@ def _advance(
 ) -> str | None:
     """Step to the end, or to the first failure, and say what it was."""
     values, failure = row.values, None
-    # Times zero, what is finite is zero, and what is not is nan: one call that costs nothing.
+    # Times zero, what is finite is zero and what is not is nan: the cheapest way to see it.
     zeros = np.zeros_like(values)
     t = end = 0.0
     blocks.append(t, values)
@@ -165,7 +165,7 @@ def _advance(
                 for member in members:
                     for call in member.get_outputs:
                         call()
-            if values.dot(zeros):
+            if np.vdot(values, zeros):
                 break
             blocks.append(end, values)
             if interrupts:
