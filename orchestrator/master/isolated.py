@@ -242,14 +242,13 @@ class IsolatedInstance:
         if self._interrupts and seconds >= _PATIENCE:
             self._hangs = True
             raise KeyboardInterrupt
-        if seconds >= (_START if self._doing == "start" else self._timeout):
-            raise self._late(seconds)
-
-    def _late(self, seconds: float) -> ComponentFailed:
-        self._hangs = True
-        return ComponentFailed(
-            f"{self.name}: {self._doing} has not ended within {seconds:.3g} s", fatal=True
-        )
+        limit = _START if self._doing == "start" else self._timeout
+        # Half a glance for the rounding of their sum.
+        if seconds >= limit - 0.5 * _GLANCE:
+            self._hangs = True
+            raise ComponentFailed(
+                f"{self.name}: {self._doing} has not ended within {limit:g} s", fatal=True
+            )
 
     def _nonsense(self) -> ComponentFailed:
         return ComponentFailed(f"{self.name}: its process answers nonsense", fatal=True)

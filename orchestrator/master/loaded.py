@@ -32,7 +32,7 @@ from fmpy.fmi2 import (
 from fmpy.logging import addLoggerProxy
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from orchestrator.errors import InputError, reason
+from orchestrator.errors import InputError, one_line, reason
 from orchestrator.master.instance import ComponentFailed, Instance, Part
 from orchestrator.master.log import Listener
 from orchestrator.master.transfer import Block
@@ -184,7 +184,7 @@ class LoadedInstance:
 
     def hear(self, status: int, message: str) -> None:
         """Take a message of the FMU; the latest explains a failure, a refusal before a warning."""
-        text = f"{self.name}: {message}"
+        text = f"{self.name}: {one_line(message)}"
         if status >= min(self._worst, fmi2Discard):
             self._complaint, self._worst = text, status
         self._listener.take(status, text)

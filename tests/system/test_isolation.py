@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-import json
+import gc
 import os
 import signal
 import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from uuid import uuid4
 
 import numpy as np
 import pytest
 
+from orchestrator.commands.main import main
 from orchestrator.errors import InputError, StartError
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.files import read_rows
 from orchestrator.master.isolated import Isolation
+from orchestrator.master.observer import Header
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
 from orchestrator.system.component import read_component
@@ -49,21 +54,31 @@ def mark(monkeypatch: pytest.MonkeyPatch) -> str:
     return mark
 
 
-def left_over(mark: str) -> list[str]:
-    """Command lines of processes that are still there some seconds later."""
-    found: list[str] = []
+def marked(mark: str) -> Iterator[Path]:
+    """Processes with a mark, by their folders in /proc."""
+    for process in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if mark.encode() in (process / "environ").read_bytes():
+                yield process
+
+
+def left_over(mark: str) -> list[Path]:
+    """Processes that are still there some seconds later."""
     for _ in range(100):
-        found = []
-        for process in Path("/proc").glob("[0-9]*"):
-            try:
-                if mark.encode() in (process / "environ").read_bytes():
-                    found.append((process / "cmdline").read_text())
-            except OSError:
-                continue
-        if not found:
+        if not (found := list(marked(mark))):
             break
         time.sleep(0.1)
     return found
+
+
+def is_hanging(mark: str) -> bool:
+    """Whether the FMU waits for a signal that never comes."""
+    for process in marked(mark):
+        with suppress(OSError):
+            # The number of pause on x86-64.
+            if (process / "syscall").read_text().startswith("34 "):
+                return True
+    return False
 
 
 def run_isolated(system: System, timeout: float = 20.0, stop_time: float = 0.5) -> Table:
@@ -146,7 +161,7 @@ def test_an_isolated_fmu_that_fails_while_it_is_instantiated(
 @pytest.mark.parametrize("isolation", [None, Isolation(20.0)])
 def test_an_fmu_that_cannot_be_instantiated_is_bad_input(c_fmu, monkeypatch, isolation):
     monkeypatch.setenv("FOREIGN_INSTANTIATE", "refuses")
-    with pytest.raises(InputError, match="foreign.fmu: Failed to instantiate") as error:
+    with pytest.raises(InputError, match=r"foreign\.fmu: Failed to instantiate") as error:
         simulate(foreign_system(c_fmu), Experiment(0.5, STEP), (), isolation)
     assert not isinstance(error.value, StartError)
 
@@ -204,6 +219,7 @@ def test_a_python_slave_that_raises(raising: System, mark: str):
     assert table.failure is not None
     assert "first: Fatal py exception encountered: [doStep]" in table.failure
     assert "no water left" in table.failure
+    assert "\n" not in table.failure
     assert rows_until(table, 0.12)
     assert left_over(mark) == []
 
@@ -220,3 +236,131 @@ def test_runs_in_several_threads(c_fmu: Path):
         thread.join()
     assert [table.failure for table in tables] == [None] * 3
     assert len({table.rows.tobytes() for table in tables}) == 1
+
+
+def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path):
+    """A run that ends while another one goes on takes no messages with it, nor the process."""
+    begun, go_on = threading.Event(), threading.Event()
+
+    class Waits(Table):
+        def begin(self, header: Header) -> None:
+            super().begin(header)
+            begun.set()
+            go_on.wait()
+
+    table = Waits()
+    system, experiment = foreign_system(c_fmu, "SILENT_ERROR"), Experiment(0.5, STEP)
+    talkative = foreign_system(c_fmu, "LOGS", at=0.0)
+    thread = threading.Thread(target=simulate, args=(system, experiment, [table]))
+    thread.start()
+    begun.wait()
+    assert len(simulate(talkative, Experiment(STEP, STEP)).messages) == 101
+    gc.collect()
+    go_on.set()
+    thread.join()
+    assert table.ending.messages == ()
+    assert table.failure is not None
+    assert "bad: fmi2DoStep failed with status 3" in table.failure
+
+
+@pytest.fixture(scope="module")
+def archives(c_fmu: Path, raising: System, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The systems as SSPs, each in a folder named by what happens in it."""
+    folder = tmp_path_factory.mktemp("archives")
+    systems = {act: foreign_system(c_fmu, act) for act in ("FATAL", "HANGS", "CRASHES")}
+    for name, system in {**systems, "raises": raising}.items():
+        (folder / name).mkdir()
+        write_ssp(system, folder / name)
+    return folder
+
+
+def command(*arguments: object, folder: Path) -> subprocess.Popen[str]:
+    """`auv-fmu` in a process whose temporary files go into a folder."""
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", "orchestrator", *map(str, arguments)],
+        env={**os.environ, "TMPDIR": str(folder)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "last_time", "words"),
+    [
+        ("FATAL", [], 0.1, "bad: beyond repair"),
+        ("raises", [], 0.12, "first: Fatal py exception encountered: [doStep] "),
+        ("CRASHES", ["--isolate"], 0.1, "bad: its process was ended by SIGSEGV"),
+        ("HANGS", ["--isolate", "--step-timeout", 0.5], 0.1, "bad: doStep has not ended within"),
+    ],
+)
+def test_command_line_says_what_happened_and_keeps_the_rows(
+    archives, tmp_path, name, options, last_time, words
+):
+    """Also where nothing more is called after fmi2Fatal: the FMU in C aborts then."""
+    [archive] = (archives / name).iterdir()
+    out, temporary = tmp_path / "out", tmp_path / "temporary"
+    temporary.mkdir()
+    process = command(
+        "run", archive, "--stop-time", 0.5, "--no-figures", "--out", out, *options,
+        folder=temporary,
+    )  # fmt: skip
+    _, errors = process.communicate()
+    assert process.returncode == 1
+    assert errors.splitlines()[-1].startswith(
+        f"auv-fmu: {archive.stem} stopped at t = {last_time} s: {words}"
+    )
+    rows = np.vstack(list(read_rows(out / "result.csv")))
+    assert rows[-1, 0] == pytest.approx(last_time)
+    assert list(temporary.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--step-timeout", "3"], "needs isolation"),
+        (["--isolate", "--step-timeout", "nan"], "must be a positive number"),
+        (["--isolate", "--step-timeout", "0"], "must be a positive number"),
+    ],
+)
+def test_a_timeout_that_means_nothing_is_bad_usage(options, words, capsys):
+    assert main(["run", "fig4", *options]) == 2
+    assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_nothing_is_left_of_a_run_that_hangs_and_is_ended(archives, tmp_path, mark, number):
+    """Also not by KILL, which the process itself cannot answer."""
+    [archive] = (archives / "HANGS").iterdir()
+    out, temporary = tmp_path / "out", tmp_path / "temporary"
+    temporary.mkdir()
+    process = command(
+        "run", archive, "--stop-time", 0.5, "--no-figures", "--out", out, "--isolate",
+        folder=temporary,
+    )  # fmt: skip
+    while not is_hanging(mark):
+        assert process.poll() is None
+        time.sleep(0.05)
+    os.kill(process.pid, number)
+    _, errors = process.communicate()
+    if number == signal.SIGINT:
+        assert process.returncode == 1
+        assert errors.splitlines()[-1] == "auv-fmu: foreign interrupted at t = 0.1 s"
+        assert np.vstack(list(read_rows(out / "result.csv")))[-1, 0] == pytest.approx(0.1)
+    assert left_over(mark) == []
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_script_without_a_main_guard_is_run_once(c_fmu: Path, tmp_path: Path):
+    archive = write_ssp(foreign_system(c_fmu), tmp_path)[0]
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from orchestrator import simulate\n"
+        f"result = simulate({str(archive)!r}, stop_time=0.5, isolate=True, step_timeout=20)\n"
+        "print(len(result), result.failure)\n",
+        encoding="utf-8",
+    )
+    process = subprocess.run(
+        [sys.executable, script], capture_output=True, text=True, check=False, cwd=tmp_path
+    )
+    assert (process.stdout, process.stderr) == ("26 None\n", "")
