@@ -16,12 +16,9 @@ class StartError(InputError):
 
 def reason(error: BaseException) -> str:
     """All that an exception says, in one line."""
-    return one_line(str(error)) or repr(error)
-
-
-def one_line(text: str) -> str:
-    """A text of several lines in one."""
-    return "; ".join(line.strip() for line in text.splitlines() if line.strip())
+    return "; ".join(line.strip() for line in str(error).splitlines() if line.strip()) or repr(
+        error
+    )
 
 
 def last_line(text: str, otherwise: str = "no reason given") -> str:

@@ -28,7 +28,7 @@ from orchestrator.master.interrupts import Interrupts
 from orchestrator.master.keeper import END
 from orchestrator.master.log import Log
 from orchestrator.system.component import Component
-from orchestrator.system.unpacking import process_folder, unpacked
+from orchestrator.system.unpacking import unpacked
 from orchestrator.system.values import Value
 
 #: How long a call may take by default [s]: an FMU may fetch a licence or read maps first.
@@ -276,13 +276,15 @@ class _Keeper:
     def __init__(
         self, components: Mapping[str, Component], connections: Sequence[socket.socket]
     ) -> None:
+        folders = [unpacked(component.fmu) for component in components.values()]
+        descriptors = [connection.fileno() for connection in connections]
         order = {
             "path": [entry for entry in sys.path if isinstance(entry, str)],
-            "folder": str(process_folder()),
+            "temporary": sorted({str(folder.parent) for folder in folders}),
             "components": [
-                (name, str(component.fmu), str(unpacked(component.fmu)), connection.fileno())
-                for (name, component), connection in zip(
-                    components.items(), connections, strict=True
+                (component.name, str(component.fmu), str(folder), descriptor)
+                for component, folder, descriptor in zip(
+                    components.values(), folders, descriptors, strict=True
                 )
             ],
         }
@@ -291,7 +293,7 @@ class _Keeper:
             stdin=PIPE,
             stdout=PIPE,
             bufsize=0,
-            pass_fds=[connection.fileno() for connection in connections],
+            pass_fds=descriptors,
             start_new_session=True,
         )
         self._statuses: dict[int, int] = {}

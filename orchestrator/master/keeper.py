@@ -42,7 +42,7 @@ def keep(order: dict[str, Any]) -> None:
 
     Args:
         order: `components`, each with its name, FMU, folder and the descriptor of a socket, and
-            the `folder` that nobody else removes if the parent is killed.
+            `temporary`, folders that nobody else removes if the parent is killed.
 
     """
     parent = os.getppid()
@@ -56,7 +56,8 @@ def keep(order: dict[str, Any]) -> None:
             return
         os.close(descriptor)
     if not children.watched(parent):
-        shutil.rmtree(order["folder"], ignore_errors=True)
+        for folder in order["temporary"]:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def _alone_with(descriptor: int) -> socket.socket:

@@ -9,6 +9,8 @@ from copy import copy
 from functools import partial
 from itertools import count
 from pathlib import Path
+from shutil import copytree
+from tempfile import mkdtemp
 from threading import Lock
 from typing import Any
 
@@ -32,12 +34,12 @@ from fmpy.fmi2 import (
 from fmpy.logging import addLoggerProxy
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from orchestrator.errors import InputError, one_line, reason
+from orchestrator.errors import InputError, reason
 from orchestrator.master.instance import ComponentFailed, Instance, Part
 from orchestrator.master.log import Listener
 from orchestrator.master.transfer import Block
 from orchestrator.system.component import Component
-from orchestrator.system.unpacking import forget, unpacked
+from orchestrator.system.unpacking import unpacked
 from orchestrator.system.values import Value
 
 
@@ -72,22 +74,26 @@ class Library:
             )
         except Exception as error:
             raise InputError(f"{archive}: cannot be loaded: {reason(error)}") from error
-        self._folder = folder
         self.corrupted = False
-
-    def give_up(self) -> None:
-        """Call it no more; a later run unpacks the archive and loads it anew."""
-        self.corrupted = True
-        with _LOCK:
-            # Referred to for ever, for it stays loaded.
-            _corrupted.append(_libraries.pop(self._folder, self))
-        forget(self._folder)
 
 
 #: Libraries by the folders into which their FMUs are unpacked, for runs in several threads.
 _libraries: dict[Path, Library] = {}
-_corrupted: list[Library] = []
 _LOCK = Lock()
+
+
+def _library(component: Component, folder: Path) -> Library:
+    """The library of an unpacked FMU, loaded once a process, or a copy of a corrupted one."""
+    with _LOCK:
+        found = _libraries.get(folder)
+        if found is None:
+            found = Library(component.fmu, component.description, folder)
+        elif found.corrupted:
+            # It stays loaded, with all that it has in memory; under another name it is a new one.
+            copied = copytree(folder, mkdtemp(dir=folder.parent), dirs_exist_ok=True)
+            found = Library(component.fmu, component.description, Path(copied))
+        _libraries[folder] = found
+        return found
 
 
 class LoadedInstance:
@@ -184,7 +190,7 @@ class LoadedInstance:
 
     def hear(self, status: int, message: str) -> None:
         """Take a message of the FMU; the latest explains a failure, a refusal before a warning."""
-        text = f"{self.name}: {one_line(message)}"
+        text = f"{self.name}: {'; '.join(message.splitlines())}"
         if status >= min(self._worst, fmi2Discard):
             self._complaint, self._worst = text, status
         self._listener.take(status, text)
@@ -210,7 +216,7 @@ class LoadedInstance:
     def _failed(self, error: FMICallException) -> ComponentFailed:
         fatal = error.status == fmi2Fatal
         if fatal:
-            self._library.give_up()
+            self._library.corrupted = True
         return ComponentFailed(self._complaint or f"{self.name}: {error}", fatal)
 
 
@@ -234,11 +240,7 @@ def loaded(
 
     """
     folder = unpacked(component.fmu) if folder is None else folder
-    with _LOCK:
-        if folder not in _libraries:
-            _libraries[folder] = Library(component.fmu, component.description, folder)
-        library = _libraries[folder]
-    instance = LoadedInstance(component, library, listener)
+    instance = LoadedInstance(component, _library(component, folder), listener)
     try:
         yield instance
     finally:

@@ -15,6 +15,9 @@ from zipfile import BadZipFile, ZipFile
 
 from orchestrator.errors import InputError, reason
 
+#: Runs in several threads share what is unpacked.
+_LOCK = Lock()
+
 
 class Version(NamedTuple):
     """A file as it is now; another content has another version."""
@@ -23,11 +26,6 @@ class Version(NamedTuple):
     modified: int
     size: int
     inode: int
-
-
-#: Runs in several threads share what is unpacked.
-_folders: dict[Version, Path] = {}
-_LOCK = Lock()
 
 
 def version_of(path: Path) -> Version:
@@ -45,29 +43,15 @@ def unpacked(archive: Path) -> Path:
     """
     try:
         with _LOCK:
-            version = version_of(archive)
-            if version not in _folders:
-                _folders[version] = _unpack(archive)
-            return _folders[version]
+            return _unpacked(version_of(archive))
     except (OSError, BadZipFile, RuntimeError, NotImplementedError) as error:
         raise InputError(f"{archive}: cannot be opened: {reason(error)}") from error
 
 
-def forget(folder: Path) -> None:
-    """Unpack what is in a folder once more, into another one, when it is asked for again."""
-    with _LOCK:
-        for version in [version for version, other in _folders.items() if other == folder]:
-            del _folders[version]
-
-
-def process_folder() -> Path:
-    """The folder of all that this process has unpacked."""
-    return Path(_process_folder().name)
-
-
-def _unpack(archive: Path) -> Path:
-    folder = Path(mkdtemp(dir=process_folder()))
-    with ZipFile(archive) as content:
+@cache
+def _unpacked(archive: Version) -> Path:
+    folder = Path(mkdtemp(dir=_process_folder().name))
+    with ZipFile(archive.path) as content:
         content.extractall(folder)
     return folder
 

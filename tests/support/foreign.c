@@ -68,6 +68,7 @@ static Status act(Instance *instance, int phase)
     case ABORTS:
         abort();
     case HANGS:
+        fputs("hangs\n", stderr);
         for (;;)
             pause();
     case SPINS:
