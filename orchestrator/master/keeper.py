@@ -13,6 +13,7 @@ import shutil
 import signal
 import socket
 import sys
+import warnings
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -63,9 +64,13 @@ def keep(order: dict[str, Any]) -> None:
 def _alone_with(descriptor: int) -> socket.socket:
     """In a new process: keep one socket and the standard streams, and die with the keeper."""
     os.dup2(descriptor, 3)
+    os.set_inheritable(3, False)
     os.closerange(4, os.sysconf("SC_OPEN_MAX"))
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        # Where memory gets short, this is the process to end.
+        with suppress(OSError):
+            Path("/proc/self/oom_score_adj").write_text("1000")
     return socket.socket(fileno=3)
 
 
@@ -106,7 +111,10 @@ class _Children:
     def start(self, name: str) -> bool:
         """Start one more; true in the new process."""
         reading, writing = os.pipe()
-        pid = os.fork()
+        with warnings.catch_warnings():
+            # That numpy may have threads: this process computes nothing.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            pid = os.fork()
         # A group of its own, so that what it starts can be ended with it.
         with suppress(OSError):
             os.setpgid(pid, pid)
