@@ -138,8 +138,14 @@ class LoadedInstance:
             types: of its arguments; None: they come as values of ctypes.
 
         """
+
+        def checked(status: int, called: Any, _: Any) -> int:
+            if status > fmi2Warning:
+                raise self._failed(FMICallException(function=called.__name__, status=status))
+            return status
+
         called = self._fmu.dll[f"fmi2{name}"]
-        called.argtypes, called.restype, called.errcheck = types, fmi2Status, self._checked
+        called.argtypes, called.restype, called.errcheck = types, fmi2Status, checked
         return partial(called, fmi2Component(self._fmu.component))
 
     def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
@@ -207,11 +213,6 @@ class LoadedInstance:
             return getattr(self._fmu, method)(*arguments, **named)
         except FMICallException as error:
             raise self._failed(error) from error
-
-    def _checked(self, status: int, called: Any, _: Any) -> int:
-        if status > fmi2Warning:
-            raise self._failed(FMICallException(function=called.__name__, status=status))
-        return status
 
     def _failed(self, error: FMICallException) -> ComponentFailed:
         fatal = error.status == fmi2Fatal

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
 
 import numpy as np
 
@@ -151,7 +152,7 @@ def _advance(
     """Step to the end, or to the first failure, and say what it was."""
     values, failure = row.values, None
     # Times zero, what is finite is zero and what is not is nan: the cheapest way to see it.
-    zeros = np.zeros_like(values)
+    is_not_finite = partial(np.vdot, values, np.zeros_like(values))
     t = end = 0.0
     blocks.append(t, values)
     try:
@@ -165,7 +166,7 @@ def _advance(
                 for member in members:
                     for call in member.get_outputs:
                         call()
-            if np.vdot(values, zeros):
+            if is_not_finite():
                 break
             blocks.append(end, values)
             if interrupts:
