@@ -214,6 +214,21 @@ def test_a_python_slave_that_raises(raising: System, mark: str):
     assert left_over(mark) == []
 
 
+def test_nobody_hangs_where_the_keeper_is_killed(c_fmu: Path, mark: str):
+    class Kills(Table):
+        def begin(self, header: Header) -> None:
+            super().begin(header)
+            for process in marked(mark):
+                if f"PPid:\t{os.getpid()}\n" in (process / "status").read_text():
+                    os.kill(int(process.name), signal.SIGKILL)
+
+    table = Kills()
+    simulate(foreign_system(c_fmu), Experiment(0.5, STEP), [table], Isolation(20.0))
+    assert table.failure is not None
+    assert "its process was ended by SIGKILL" in table.failure
+    assert left_over(mark) == []
+
+
 def test_runs_in_several_threads(c_fmu: Path):
     tables: list[Table] = []
     threads = [
@@ -338,6 +353,24 @@ def test_nothing_is_left_of_a_run_that_hangs_and_is_ended(archives, tmp_path, ma
         assert np.vstack(list(read_rows(out / "result.csv")))[-1, 0] == pytest.approx(0.1)
     assert left_over(mark) == []
     assert list(temporary.iterdir()) == []
+
+
+def test_an_fmu_that_ended_fatally_is_loaded_anew(archives: Path, tmp_path: Path):
+    """The C library remembers, as any may, that it must not be called."""
+    [archive] = (archives / "FATAL").iterdir()
+    code = (
+        "from orchestrator import simulate\n"
+        f"for parameters in ({{}}, {{'bad.at': 0.2}}, {{'bad.act': 0}}):\n"
+        f"    print(simulate({str(archive)!r}, parameters, stop_time=0.5).failure)\n"
+    )
+    process = subprocess.run(
+        [sys.executable, "-P", "-c", code], capture_output=True, text=True, check=False
+    )
+    assert process.stdout.splitlines() == [
+        "stopped at t = 0.1 s: bad: beyond repair",
+        "stopped at t = 0.2 s: bad: beyond repair",
+        "None",
+    ], process.stderr
 
 
 def test_a_script_without_a_main_guard_is_run_once(c_fmu: Path, tmp_path: Path):
