@@ -243,8 +243,7 @@ class IsolatedInstance:
             self._hangs = True
             raise KeyboardInterrupt
         limit = _START if self._doing == "start" else self._timeout
-        # Half a glance for the rounding of their sum.
-        if seconds >= limit - 0.5 * _GLANCE:
+        if seconds >= limit:
             self._hangs = True
             raise ComponentFailed(
                 f"{self.name}: {self._doing} has not ended within {limit:g} s", fatal=True
@@ -265,7 +264,8 @@ def _end(status: int | None) -> str:
         return "answers no more"
     if status >= 0:
         return f"exited with status {status}"
-    name = signal.Signals(-status).name
+    names = {number.value: number.name for number in signal.Signals}
+    name = names.get(-status, f"signal {-status}")
     memory = ", perhaps for want of memory" if -status == signal.SIGKILL else ""
     return f"was ended by {name} ({signal.strsignal(-status)}{memory})"
 

@@ -90,10 +90,16 @@ def _library(component: Component, folder: Path) -> Library:
             found = Library(component.fmu, component.description, folder)
         elif found.corrupted:
             # It stays loaded, with all that it has in memory; under another name it is a new one.
-            copied = copytree(folder, mkdtemp(dir=folder.parent), dirs_exist_ok=True)
-            found = Library(component.fmu, component.description, Path(copied))
+            found = Library(component.fmu, component.description, _copied(folder))
         _libraries[folder] = found
         return found
+
+
+def _copied(folder: Path) -> Path:
+    try:
+        return Path(copytree(folder, mkdtemp(dir=folder.parent), dirs_exist_ok=True))
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be copied: {reason(error)}") from error
 
 
 class LoadedInstance:
@@ -189,9 +195,11 @@ class LoadedInstance:
 
     def free(self) -> None:
         """Free the instance; its library stays loaded."""
-        if not self._library.corrupted:
-            # FMU2Slave.freeInstance would unload the library as well.
-            self._fmu.fmi2FreeInstance(self._fmu.component)
+        if self._library.corrupted:
+            # What it was given by us must stay where it is, too.
+            return
+        # FMU2Slave.freeInstance would unload the library as well.
+        self._fmu.fmi2FreeInstance(self._fmu.component)
         del _instances[self._environment]
 
     def hear(self, status: int, message: str) -> None:

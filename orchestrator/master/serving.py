@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -54,11 +55,10 @@ class _Served:
         self, component: Component, instance: LoadedInstance, channel: Channel, letters: Letters
     ) -> None:
         self._instance, self._channel, self._letters = instance, channel, letters
-        self._row = Row(System(component.name, {component.name: component}, ()), {
-            component.name: instance
-        }).values  # fmt: skip
+        system = System(component.name, {component.name: component}, ())
+        values = Row(system, {component.name: instance}).values
         n = len(channel.incoming) - 2
-        self._inputs, self._outputs = self._row[:n], self._row[n:]
+        self._inputs, self._outputs = values[:n], values[n:]
 
     def answer_all(self) -> None:
         """Answer until the other end closes, or the FMU must not be called again."""
@@ -81,7 +81,7 @@ class _Served:
         for call in instance.get_outputs:
             call()
 
-    def _answered(self, call: Any) -> bool:
+    def _answered(self, call: Callable[[], Any]) -> bool:
         note: dict[str, Any] = {}
         try:
             value = call()

@@ -24,7 +24,7 @@ typedef struct {
 enum { ENTER, EXIT, STEP, TERMINATE, FREE };
 enum {
     BEHAVE, NOT_A_NUMBER, INFINITE, SILENT_ERROR, FATAL, EXITS, CRASHES, ABORTS, HANGS, SPINS,
-    KILLED, WRITES, LOGS, LEAVES_A_PROCESS, CLOSES_ALL, ANSWERS_ITSELF,
+    KILLED, WRITES, LOGS, LEAVES_A_PROCESS, CLOSES_ALL, ANSWERS_ITSELF, SIGNALS,
 };
 enum { U, Y, AT, ACT, PHASE, VARIABLES };
 
@@ -76,6 +76,9 @@ static Status act(Instance *instance, int phase)
             ;
     case KILLED:
         kill(getpid(), SIGKILL);
+        break;
+    case SIGNALS:
+        kill(getpid(), 40);
         break;
     case WRITES:
         for (int i = 0; i < 100000; i++)
