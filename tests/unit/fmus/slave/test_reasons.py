@@ -66,8 +66,10 @@ REASONS = {
     "state refused: the bytes are not those of a state ": from_bytes(b"\xff"),
     "state refused: the bytes were changed since they were written": from_bytes(b"{}"),
     "state refused: it has other parts": from_json(more=1),
-    "state refused: mode 'bogus' does not go with its state": from_json(mode="bogus"),
-    "state refused: mode 'instantiated' does not go with its state": from_json(mode="instantiated"),
+    "state refused: no mode is 'bogus'": from_json(mode="bogus"),
+    "state refused: it has a state, or outputs, before the initialisation": (
+        from_json(mode="instantiated")
+    ),
     "state refused: its fault is neither true nor false": from_json(fault=0),
     "state refused: it has other parameters": from_json(parameters={}),
     "state refused: it has other ports": from_json(inputs=[1.0]),
