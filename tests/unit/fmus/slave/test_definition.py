@@ -167,3 +167,31 @@ def test_bytes_of_a_state_do_not_depend_on_the_order_of_its_parts(slave):
     assert slave._fmu_state_from_bytes(content) == slave._fmu_state_from_bytes(
         slave._fmu_state_to_bytes(turned)
     )
+
+
+def test_fault_is_known_as_soon_as_it_is_asked_for(slave):
+    slave.setup_experiment(0.0)
+    slave.set_real([5], [10.0])
+    slave.enter_initialization_mode()
+    assert slave.get_boolean([8]) == [True]
+
+
+def test_fault_can_be_read_among_others(slave):
+    assert initialised(slave).get_boolean([6, 8]) == [True, False]
+
+
+def test_state_of_whole_numbers_is_bounded_as_one_of_floats(slave):
+    saved = initialised(slave)._get_fmu_state()
+    slave._set_fmu_state({**saved, "state": [[3, 4]], "outputs": [3, 4, 0.0]})
+    assert slave._get_fmu_state()["state"] == ((3.0, 4.0),)
+    slave._set_fmu_state({**saved, "state": [[10**200, 0]]})
+    assert "beyond" in slave.log_queue[0].msg
+
+
+def test_state_that_cannot_be_saved_says_why_when_it_is_set(slave, monkeypatch):
+    def broken() -> None:
+        raise Refusal("not now")
+
+    monkeypatch.setattr(initialised(slave), "hidden_state", broken)
+    slave._set_fmu_state(slave._get_fmu_state())
+    assert [entry.msg for entry in slave.log_queue] == ["state refused: not now"]

@@ -37,6 +37,10 @@ def test_size_is_the_euclidean_norm_of_all_floats():
     assert measuring(Whole)(other) == pytest.approx(sqrt(sum(4.0**k for k in range(7))))
 
 
+def test_whole_numbers_in_the_place_of_floats_have_a_size():
+    assert measuring(Pair)(Pair(3, (0, -4))) == 5.0
+
+
 @pytest.mark.parametrize("bad", [nan, inf, -inf])
 @pytest.mark.parametrize(
     "spoil",
