@@ -98,6 +98,13 @@ def test_truth_values_reach_the_equations(slave):
     assert slave.get_real(B) == [-1.0, -2.0]
 
 
+def test_fixed_parameter_stays_what_it_was_at_the_start(slave):
+    initialised(slave).set_boolean([6], [False])
+    said = "up is fixed and cannot be set after the initialisation"
+    assert [entry.msg for entry in slave.log_queue] == [said]
+    assert slave.get_boolean([6]) == [True]
+
+
 def test_outputs_at_the_start_follow_every_value_that_is_set_until_then(slave):
     slave.setup_experiment(0.0)
     slave.enter_initialization_mode()

@@ -89,3 +89,11 @@ def test_reason_is_logged_once(reason):
     REASONS[reason](driver.slave)
     assert driver.messages() == [reason.strip()]
     assert driver.get("fault") is True
+
+
+def test_step_that_is_blocked_names_all_that_blocks_it():
+    driver = ClassInstance("DisturbanceGenerator")
+    driver.set(nu__u=nan, nu__v=nan)
+    assert not driver.step()
+    reasons = ["nu.u = nan: must be finite", "nu.v = nan: must be finite"]
+    assert driver.messages() == [*reasons, f"step refused at t = 0 s: {'; '.join(reasons)}"]

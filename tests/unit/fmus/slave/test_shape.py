@@ -94,5 +94,6 @@ def test_whole_numbers_may_stand_for_floats():
     assert restored(Pair, [1, [2, 3]]) == (1, (2, 3))
 
 
-def test_what_is_of_no_known_type_is_left_as_it_is():
-    assert restored(frozenset, [1, [2, [3]]]) == (1, (2, (3,)))
+@pytest.mark.parametrize("kind", [frozenset, tuple])
+def test_what_is_of_no_known_type_is_left_as_it_is(kind):
+    assert restored(kind, [1, [2, [3]]]) == (1, (2, (3,)))
