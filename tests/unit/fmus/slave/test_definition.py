@@ -6,10 +6,11 @@ from math import inf
 from typing import NamedTuple, TypedDict
 
 import pytest
+from pythonfmu.enums import Fmi2Status
 
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, Port, Refusal, inputs, outputs, parameter
-from fmus.slave import component
+from fmus.slave import callbacks, component
 from fmus.slave.component import Component
 
 GAIN = parameter("gain", 1.0, "1", "Gain", 0.0, tunable=True)
@@ -112,9 +113,50 @@ def test_outputs_at_the_start_follow_every_value_that_is_set_until_then(slave):
         slave.set_real([0], [value])
         assert slave.get_real([2]) == [value]
         assert slave._get_fmu_state()["state"] == ((value, 0.0),)
+        slave.set_real(A, [-value, 1.0])
+        assert slave.get_real(B) == [-value, 1.0]
+        slave.set_real([1], [0.0])
     slave.exit_initialization_mode()
     slave.set_real([0], [7.0])
-    assert slave.get_real([2]) == [6.0]
+    assert slave.get_real(B) == [-6.0, 0.0]
+
+
+def test_all_inputs_in_one_call_are_refused_after_the_end_as_one_is(slave):
+    initialised(slave).terminate()
+    slave.set_real(A, [1.0, 2.0])
+    assert slave.get_real(A) == [0.0, 0.0]
+    assert len(slave.log_queue) == 2
+
+
+def test_what_equations_raise_is_named_and_logged_once_whatever_the_time(slave, monkeypatch):
+    def broken(*arguments: object) -> None:
+        raise ZeroDivisionError("of nothing")
+
+    monkeypatch.setattr(initialised(slave), "advance", broken)
+    for t in (1.0, 2.0):
+        assert not slave.do_step(t, 0.1)
+    [entry] = slave.log_queue
+    assert entry.msg == "step refused at t = 1 s: ZeroDivisionError: of nothing"
+    assert entry.status == Fmi2Status.discard
+
+
+def test_the_last_message_says_that_it_is_the_last(slave, monkeypatch):
+    monkeypatch.setattr(callbacks, "MOST_MESSAGES", 2)
+    for reference in (97, 98, 99):
+        slave.get_real([reference])
+    first, last = (entry.msg for entry in slave.log_queue)
+    assert first == "no Real has the value reference 97"
+    assert last == "no Real has the value reference 98; what comes after this is not logged"
+
+
+def test_a_refused_state_is_mended_by_a_good_one_alone(slave):
+    saved = initialised(slave)._get_fmu_state()
+    slave._set_fmu_state({})
+    assert slave._get_fmu_state()["refused"].keys() == {"fmi2SetFMUstate"}
+    slave.set_real(A, [0.0, 0.0])
+    assert not slave.do_step(0.0, 0.1)
+    slave._set_fmu_state(saved)
+    assert slave.do_step(0.0, 0.1)
 
 
 def test_outputs_are_sampled_once_at_the_start_and_once_a_step(slave):

@@ -65,6 +65,9 @@ REASONS = {
     "state refused: the bytes are not those of a state": from_bytes(b"[1]"),
     "state refused: the bytes are not those of a state ": from_bytes(b"\xff"),
     "state refused: the bytes were changed since they were written": from_bytes(b"{}"),
+    "state refused: not a state of fmus.disturbance_generator.slave.DisturbanceGenerator": (
+        from_json(identity="another")
+    ),
     "state refused: it has other parts": from_json(more=1),
     "state refused: no mode is 'bogus'": from_json(mode="bogus"),
     "state refused: it has a state, or outputs, before the initialisation": (
