@@ -224,6 +224,19 @@ def test_fault_is_known_as_soon_as_it_is_asked_for(slave):
     slave.set_real([5], [10.0])
     slave.enter_initialization_mode()
     assert slave.get_boolean([8]) == [True]
+    assert slave._get_fmu_state()["refused"] == {
+        "initialisation": "initialisation refused: too much"
+    }
+
+
+def test_experiment_that_is_not_set_up_starts_at_zero(slave):
+    slave.enter_initialization_mode()
+    assert slave.get_real(C) == [0.0]
+
+
+def test_call_out_of_order_blocks_by_its_name(slave):
+    slave.terminate()
+    assert slave._get_fmu_state()["refused"].keys() == {"fmi2Terminate"}
 
 
 def test_fault_can_be_read_among_others(slave):
