@@ -17,6 +17,11 @@ def reason(error: BaseException) -> str:
     )
 
 
+def shortened(text: str, most: int = 80) -> str:
+    """A text for a message, cut where it gets long."""
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
 def last_line(text: str, otherwise: str = "no reason given") -> str:
     """The last line of what a child process has said: the reason why it failed."""
     lines = text.strip().splitlines()

@@ -47,7 +47,8 @@ class Experiment:
                 raise InputError("stop time and step must be smaller than 1e308 s") from None
         if not all(isfinite(value) and value > 0.0 for value in (self.stop_time, self.step)):
             raise InputError(
-                f"stop time {self.stop_time:g} s and step {self.step:g} s must be positive and finite"
+                f"stop time {self.stop_time:g} s and step {self.step:g} s must be positive, and "
+                "finite"
             )
         if self.stop_time / self.step > MOST_STEPS:
             raise InputError(
