@@ -5,16 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+#: Of a long text, such as all that is wrong with a description, this many lines and letters of
+#: each are said.
+_MOST_LINES, _LONGEST_LINE = 10, 300
+
 
 class InputError(ValueError):
     """The user asked for something that cannot be done; the text says what to change."""
 
 
 def reason(error: BaseException) -> str:
-    """All that an exception says, in one line."""
-    return "; ".join(line.strip() for line in str(error).splitlines() if line.strip()) or repr(
-        error
-    )
+    """What an exception says, in one line."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    more = [f"and {len(lines) - _MOST_LINES} lines more"] * (len(lines) > _MOST_LINES)
+    said = (shortened(line, _LONGEST_LINE) for line in (*lines[:_MOST_LINES], *more))
+    return "; ".join(said) or repr(error)
 
 
 def shortened(text: str, most: int = 80) -> str:

@@ -248,7 +248,7 @@ def test_animation_is_written(workplace):
         (["run", "fig4", "--stop-time", "0.1", "--out", "taken"], "cannot write into"),
         (["gains", "--set", "plant.ell=0"], "must be at least"),
         (["gains", "--set", "controller.K1[1]=nan"], "must be finite"),
-        (["run", "missing.toml"], "no such FMU"),
+        (["run", "missing.toml"], "no such file"),
         (["gains", "--set", "controller.lambda=much"], "not a real number"),
         (["gains", "--set", "controller.saturation=sigmoid"], "use one of tanh, algebraic"),
         (["animate", "fig4", "--stop-time", "0.1", "--out", "film.avi"], "write a .gif"),
