@@ -18,6 +18,10 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.files import FORMATS, read_columns, read_rows
 from orchestrator.master.observer import Ending, Header
 from orchestrator.master.table import Table
+from orchestrator.reading import explained, text_of
+
+#: What a file is not that cannot be read.
+_WHAT = "not the record of a run"
 
 #: Chooses the columns that are drawn among those that there are.
 Choice = Callable[[Sequence[str]], Collection[str]]
@@ -74,15 +78,16 @@ def read_record(table: Path) -> dict[str, Any]:
 
     """
     file = table.with_name(RECORD)
-    if not file.is_file():
+    if not file.exists():
         return {}
-    try:
-        record = json.loads(file.read_text(encoding="utf-8"))
-        if table.name not in record["files"]:
-            return {}
-        read_header(record, ())
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{file}: not the record of a run") from error
+    with explained(file, _WHAT):
+        record = json.loads(text_of(file, _WHAT))
+        try:
+            if table.name not in record["files"]:
+                return {}
+            read_header(record, ())
+        except (KeyError, TypeError, AttributeError):
+            raise ValueError("it lacks what a run writes") from None
     return dict(record)
 
 
