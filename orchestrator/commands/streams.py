@@ -7,6 +7,11 @@ import sys
 from contextlib import suppress
 from typing import TextIO
 
+from orchestrator.errors import shortened
+
+#: Letters of a line for the user: a name or a value in it may be a whole file.
+_LONGEST = 4000
+
 
 class Unheard(Exception):
     """Standard output cannot be written; nothing more is to be said there."""
@@ -29,7 +34,7 @@ def fill() -> None:
 def say(text: str) -> None:
     """A line for the user beside the output."""
     with suppress(OSError):
-        print(f"auv-fmu: {_plain(text)}", file=sys.stderr, flush=True)
+        print(shortened(f"auv-fmu: {_plain(text)}", _LONGEST), file=sys.stderr, flush=True)
 
 
 def show(*lines: object) -> None:

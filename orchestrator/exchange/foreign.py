@@ -118,8 +118,12 @@ def _places_of_time(names: Sequence[str]) -> list[int]:
 
 def _rows(reader: Any, width: int) -> Iterator[list[str]]:
     """The rows below the names; empty lines may follow the last one only."""
-    empty = 0
+    empty, line = 0, reader.line_num
     for row in reader:
+        line += 1
+        if reader.line_num != line:
+            # A lone quote, and the next one some rows later: what is between would be one value.
+            raise ValueError(f"line {line}: a value in quotes goes on in the next line")
         if not row:
             empty = empty or reader.line_num
             continue

@@ -300,7 +300,7 @@ def _stop(_: int, __: FrameType | None) -> None:
 def prepare() -> dict[str, Kind]:
     """All kinds of files, after one run of each with its valid file."""
     # Temporary files go into a folder of their own, so that writing beside it is seen.
-    tempfile.tempdir = tempfile.mkdtemp(prefix="auvfmu-fuzz")
+    tempfile.tempdir = tempfile.mkdtemp(prefix="mutated-files-")
     sys.dont_write_bytecode = True
     found = kinds()
     for name, kind in found.items():

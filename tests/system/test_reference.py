@@ -156,6 +156,7 @@ def test_own_run_that_fails_certifies_nothing(system: System):
         ("time,plant.eta.x\n0,1\n\n1,2\n", "line 3 is empty"),
         ('time,plant.eta.x\n0,1\n1,"2"5\n', "expected after"),
         ('time,plant.eta.x\n0,1\n1,"2\n', "end of data"),
+        ('time,plant.eta.x,b\n0,1,"\n1,2,"\n2,1,a\n', "line 2: a value in quotes goes on"),
         ("time,plant.eta.x,plant::eta.x[REAL]\n0,1,1\n", "columns 2 and 3 are both plant.eta.x"),
         ("time,auv.plant.eta.x,plant.eta.x\n0,1,1\n", "columns 2 and 3 are both plant.eta.x"),
         ("time,controller.fault\n0,false\n1,maybe\n", "'maybe' is no number"),
