@@ -15,17 +15,18 @@ from orchestrator.commands import streams
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     streams.fill()
-    status = 1
     try:
         with _interrupts_end_the_process():
             # Half a second of imports.
             dispatch: Callable[[Sequence[str] | None], int]
             dispatch = import_module("orchestrator.commands.parser").dispatch
         status = dispatch(arguments)
-    finally:
-        # Also where the parser ends the process, after a word of help.
-        heard = streams.finished()
-    return status if heard else max(status, 1)
+    except SystemExit as end:
+        # The parser has shown its help, or complained.
+        if not streams.finished():
+            raise SystemExit(end.code or 1) from None
+        raise
+    return status if streams.finished() else status or 1
 
 
 @contextmanager

@@ -26,7 +26,6 @@ def dispatch(arguments: Sequence[str] | None) -> int:
         say("interrupted")
         return INTERRUPTED
     except Unheard:
-        # Why is said when what was written is flushed.
         return FAILED
 
 

@@ -14,7 +14,7 @@ _LONGEST = 4000
 
 
 class Unheard(Exception):
-    """Standard output cannot be written; nothing more is to be said there."""
+    """Standard output cannot be written, which has been said."""
 
 
 def fill() -> None:
@@ -48,6 +48,7 @@ def show(*lines: object) -> None:
         for line in lines:
             print(_plain(str(line)))
     except OSError as error:
+        _give_up(sys.stdout, error)
         raise Unheard from error
 
 
@@ -57,7 +58,7 @@ def _plain(text: str) -> str:
 
 
 def finished() -> bool:
-    """Whether all output was written; says why, if it was not."""
+    """Whether all output could be written; says why, if it could not."""
     return all([_flushed(sys.stdout), _flushed(sys.stderr)])
 
 
@@ -65,10 +66,14 @@ def _flushed(stream: TextIO) -> bool:
     try:
         stream.flush()
     except OSError as error:
-        # Python would try again when the process ends, and complain.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-        # Where a reader has gone, nobody misses the rest.
-        if not isinstance(error, BrokenPipeError):
-            say(f"cannot write the output: {error.strerror}")
+        _give_up(stream, error)
         return False
     return True
+
+
+def _give_up(stream: TextIO, error: OSError) -> None:
+    # Python would try again when the process ends, and complain.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    # Where a reader has gone, nobody misses the rest.
+    if not isinstance(error, BrokenPipeError):
+        say(f"cannot write the output: {error.strerror}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Sequence
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -85,10 +85,18 @@ def read_record(table: Path) -> dict[str, Any]:
         try:
             if table.name not in record["files"]:
                 return {}
-            read_header(record, ())
+            header = read_header(record, ())
         except (KeyError, TypeError, AttributeError):
             raise ValueError("it lacks what a run writes") from None
+        if not all(map(_is_value, header.parameters.values())):
+            raise ValueError("it holds parameters that no run has")
     return dict(record)
+
+
+def _is_value(value: object) -> bool:
+    return isinstance(value, float | int | str) and (
+        not isinstance(value, float) or isfinite(value)
+    )
 
 
 def _header(
