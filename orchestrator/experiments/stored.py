@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.analysis.visible import VisibleRows
-from orchestrator.errors import InputError, reason
+from orchestrator.errors import InputError
 from orchestrator.experiments.folder import RECORD
 from orchestrator.experiments.record import read_header
 from orchestrator.master.experiment import Experiment
@@ -61,12 +61,10 @@ def table_in(path: Path) -> Path:
         InputError: there is none.
 
     """
-    try:
+    with explained(path, "not the name of a result"):
         for file in (path, *(path / f"result.{ending}" for ending in FORMATS)):
             if file.is_file():
                 return file
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {reason(error)}") from error
     raise InputError(f"{path}: holds no result.csv or result.parquet")
 
 

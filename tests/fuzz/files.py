@@ -23,9 +23,11 @@ import sys
 import tempfile
 import traceback
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass, replace
+from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from random import Random
 from types import FrameType
@@ -34,7 +36,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from orchestrator import simulate
+from orchestrator import Result, simulate
 from orchestrator.commands.main import main as auv_fmu
 from orchestrator.errors import InputError
 from orchestrator.exchange import verify
@@ -42,11 +44,12 @@ from orchestrator.experiments.bundle import current_fmus
 from orchestrator.experiments.scenario import FOLDER as SCENARIOS
 from orchestrator.experiments.scenario import read_scenario
 from orchestrator.experiments.wiring import closed_loop
-from orchestrator.master.experiment import ORDERS
+from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.files import CsvFile
-from orchestrator.master.observer import Ending
+from orchestrator.master.observer import Observer
 from orchestrator.master.table import Table
 from orchestrator.system.ssp.writing import ssp_bytes
+from orchestrator.system.unpacking import _process_folder, _unpacked
 
 from . import files_mutators as mutators
 from .files_oracle import agreement
@@ -91,8 +94,8 @@ class Kind:
     check: Callable[[bytes, str], str] = lambda content, said: ""
 
 
-def kinds() -> dict[str, Kind]:
-    """All kinds of files, each with a valid one."""
+def kinds(runs: Mapping[str, Result]) -> dict[str, Kind]:
+    """All kinds of files, each with a valid one; some need plotly."""
     fmus = {
         # Descriptions need no code; a system of such FMUs can be read and written, not run.
         fmu.name: _zipped({"modelDescription.xml": _entries(fmu.read_bytes())[_DESCRIPTION]})
@@ -103,9 +106,12 @@ def kinds() -> dict[str, Kind]:
             Path(folder, name).write_bytes(content)
         system = closed_loop(Path(folder), read_scenario("fig5"))
         archive = ssp_bytes(replace(system, stop_time=0.1, step=0.02))
-        result = simulate("fig4", stop_time=RECORDED)
-        stored = {path.name: path.read_bytes() for path in result.save(Path(folder, "r")).iterdir()}
-        runs = {order: simulate("fig4", stop_time=RECORDED, order=order) for order in ORDERS}
+        saved = runs[ORDERS[0]].save(Path(folder, "saved"))
+        stored = {path.name: path.read_bytes() for path in saved.iterdir()}
+        table = Path(folder, "table.csv")
+        file = CsvFile(table)
+        _tell(file, runs["jacobi"])
+        columns = table.read_bytes()
     entries, fmu = _entries(archive), fmus["ObserverController.fmu"]
 
     def exported(content: bytes) -> Place:
@@ -121,7 +127,7 @@ def kinds() -> dict[str, Kind]:
     def beside_the_others(name: str, *command: str) -> Callable[[bytes], Place]:
         return lambda content: Place({**stored, name: content}, [*command])
 
-    return {
+    found = {
         "description": Kind(
             _entries(fmu)[_DESCRIPTION],
             mutators.xml,
@@ -139,8 +145,11 @@ def kinds() -> dict[str, Kind]:
         "plot": Kind(stored["result.csv"], mutators.table, beside_the_others("result.csv", *_PLOT)),
         "view": Kind(stored["result.csv"], mutators.table, beside_the_others("result.csv", *_VIEW)),
         "record": Kind(stored["run.json"], mutators.json, beside_the_others("run.json", *_VIEW)),
-        "table": _table(runs),
+        "table": _table(runs, columns),
     }
+    if find_spec("plotly") is None:
+        del found["view"], found["record"]
+    return found
 
 
 _DESCRIPTION, _STRUCTURE, _VALUES = (
@@ -162,11 +171,28 @@ def _entries(content: bytes) -> dict[str, bytes]:
         return {name: archive.read(name) for name in archive.namelist()}
 
 
-def _table(runs: Mapping[str, Table]) -> Kind:
-    """Tables for `verify`, which meet recorded runs instead of new ones."""
+def _tell(observer: Observer, run: Table) -> None:
+    observer.begin(run.header)
+    for rows in np.array_split(run.rows, 3):
+        observer.take(rows)
+    observer.end(run.ending)
+
+
+def _replay(
+    runs: Mapping[str, Table], _: object, experiment: Experiment, observers: Sequence[Observer]
+) -> None:
+    """What `verify` meets instead of a new run."""
+    if experiment.stop_time > RECORDED + 1e-9:
+        raise InputError("not recorded")
+    for observer in observers:
+        _tell(observer, runs[experiment.order])
+
+
+def _table(runs: Mapping[str, Result], valid: bytes) -> Kind:
+    """Tables for `verify`, whose answers are judged."""
     outputs = [
         f"{component.name}.{variable.name}"
-        for component in runs["jacobi"].system.components.values()  # type: ignore[attr-defined]
+        for component in runs["jacobi"].system.components.values()
         for variable in component.having("output")
     ]
     booleans = {name for name in outputs if name.endswith(".fault")}
@@ -186,23 +212,6 @@ def _table(runs: Mapping[str, Table]) -> Kind:
         )
         return "" if said.startswith(wanted) else f"certified more than {wanted!r}"
 
-    def replay(system: object, experiment: Any, observers: Any) -> None:
-        run = runs[experiment.order]
-        if experiment.stop_time > RECORDED + 1e-9:
-            raise InputError("not recorded")
-        for observer in observers:
-            observer.begin(run.header)
-            for rows in np.array_split(run.rows, 3):
-                observer.take(rows)
-            observer.end(Ending())
-
-    patch.object(verify, "completed", replay).start()
-    with tempfile.TemporaryDirectory() as folder:
-        file = CsvFile(Path(folder, "t.csv"))
-        file.begin(runs["jacobi"].header)
-        file.take(runs["jacobi"].rows)
-        file.end(Ending())
-        valid = Path(folder, "t.csv").read_bytes()
     command = ["verify", "t.csv", "--tolerance", str(TOLERANCE)]
     return Kind(valid, mutators.table, lambda content: Place({"t.csv": content}, command), check)
 
@@ -297,19 +306,27 @@ def _stop(_: int, __: FrameType | None) -> None:
     raise Overdue
 
 
-def prepare() -> dict[str, Kind]:
+@contextmanager
+def prepared() -> Iterator[dict[str, Kind]]:
     """All kinds of files, after one run of each with its valid file."""
-    # Temporary files go into a folder of their own, so that writing beside it is seen.
-    tempfile.tempdir = tempfile.mkdtemp(prefix="mutated-files-")
-    sys.dont_write_bytecode = True
-    found = kinds()
-    for name, kind in found.items():
-        with suppress(Finding):
-            # The first use of a library may write into its cache.
-            attack(kind, kind.valid)
-        assert attack(kind, kind.valid) == 0, name
-    sys.addaudithook(_watch)
-    return found
+    before = tempfile.tempdir, sys.dont_write_bytecode
+    with tempfile.TemporaryDirectory(prefix="mutated-files-") as folder:
+        # Temporary files go into a folder of their own, so that writing beside it is seen.
+        tempfile.tempdir, sys.dont_write_bytecode = folder, True
+        _process_folder.cache_clear()
+        try:
+            runs = {order: simulate("fig4", stop_time=RECORDED, order=order) for order in ORDERS}
+            with patch.object(verify, "completed", partial(_replay, runs)):
+                found = kinds(runs)
+                for name, kind in found.items():
+                    # The first use of a library may write into its cache.
+                    assert attack(kind, kind.valid) == 0, name
+                sys.addaudithook(_watch)
+                yield found
+        finally:
+            tempfile.tempdir, sys.dont_write_bytecode = before
+            _unpacked.cache_clear()
+            _process_folder.cache_clear()
 
 
 def main() -> int:
@@ -321,7 +338,11 @@ def main() -> int:
     parser.add_argument("--only", metavar="KIND", help="one kind of file; default: all")
     parser.add_argument("--guided", action="store_true", help="let coverage choose, by atheris")
     options = parser.parse_args()
-    found = prepare()
+    with prepared() as found:
+        return _attacks(found, options)
+
+
+def _attacks(found: Mapping[str, Kind], options: argparse.Namespace) -> int:
     chosen = {options.only: found[options.only]} if options.only else found
     if options.guided:
         _guided(*chosen.values(), runs=options.runs)

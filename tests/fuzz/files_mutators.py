@@ -50,26 +50,7 @@ def table(content: bytes, random: Random) -> bytes:
     for _ in range(random.choice((1, 1, 1, 2, 4))):
         if len(rows) < 3:
             break
-        row = random.randrange(1, len(rows))
-        column = random.randrange(len(rows[0]))
-        actions: list[Callable[[], object]] = [
-            lambda: _put(rows, row, column, random.choice(NASTY)),
-            lambda: _put(rows, row, 0, random.choice((*NASTY, "0.5", "1.01", "3.999", "4"))),
-            lambda: _put(rows, row, column, _written_otherwise(_at(rows, row, column), random)),
-            lambda: _put(rows, 0, column, _renamed(_at(rows, 0, column), rows, random)),
-            lambda: _wrong_column(rows, column, random),
-            lambda: rows[row].pop(random.randrange(len(rows[row]))) if rows[row] else None,
-            lambda: rows[row].insert(column, random.choice(NASTY)),
-            lambda: rows.pop(row),
-            lambda: rows.insert(row, list(rows[random.randrange(len(rows))])),
-            lambda: rows.insert(row, random.choice(([], [""], [" "], ["# remark"]))),
-            lambda: rows.__setitem__(slice(row, None), []),
-            lambda: [line.append(line[column]) for line in rows if len(line) > column],
-            lambda: [line.pop(column) for line in rows if len(line) > column],
-            lambda: [line.append(random.choice(NASTY)) for line in rows],
-            lambda: rows[row].append(""),
-        ]
-        random.choice(actions)()
+        _spoil(rows, random)
     if random.random() < 0.2:
         separator, end, mark = random.choice(
             ((";", "\n", ""), ("\t", "\r\n", ""), (", ", "\r", ""), (",", "\n", "\ufeff"),
@@ -77,6 +58,29 @@ def table(content: bytes, random: Random) -> bytes:
         )  # fmt: skip
     changed = (mark + end.join(map(separator.join, rows)) + end).encode("utf-8", "surrogatepass")
     return some_bytes(changed, random) if random.random() < 0.2 else changed
+
+
+def _spoil(rows: list[list[str]], random: Random) -> None:
+    row = random.randrange(1, len(rows))
+    column = random.randrange(len(rows[0]))
+    actions: list[Callable[[], object]] = [
+        lambda: _put(rows, row, column, random.choice(NASTY)),
+        lambda: _put(rows, row, 0, random.choice((*NASTY, "0.5", "1.01", "3.999", "4"))),
+        lambda: _put(rows, row, column, _written_otherwise(_at(rows, row, column), random)),
+        lambda: _put(rows, 0, column, _renamed(_at(rows, 0, column), rows, random)),
+        lambda: _wrong_column(rows, column, random),
+        lambda: rows[row].pop(random.randrange(len(rows[row]))) if rows[row] else None,
+        lambda: rows[row].insert(column, random.choice(NASTY)),
+        lambda: rows.pop(row),
+        lambda: rows.insert(row, list(rows[random.randrange(len(rows))])),
+        lambda: rows.insert(row, random.choice(([], [""], [" "], ["# remark"]))),
+        lambda: rows.__setitem__(slice(row, None), []),
+        lambda: [line.append(line[column]) for line in rows if len(line) > column],
+        lambda: [line.pop(column) for line in rows if len(line) > column],
+        lambda: [line.append(random.choice(NASTY)) for line in rows],
+        lambda: rows[row].append(""),
+    ]
+    random.choice(actions)()
 
 
 def _at(rows: list[list[str]], row: int, column: int) -> str:
@@ -95,8 +99,9 @@ def _written_otherwise(text: str, random: Random) -> str:
     except ValueError:
         return f'"{text}"'
     return random.choice(
-        (f'"{text}"', f" {text} ", f"{number:.17e}", f"{number:.6g}", f"+{number!r}", f"{number:.3f}",
-         f'"{text}', f'{text}"', f"{text}f", f"{number * (1 + 1e-5)!r}", f"{number + 1e-3!r}")
+        (f'"{text}"', f" {text} ", f"{number:.17e}", f"{number:.6g}", f"+{number!r}",
+         f"{number:.3f}", f'"{text}', f'{text}"', f"{text}f", f"{number + 1e-3!r}",
+         f"{number * (1 + 1e-5)!r}")
     )  # fmt: skip
 
 
@@ -231,6 +236,7 @@ def archive(content: bytes, random: Random) -> bytes:
     method = random.choice(
         (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
     )
+    odd = ("", "/", ".", "a/", "\\", "a\\..\\..\\b", "n" * 300, "d/" * 2000)
     added = {
         0: [(name, b"another")],
         1: [("../outside.txt", b"x")],
@@ -239,7 +245,7 @@ def archive(content: bytes, random: Random) -> bytes:
         4: [(f"{name}/below", b"x")],
         5: [("zeros", bytes(1_000_000))],
         6: [(f"{i:x}", b"") for i in range(random.choice((10, 2000)))],
-        7: [(random.choice(("", "/", ".", "a/", "\\", "a\\..\\..\\b", "n" * 300, "d/" * 2000)), b"x")],
+        7: [(random.choice(odd), b"x")],
         8: [("link", b"/etc/passwd")],
     }.get(kind, [])  # fmt: skip
     out = io.BytesIO()

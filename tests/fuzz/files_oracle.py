@@ -6,6 +6,7 @@ import re
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
+from itertools import pairwise
 from typing import NamedTuple
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -69,7 +70,7 @@ def _fields(line: str, separator: str) -> list[str] | None:
         line = line[1:]
 
 
-def _agreement(
+def _agreement(  # noqa: PLR0911  # one for each thing that can be wrong
     rows: list[list[str] | None],
     run: Mapping[str, Sequence[float]],
     booleans: set[str],
@@ -86,13 +87,13 @@ def _agreement(
     if None in times or not times or not times[-1]:
         return None
     known = [float(time) for time in times if time is not None]
-    if known[0] < 0 or any(a >= b for a, b in zip(known, known[1:], strict=False)):
+    if known[0] < 0 or any(a >= b for a, b in pairwise(known)):
         return None
     compared: dict[str, int] = {}
     for i, name in enumerate(names):
         alias = _ALIASES.fullmatch(name.strip())
-        port = f"{alias[1]}.{alias[2]}" if alias else name
-        for port in {port, name.strip()} & run.keys() - {"time"}:
+        plain = f"{alias[1]}.{alias[2]}" if alias else name
+        for port in {plain, name.strip()} & run.keys() - {"time"}:
             if port in compared:
                 return None
             compared[port] = i
