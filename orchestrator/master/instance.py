@@ -31,7 +31,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 
 from orchestrator.errors import InputError, reason
 from orchestrator.system.component import Component
-from orchestrator.system.unpacking import unpacked
+from orchestrator.system.unpacking import check_place, unpacked
 from orchestrator.system.values import Value
 
 #: Messages that are kept: an FMU may have something to say in every step.
@@ -179,12 +179,7 @@ _LOCK = Lock()
 def _library(fmu: Path, description: ModelDescription, folder: Path) -> FMU2Slave:
     """The library of an unpacked FMU, loaded once a process."""
     if folder not in _libraries:
-        if "%" in folder.as_uri().replace("%20", ""):
-            # PythonFMU 0.7 does not decode the URI and crashes its host.
-            raise InputError(
-                f"temporary folder {str(folder)!r}: FMUs need a path of plain ASCII characters; "
-                "set TMPDIR to one"
-            )
+        check_place(folder)
         try:
             _libraries[folder] = FMU2Slave(
                 guid=description.guid,

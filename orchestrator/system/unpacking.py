@@ -6,6 +6,7 @@ again then neither unzips an FMU nor loads its library a second time.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path, PurePosixPath
@@ -94,6 +95,24 @@ def _check(entries: Sequence[ZipInfo]) -> None:
         names.add(path)
         if path.suffix in _DESCRIPTIONS and entry.file_size > _MOST_OF_A_DESCRIPTION:
             raise ValueError(f"{entry.filename!r} is longer than {_MOST_OF_A_DESCRIPTION:,} bytes")
+
+
+def check_place(folder: Path) -> None:
+    """Check that an unpacked FMU can be told where it is.
+
+    Raises:
+        InputError: it cannot; the text says what to do.
+
+    """
+    # PythonFMU 0.7 does not decode the URI of its folder, but for spaces, and crashes its host. Our
+    # loader, which has PythonFMU's library beside it, does that for it.
+    plain = (folder / "resources" / "slavemodule.txt").is_file()
+    loader = any((folder / "binaries").glob("*/*_pythonfmu.*"))
+    if plain and not loader and (odd := re.sub(r"[\w./~-]| ", "", str(folder), flags=re.ASCII)):
+        raise InputError(
+            f"temporary folder {str(folder)!r}: PythonFMU takes no {odd[0]!r} in it; set TMPDIR to "
+            "another, or build the FMU with --loader native"
+        )
 
 
 @cache
