@@ -19,7 +19,7 @@ def reason(error: BaseException) -> str:
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     more = [f"and {len(lines) - _MOST_LINES} lines more"] * (len(lines) > _MOST_LINES)
     said = (shortened(line, _LONGEST_LINE) for line in (*lines[:_MOST_LINES], *more))
-    return "; ".join(said) or repr(error)
+    return "; ".join(said).replace(":; ", ": ") or repr(error)
 
 
 def shortened(text: str, most: int = 80) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -100,7 +99,4 @@ def _description(fmu: Path, _: Version) -> ModelDescription:
             f"{fmu}: its model identifier {description.coSimulation.modelIdentifier!r} names no "
             "library"
         )
-    names = Counter(variable.name for variable in description.modelVariables)
-    if twice := [name for name, n in names.items() if n > 1]:
-        raise InputError(f"{fmu}: declares {twice[0]!r} twice")
     return description
