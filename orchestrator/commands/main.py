@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 
+from orchestrator.errors import reason
+from orchestrator.master.interrupts import orderly_end
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
+    # No matrix here is worth a thread, and where one cannot be had numpy's library ends in Ctrl-C.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        # Half a second of imports, in which Ctrl-C must find an answer, too.
-        return int(import_module("orchestrator.commands.parser").dispatch(arguments))
+        with orderly_end():
+            # Half a second of imports, in which Ctrl-C must find an answer, too.
+            return int(import_module("orchestrator.commands.parser").dispatch(arguments))
     except KeyboardInterrupt:
         print("auv-fmu: interrupted", file=sys.stderr)
         return 130
+    except (OSError, MemoryError) as error:
+        # Whatever else this machine does not give.
+        print(f"auv-fmu: {reason(error)}", file=sys.stderr)
+        return 2
 
 
 if __name__ == "__main__":

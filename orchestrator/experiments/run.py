@@ -7,8 +7,9 @@ import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
+from shutil import rmtree
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from orchestrator.analysis.cautions import cautions, cautions_after
@@ -18,10 +19,11 @@ from orchestrator.analysis.metrics import Metrics
 from orchestrator.analysis.sensors import velocities_reaching
 from orchestrator.analysis.signals import CONTROLLER, THETA_HAT
 from orchestrator.analysis.visible import VisibleRows
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, reason
 from orchestrator.experiments.folder import place_of, replaced
 from orchestrator.experiments.preparation import Prepared
-from orchestrator.experiments.record import write_record
+from orchestrator.experiments.record import Clock, write_record
+from orchestrator.experiments.scenario import Scenario
 from orchestrator.master.files import FORMATS
 from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.observer import Ending, Observer
@@ -30,6 +32,9 @@ from orchestrator.master.row import KINDS
 from orchestrator.master.selection import Selection, check_interval, matches, matching
 from orchestrator.master.simulation import simulate
 from orchestrator.system.structure import System
+
+#: A file that keeps room for what is written last, so that a full disk does not cost the record.
+_SPARE, _SPARE_BYTES = ".spare", 65536
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,17 @@ class Finished:
     ending: Ending
 
 
+@dataclass
+class _Done:
+    """A run that has ended: its folder, what metrics.json will hold, and what figures show."""
+
+    folder: Path
+    prepared: Prepared
+    metrics: dict[str, Any]
+    seen: VisibleRows
+    ending: Ending
+
+
 def run_into(
     folder: Path,
     runs: Sequence[Prepared],
@@ -86,39 +102,43 @@ def run_into(
         selected_columns(prepared.system, files.columns, is_companion=i > 0)
         for i, prepared in enumerate(runs)
     ]
-    started = datetime.now(UTC)
+    clock = Clock()
+    done: list[_Done] = []
     with (
         held_interrupts(_answer) as interrupts,
-        replaced(folder) as unfinished,
+        replaced(folder, keep=lambda: bool(done)) as unfinished,
     ):
-        done: list[tuple[Path, Prepared, Finished, VisibleRows]] = []
-        for prepared, columns in zip(runs, tables, strict=True):
-            for caution in cautions(prepared.system, prepared.experiment):
-                say(f"warning: {prepared.scenario.name}: {caution}")
-            target = unfinished / prepared.scenario.name if done else unfinished
-            target.mkdir(exist_ok=True)
-            done.append((target, prepared, *_run(target, prepared, files, columns)))
-            for caution in cautions_after(done[-1][-1]):
-                say(f"warning: {prepared.scenario.name}: {caution}")
-            if interrupts:
-                break
-        if files.figures and not interrupts.urgent:
-            scenario = runs[0].scenario
-            drawn = [Drawn(run.scenario.legend, seen) for _, run, _, seen in done]
-            for note in draw(
-                scenario.figure,
-                scenario.title,
-                drawn,
-                unfinished,
-                scenario.name,
-                stop=lambda: interrupts.urgent,
-            ):
-                say(note)
+        spare = unfinished / _SPARE
+        # No zeros: some file systems need no room for them.
+        spare.write_bytes(os.urandom(_SPARE_BYTES))
+        try:
+            for prepared, columns in zip(runs, tables, strict=True):
+                for caution in cautions(prepared.system, prepared.experiment):
+                    say(f"warning: {prepared.scenario.name}: {caution}")
+                target = unfinished / prepared.scenario.name if done else unfinished
+                target.mkdir(exist_ok=True)
+                done.append(_run(target, prepared, files, columns))
+                for caution in cautions_after(done[-1].seen):
+                    say(f"warning: {prepared.scenario.name}: {caution}")
+                if interrupts:
+                    break
+            if files.figures and not interrupts.urgent:
+                for note in _draw(runs[0].scenario, done, unfinished, interrupts):
+                    say(note)
+        except (OSError, MemoryError) as error:
+            if not done:
+                raise
+            if target != done[-1].folder:
+                rmtree(target)
+            first, failure = done[0], f"could not be written in full: {reason(error)}"
+            first.ending = replace(first.ending, failure=first.ending.failure or failure)
+        spare.unlink()
         # The record of the first names the files of all, so it comes last.
-        for target, prepared, finished, seen in reversed(done):
-            write_record(target, prepared, seen.header, finished.ending, command, started)
+        for run in reversed(done):
+            write_metrics(run.folder, run.metrics)
+            write_record(run.folder, run.prepared, run.seen.header, run.ending, command, clock)
         place = place_of(unfinished, folder)
-        return [replace(finished, folder=place) for _, _, finished, _ in done]
+    return [Finished(place, run.prepared.scenario.name, run.metrics, run.ending) for run in done]
 
 
 def _answer(interrupts: Interrupts) -> None:
@@ -131,10 +151,7 @@ def _answer(interrupts: Interrupts) -> None:
         os.write(2, f"auv-fmu: {text}\n".encode())
 
 
-def _run(
-    folder: Path, prepared: Prepared, files: Files, columns: Sequence[str] | None
-) -> tuple[Finished, VisibleRows]:
-    scenario, system = prepared.scenario, prepared.system
+def _run(folder: Path, prepared: Prepared, files: Files, columns: Sequence[str] | None) -> _Done:
     metrics = Metrics()
     # Without figures the cautions alone look at what was seen.
     seen = VisibleRows() if files.figures else VisibleRows(THETA_HAT[:1])
@@ -144,12 +161,29 @@ def _run(
         CertificatesFile(folder / "certificates.csv", files.interval),
         metrics,
         seen,
-        Progress(scenario.name),
+        Progress(prepared.scenario.name),
     ]
-    ending = simulate(system, prepared.experiment, observers)
-    values = metrics_json(metrics, prepared)
-    write_metrics(folder, values)
-    return Finished(folder, scenario.name, values, ending), seen
+    ending = simulate(prepared.system, prepared.experiment, observers)
+    return _Done(folder, prepared, metrics_json(metrics, prepared), seen, ending)
+
+
+def _draw(
+    scenario: Scenario, done: Sequence[_Done], folder: Path, interrupts: Interrupts
+) -> list[str]:
+    """Draw all figures or, where one of them cannot be written, none; notes on what is left out."""
+    drawn = [Drawn(run.prepared.scenario.legend, run.seen) for run in done]
+    with TemporaryDirectory(dir=folder) as temporary:
+        notes = draw(
+            scenario.figure,
+            scenario.title,
+            drawn,
+            Path(temporary),
+            scenario.name,
+            stop=lambda: interrupts.urgent,
+        )
+        for figure in Path(temporary).iterdir():
+            figure.rename(folder / figure.name)
+    return notes
 
 
 def metrics_json(metrics: Metrics, prepared: Prepared) -> dict[str, Any]:

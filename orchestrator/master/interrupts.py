@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 #: Ctrl-C, what a batch system sends, and the end of the terminal.
 _STOPS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
+
+
+#: Exit status of a process that a signal has ended, less the number of the signal.
+_SIGNALLED = 128
 
 
 class Interrupts:
@@ -47,6 +52,35 @@ class Interrupts:
 
 
 @contextmanager
+def orderly_end() -> Iterator[None]:
+    """As long as the context lasts, leave by SIGTERM and SIGHUP as by any other exit.
+
+    What is temporary then goes, and child processes end.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with _handled([n for n in _STOPS if signal.getsignal(n) is signal.SIG_DFL], _leave):
+        yield
+
+
+def _leave(number: int, _frame: Any) -> None:
+    # Once: the way out is not to be cut short.
+    signal.signal(number, signal.SIG_IGN)
+    sys.exit(_SIGNALLED + number)
+
+
+@contextmanager
+def _handled(numbers: Sequence[int], handler: Callable[[int, Any], None]) -> Iterator[None]:
+    before = {number: signal.signal(number, handler) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, previous in before.items():
+            signal.signal(number, previous)
+
+
+@contextmanager
 def held_interrupts(
     announce: Callable[[Interrupts], None] | None = None,
 ) -> Iterator[Interrupts]:
@@ -69,9 +103,5 @@ def held_interrupts(
     interrupts = Interrupts(announce)
     # What is ignored stays so: nohup, or a shell's background.
     heeded = [n for n in _STOPS if signal.getsignal(n) not in (signal.SIG_IGN, None)]
-    before = {number: signal.signal(number, interrupts.take) for number in heeded}
-    try:
+    with _handled(heeded, interrupts.take):
         yield interrupts
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

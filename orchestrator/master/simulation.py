@@ -12,7 +12,7 @@ from orchestrator.errors import InputError, reason
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.instance import Instance, Log, running
 from orchestrator.master.interrupts import Interrupts, held_interrupts
-from orchestrator.master.observer import Blocks, Ending, Header, Observer
+from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import Stage, schedule, stages
 from orchestrator.system.names import PortName
@@ -49,7 +49,11 @@ def simulate(system: System, experiment: Experiment, observers: Sequence[Observe
         steps = schedule(system, plan, instances, row)
         with _told(header, observers) as tell:
             blocks = Blocks(len(row.values), observers)
-            failure = _advance(experiment, steps, row.values, blocks, interrupts, log)
+            try:
+                failure = _advance(experiment, steps, row.values, blocks, interrupts, log)
+            except NotKept as error:
+                # Rows that cannot be kept need not be computed.
+                failure = str(error)
             if failure is None:
                 _terminate(instances)
             ending = Ending(failure, log.messages, tuple(interrupts.signals))

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory, mkdtemp
+from shutil import rmtree
+from tempfile import gettempdir, mkdtemp
 from threading import Lock
 from typing import NamedTuple
 from zipfile import BadZipFile, ZipFile
 
 from orchestrator.errors import InputError, reason
+from orchestrator.system.leftovers import process_folder
 
 #: Runs in several threads share what is unpacked.
 _LOCK = Lock()
@@ -50,12 +52,17 @@ def unpacked(archive: Path) -> Path:
 
 @cache
 def _unpacked(archive: Version) -> Path:
-    folder = Path(mkdtemp(dir=_process_folder().name))
     with ZipFile(archive.path) as content:
-        content.extractall(folder)
+        try:
+            folder = Path(mkdtemp(dir=process_folder()))
+            try:
+                content.extractall(folder)
+            except BaseException:
+                rmtree(folder, ignore_errors=True)
+                raise
+        except OSError as error:
+            raise InputError(
+                f"{archive.path}: cannot be unpacked into {gettempdir()}: {reason(error)}; set "
+                "TMPDIR to another folder"
+            ) from error
     return folder
-
-
-@cache
-def _process_folder() -> TemporaryDirectory[str]:
-    return TemporaryDirectory(prefix="auvfmu")
