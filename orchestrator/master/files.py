@@ -21,9 +21,9 @@ from orchestrator.master.observer import Ending, Header
 #: Rows that are written to Parquet, or read, at once.
 _ROWS = 8192
 
-#: What Parquet needs at most: rows that wait, bytes of a value, and bytes that describe a column of
-#: the rows written at once.
-_ROWS_ROOM, _BYTES, _CHUNK_BYTES = 2 * _ROWS, 9, 1024
+#: What Parquet needs at most: bytes of a value, and bytes that describe a column of the rows that
+#: are written at once, of which there may be a block too many.
+_BYTES, _CHUNK_BYTES, _MOST_ROWS = 9, 1024, _ROWS + 1024
 
 
 class CsvLines:
@@ -104,7 +104,7 @@ class ParquetFile:
         self._file = self._path.open("wb")
         self._writer = import_module("pyarrow.parquet").ParquetWriter(self._file, self._schema)
         self._waiting: list[np.ndarray] = []
-        self._n = 0
+        self._n, self._room = 0, min(header.experiment.rows, _MOST_ROWS)
         self._take_room()
 
     def take(self, rows: np.ndarray) -> None:
@@ -139,7 +139,7 @@ class ParquetFile:
         self._file.flush()
         if hasattr(os, "posix_fallocate"):
             columns = len(self._schema)
-            needed = columns * (_ROWS_ROOM * _BYTES + (self._n + 2) * _CHUNK_BYTES)
+            needed = columns * (self._room * _BYTES + (self._n + 2) * _CHUNK_BYTES)
             os.posix_fallocate(self._file.fileno(), self._file.tell(), needed)
 
 

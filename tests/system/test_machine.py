@@ -1,0 +1,218 @@
+"""Disks that are full, folders that may not be written, limits, signals, kills, clocks that jump.
+
+What was computed is kept, what was good stays good, and nothing half-written is taken for whole.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.machine import (
+    called,
+    contents,
+    eventually,
+    is_over,
+    members,
+    small_disk,
+    start,
+    without_privileges,
+)
+
+from orchestrator import simulate
+from orchestrator.commands.main import main
+from orchestrator.experiments.bundle import current_fmus
+from orchestrator.experiments.stored import read_result
+from orchestrator.master.files import read_rows
+
+
+@pytest.fixture(autouse=True)
+def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture(autouse=True)
+def temporary(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder for temporary files of child processes."""
+    folder = tmp_path_factory.mktemp("temporary")
+    current_fmus()
+    monkeypatch.setenv("TMPDIR", str(folder))
+    return folder
+
+
+def rows(folder: Path, ending: str = "csv") -> np.ndarray:
+    return np.vstack(list(read_rows(folder / f"result.{ending}")))
+
+
+def failure(folder: Path) -> str:
+    return str(json.loads((folder / "run.json").read_text())["failure"])
+
+
+RUN = ["run", "fig4", "--no-figures", "--stop-time"]
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_full_disk_ends_a_run_early_and_keeps_the_rows(workplace, capsys, ending):
+    """There is room for some thousand of a million."""
+    if ending == "parquet":
+        pytest.importorskip("pyarrow")
+    with small_disk(workplace / "disk", 14_000_000) as disk:
+        out = ["--out", str(disk / "r"), "--format", ending]
+        assert main([*RUN, "0.1", *out]) == 0
+        before = contents(disk)
+        capsys.readouterr()
+        assert main([*RUN, "20000", *out]) == 1
+        [where, why] = capsys.readouterr().err.splitlines()
+        assert where.endswith("keeps the whole result that was there before")
+        assert why.startswith("auv-fmu: fig4 stopped at t = ")
+        assert why.endswith("No space left on device")
+        after = contents(disk)
+        incomplete = disk / "r" / "incomplete"
+        assert {name: after[name] for name in after if "incomplete" not in name} == before
+        kept = rows(incomplete, ending)
+        assert len(kept) > 1000
+        assert np.array_equal(kept, simulate("fig4", stop_time=(len(kept) - 1) * 0.02).rows)
+        assert read_result(incomplete)[1].failure == why.removeprefix("auv-fmu: fig4 ")
+
+
+@pytest.mark.parametrize("size", [60_000, 150_000, 300_000, 500_000, 700_000, 900_000])
+def test_full_disk_at_any_stage(workplace, capsys, size):
+    """The table takes 0.2 MB, figures another 0.9 MB."""
+    with small_disk(workplace / "disk", size) as disk:
+        folder = disk / "r"
+        status = main(["run", "fig4", "--stop-time", "2", "--out", str(folder)])
+        said = capsys.readouterr().err.splitlines()
+        assert len(said) == 1
+        assert "No space left on device" in said[0]
+        if status == 2:
+            # Not even what is taken before the first row.
+            assert contents(disk) == {}
+            return
+        assert status == 1
+        assert failure(folder) in said[0]
+        whole = simulate("fig4", stop_time=2.0).rows
+        kept = rows(folder)
+        assert np.array_equal(kept, whole[: len(kept)])
+        assert len(kept) == len(whole) or size < 300_000
+        names = contents(folder).keys()
+        assert names >= {"run.json", "metrics.json", "result.csv"}
+        assert not [name for name in names if name.startswith(".") or name.endswith("g")]
+
+
+@pytest.mark.parametrize("arguments", [["build"], ["export", "fig4"], ["reference"]])
+def test_full_disk_leaves_what_was_there_and_nothing_else(workplace, capsys, arguments):
+    with small_disk(workplace / "disk", 600_000) as disk:
+        (disk / "r").mkdir()
+        (disk / "r" / "AuvPlant.fmu").write_text("earlier")
+        before = contents(disk)
+        assert main([*arguments, "--out", str(disk / "r")]) == 2
+        [line] = capsys.readouterr().err.splitlines()
+        assert "No space left on device" in line
+        assert contents(disk) == before
+
+
+def test_full_temporary_folder_is_named(workplace):
+    with small_disk(workplace / "disk", 300_000) as disk:
+        status, [line] = called(*RUN, "0.1", environment={"TMPDIR": str(disk)})
+        assert status == 2
+        assert f"cannot be unpacked into {disk}: " in line
+        assert line.endswith("No space left on device; set TMPDIR to another folder")
+        assert list(disk.iterdir()) == []
+
+
+def test_full_cache_is_named_and_left_empty(workplace):
+    with small_disk(workplace / "disk", 300_000) as disk:
+        status, said = called(*RUN, "0.1", environment={"XDG_CACHE_HOME": str(disk)})
+        assert status == 2
+        assert "No space left on device" in said[-1]
+        assert not list(disk.glob("auv-fmu/fmus/*"))
+        assert not list(disk.glob("auv-fmu/fmus/.*"))
+
+
+def test_limit_of_the_size_of_files_is_like_a_full_disk(workplace):
+    """An unpacked FMU has files of 200 kB."""
+    limit = {resource.RLIMIT_FSIZE: 1_000_000}
+    status, [line] = called(*RUN, "20000", limits=limit)
+    assert status == 1
+    assert line.startswith("auv-fmu: fig4 stopped at t = ")
+    assert line.endswith("File too large")
+    kept = rows(workplace / "results" / "fig4")
+    assert np.array_equal(kept, simulate("fig4", stop_time=(len(kept) - 1) * 0.02).rows)
+    assert len(kept) > 500
+
+
+@pytest.mark.parametrize("megabytes", [160, 220, 235, 250])
+def test_short_memory_is_said_and_loses_no_rows(workplace, megabytes):
+    """Python and numpy alone need 150 MB of address space, figures 300."""
+    limit = {resource.RLIMIT_AS: megabytes * 10**6}
+    status, said = called("run", "fig4", "--stop-time", "1", limits=limit)
+    assert status in (1, 2)
+    assert not [line for line in said if "Traceback" in line]
+    if status == 1 and said[-1].startswith("auv-fmu: fig4"):
+        assert len(rows(workplace / "results" / "fig4")) == 51
+        assert failure(workplace / "results" / "fig4") in said[-1]
+
+
+@pytest.mark.parametrize("descriptors", [5, 7, 9, 11, 13])
+def test_few_descriptors(workplace, temporary, descriptors):
+    status, said = called(
+        "run", "fig4", "--stop-time", "0.1", limits={resource.RLIMIT_NOFILE: descriptors}
+    )
+    assert status in (0, 1, 2)
+    assert not [line for line in said if "Traceback" in line], said
+    assert status == 0 or "Too many open files" in said[-1]
+
+
+def test_folders_that_may_not_be_written(workplace):
+    sealed = workplace / "sealed"
+    assert main([*RUN, "0.1", "--out", "sealed/r"]) == 0
+    before = contents(sealed)
+    for path in (sealed, sealed / "r"):
+        path.chmod(0o500)
+    try:
+        for arguments in (
+            [*RUN, "0.1", "--out", "sealed/r"],
+            [*RUN, "0.1", "--out", "sealed/new/r"],
+            ["export", "fig4", "--out", "sealed/r"],
+            ["plot", "sealed/r", "--out", "sealed/r/plot.png"],
+            ["view", "sealed/r"],
+        ):
+            status, [line] = called(*arguments, before=without_privileges)
+            assert status == 2
+            assert "Permission denied" in line
+            assert "; choose " in line
+        assert contents(sealed) == before
+        # To look at it needs no more than to read it.
+        status, said = called("plot", "sealed/r", before=without_privileges)
+        assert (status, said) == (0, [])
+    finally:
+        for path in (sealed, sealed / "r"):
+            path.chmod(0o700)
+
+
+def test_home_that_may_not_be_written(workplace):
+    (workplace / "home").mkdir(mode=0o500)
+    home = {"HOME": str(workplace / "home"), "XDG_CACHE_HOME": None, "XDG_CONFIG_HOME": None}
+    status, [line] = called(*RUN, "0.1", environment=home, before=without_privileges)
+    assert status == 2
+    assert line.startswith("auv-fmu: cannot keep FMUs in ")
+    assert line.endswith("set XDG_CACHE_HOME to a folder that can be written")
+
+
+def test_no_home_and_no_temporary_folder(workplace):
+    status, said = called(*RUN, "0.1", environment={"HOME": None, "TMPDIR": "/nonexistent"})
+    assert (status, said) == (0, [])
+
+
