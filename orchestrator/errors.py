@@ -12,8 +12,11 @@ class InputError(ValueError):
 
 def reason(error: BaseException) -> str:
     """All that an exception says, in one line."""
-    text = "; ".join(line.strip() for line in str(error).splitlines() if line.strip())
-    return text or ("memory is short" if isinstance(error, MemoryError) else repr(error))
+    if isinstance(error, MemoryError):
+        return "memory is short"
+    return "; ".join(line.strip() for line in str(error).splitlines() if line.strip()) or repr(
+        error
+    )
 
 
 def last_line(text: str, otherwise: str = "no reason given") -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 from collections.abc import Sequence
@@ -15,6 +16,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     # No matrix here is worth a thread, and where one cannot be had numpy's library ends in Ctrl-C.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Where it can keep no fonts it says so at length, and draws all the same.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     try:
         with orderly_end():
             # Half a second of imports, in which Ctrl-C must find an answer, too.
@@ -22,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("auv-fmu: interrupted", file=sys.stderr)
         return 130
-    except (OSError, MemoryError) as error:
+    except (OSError, MemoryError, ImportError) as error:
         # Whatever else this machine does not give.
         print(f"auv-fmu: {reason(error)}", file=sys.stderr)
         return 2

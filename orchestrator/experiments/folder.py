@@ -52,7 +52,7 @@ def replaced(folder: Path, keep: Callable[[], bool] = lambda: False) -> Iterator
 
     Args:
         folder: of the result, made if it does not exist.
-        keep: asked, when the disk has failed, whether what was written before is to be kept.
+        keep: asked, when there is no more room, whether what was written before is to be kept.
 
     Raises:
         InputError: the folder cannot be written, or another run is writing into it.
@@ -72,7 +72,7 @@ def replaced(folder: Path, keep: Callable[[], bool] = lambda: False) -> Iterator
             try:
                 yield unfinished
                 _publish(unfinished, place_of(unfinished, folder))
-            except OSError as error:
+            except (OSError, MemoryError) as error:
                 rest = _rest(unfinished, folder) if keep() else ""
                 raise InputError(_cannot_write(folder, error, rest)) from error
             finally:
@@ -154,8 +154,9 @@ def _locked(folder: Path) -> Iterator[None]:
         ) from None
 
 
-def _cannot_write(folder: Path, error: OSError, rest: str = "") -> str:
-    return f"cannot write into {folder}: {reason(error)}{rest}; choose another folder (--out DIR)"
+def _cannot_write(folder: Path, error: Exception, rest: str = "") -> str:
+    hint = "; choose another folder (--out DIR)" if isinstance(error, OSError) else ""
+    return f"cannot write into {folder}: {reason(error)}{rest}{hint}"
 
 
 def _rest(unfinished: Path, folder: Path) -> str:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import rmtree
 from tempfile import TemporaryDirectory
 from typing import Any
+
+import numpy as np
 
 from orchestrator.analysis.cautions import cautions, cautions_after
 from orchestrator.analysis.certificates import CertificatesFile
@@ -102,10 +103,13 @@ def run_into(
         selected_columns(prepared.system, files.columns, is_companion=i > 0)
         for i, prepared in enumerate(runs)
     ]
+    # The library of numpy's algebra ends the process if there is no memory for it: not later, when
+    # there are rows to lose.
+    np.linalg.inv(np.eye(1))
     clock = Clock()
     done: list[_Done] = []
     with (
-        held_interrupts(_answer) as interrupts,
+        held_interrupts() as interrupts,
         replaced(folder, keep=lambda: bool(done)) as unfinished,
     ):
         spare = unfinished / _SPARE
@@ -132,6 +136,11 @@ def run_into(
                 rmtree(target)
             first, failure = done[0], f"could not be written in full: {reason(error)}"
             first.ending = replace(first.ending, failure=first.ending.failure or failure)
+        if not unfinished.is_dir():
+            raise InputError(
+                f"{folder} was moved or deleted while it was written, and what was computed went "
+                f"with it, in {unfinished.name}"
+            )
         spare.unlink()
         # The record of the first names the files of all, so it comes last.
         for run in reversed(done):
@@ -139,16 +148,6 @@ def run_into(
             write_record(run.folder, run.prepared, run.seen.header, run.ending, command, clock)
         place = place_of(unfinished, folder)
     return [Finished(place, run.prepared.scenario.name, run.metrics, run.ending) for run in done]
-
-
-def _answer(interrupts: Interrupts) -> None:
-    """Tell the user at once what happens now, from within the handler of the signal."""
-    text = "stopping: writing what was computed and drawing it; once more leaves the figures out"
-    if interrupts.urgent:
-        text = "stopping at once: what was computed is kept, figures are left out"
-    # print could have been interrupted itself, and must not be entered a second time.
-    with suppress(OSError):
-        os.write(2, f"auv-fmu: {text}\n".encode())
 
 
 def _run(folder: Path, prepared: Prepared, files: Files, columns: Sequence[str] | None) -> _Done:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import signal
 import sys
 import threading
@@ -55,13 +56,24 @@ class Interrupts:
 def orderly_end() -> Iterator[None]:
     """As long as the context lasts, leave by SIGTERM and SIGHUP as by any other exit.
 
-    What is temporary then goes, and child processes end.
+    What is temporary then goes, and child processes end. What comes once the process is on its way
+    out anyway changes nothing.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     with _handled([n for n in _STOPS if signal.getsignal(n) is signal.SIG_DFL], _leave):
-        yield
+        try:
+            yield
+        finally:
+            # Before what was registered earlier.
+            atexit.unregister(_ignore_stops)
+            atexit.register(_ignore_stops)
+
+
+def _ignore_stops() -> None:
+    for number in _STOPS:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _leave(number: int, _frame: Any) -> None:

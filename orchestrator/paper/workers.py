@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
@@ -119,6 +120,8 @@ def _begin() -> None:
         # The end of the terminal is for the process to answer that has started this one.
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
     threading.Thread(target=_follow, daemon=True).start()
+    # As in the process that has started this one.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 
 def _follow() -> None:

@@ -5,20 +5,27 @@ What was computed is kept, what was good stays good, and nothing half-written is
 
 from __future__ import annotations
 
-import errno
 import json
-import os
 import resource
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from datetime import UTC, datetime
+from datetime import datetime, timedelta, tzinfo
+from itertools import count
 from pathlib import Path
+from shutil import rmtree
 
 import numpy as np
 import pytest
+
+from orchestrator import simulate
+from orchestrator.commands.main import main
+from orchestrator.commands.options import INTERRUPTED
+from orchestrator.experiments import record
+from orchestrator.experiments.bundle import current_fmus
+from orchestrator.experiments.stored import read_result
+from orchestrator.master.files import read_rows
 from support.machine import (
     called,
     contents,
@@ -29,12 +36,6 @@ from support.machine import (
     start,
     without_privileges,
 )
-
-from orchestrator import simulate
-from orchestrator.commands.main import main
-from orchestrator.experiments.bundle import current_fmus
-from orchestrator.experiments.stored import read_result
-from orchestrator.master.files import read_rows
 
 
 @pytest.fixture(autouse=True)
@@ -187,7 +188,6 @@ def test_folders_that_may_not_be_written(workplace):
             [*RUN, "0.1", "--out", "sealed/new/r"],
             ["export", "fig4", "--out", "sealed/r"],
             ["plot", "sealed/r", "--out", "sealed/r/plot.png"],
-            ["view", "sealed/r"],
         ):
             status, [line] = called(*arguments, before=without_privileges)
             assert status == 2
@@ -216,3 +216,127 @@ def test_no_home_and_no_temporary_folder(workplace):
     assert (status, said) == (0, [])
 
 
+def under_way(folder: Path) -> bool:
+    """Whether rows are on their way into a folder."""
+    return any(path.stat().st_size for path in folder.glob(".unfinished-*/result.csv"))
+
+
+def running(*arguments: str) -> subprocess.Popen[str]:
+    """A run of hours that has begun to write rows."""
+    process = start(*RUN, "200000", *arguments)
+    assert eventually(lambda: under_way(Path("results/fig4"))), process.communicate()[1]
+    return process
+
+
+@pytest.mark.parametrize(
+    "signals",
+    [[signal.SIGTERM], [signal.SIGHUP], [signal.SIGINT] * 5, [signal.SIGTERM, signal.SIGINT] * 2],
+)
+def test_signals_end_a_run_and_lose_nothing(workplace, temporary, signals):
+    process = running()
+    for number in signals:
+        process.send_signal(number)
+        time.sleep(0.05)
+    error = process.communicate(timeout=60)[1]
+    assert process.returncode == 1
+    assert "Traceback" not in error
+    folder = workplace / "results" / "fig4"
+    assert "fig4 interrupted at t = " in error.splitlines()[-1]
+    assert failure(folder).startswith("interrupted at t = ")
+    kept = rows(folder)
+    assert np.array_equal(kept[:, 0], 0.02 * np.arange(len(kept)))
+    assert not [name for name in contents(folder) if name.startswith(".")]
+    assert list(temporary.iterdir()) == []
+
+
+def test_the_end_of_the_terminal_means_nothing_under_nohup(workplace):
+    process = start(*RUN, "5", before=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+    while process.poll() is None:
+        process.send_signal(signal.SIGHUP)
+        time.sleep(0.1)
+    assert process.communicate()[1] == ""
+    assert process.returncode == 0
+    assert len(rows(workplace / "results" / "fig4")) == 251
+
+
+def busy(process: subprocess.Popen[str], temporary: Path) -> bool:
+    """Whether a process has children, which have begun to write temporary files."""
+    return len(members(process.pid)) > 1 and any(temporary.glob("auvfmu-*/*/*"))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
+@pytest.mark.parametrize("command", ["build", "report"])
+def test_children_end_with_their_parent(workplace, temporary, command, number):
+    """And what was good stays good, byte for byte; nothing stays but what the next one removes."""
+    out = workplace / "out"
+    out.mkdir()
+    for name in ("auv.ssp", "report.html", "run.json"):
+        (out / name).write_text("{}")
+    before = contents(out)
+    process = start(command, "--out", str(out))
+    assert eventually(lambda: busy(process, temporary))
+    process.send_signal(number)
+    error = process.communicate(timeout=60)[1]
+    assert is_over(process.pid)
+    assert process.returncode in (-number, 128 + number, INTERRUPTED)
+    assert "Traceback" not in error
+    if number == signal.SIGKILL:
+        # Any command that needs a temporary folder.
+        assert called(*RUN, "0.1", "--out", "other") == (0, [])
+        assert main(["export", "fig4", "--out", str(out)]) == 0
+        (out / "fig4.ssp").unlink()
+    after = contents(out)
+    assert {name: after[name] for name in after if not name.startswith("runs/")} == before
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_folder_that_is_moved_away_ends_the_run_early(workplace):
+    process = running()
+    Path("results/fig4").rename("moved")
+    [line] = process.communicate(timeout=60)[1].splitlines()
+    assert process.returncode == 2
+    [left] = Path("moved").glob(".unfinished-*")
+    assert line == (
+        "auv-fmu: results/fig4 was moved or deleted while it was written, and what was computed "
+        f"went with it, in {left.name}"
+    )
+    assert rows(left)[0, 0] == 0.0
+
+
+def test_a_folder_that_is_deleted_ends_the_run_early(workplace):
+    process = running()
+    while Path("results").exists():
+        rmtree("results", ignore_errors=True)
+    [line] = process.communicate(timeout=60)[1].splitlines()
+    assert process.returncode == 2
+    assert "moved or deleted while it was written" in line
+    assert not Path("results").exists()
+
+
+@pytest.mark.parametrize("hours", [-1000, 1000])
+def test_a_clock_that_jumps_changes_no_duration(workplace, monkeypatch, capsys, hours):
+    """With the bar, which a terminal would show."""
+    jump = iter(3600 * hours * k for k in count())
+    monkeypatch.setattr(time, "time", lambda now=time.time: now() + next(jump))
+    monkeypatch.setattr(record, "datetime", jumping_datetime(hours))
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    begun = time.monotonic()
+    assert main([*RUN, "20"]) == 0
+    taken = time.monotonic() - begun
+    told = json.loads(Path("results/fig4/run.json").read_text())["seconds"]
+    assert 0.0 < told <= taken
+    assert len(rows(workplace / "results" / "fig4")) == 1001
+
+
+def jumping_datetime(hours: float) -> type[datetime]:
+    """Dates of which each is some hours further off."""
+
+    class Jumping(datetime):
+        n = 0
+
+        @classmethod
+        def now(cls, tz: tzinfo | None = None) -> datetime:
+            cls.n += 1
+            return datetime.now(tz) + timedelta(hours=hours * cls.n)
+
+    return Jumping
