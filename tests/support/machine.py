@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 import ctypes
 import os
 import resource
@@ -124,7 +123,10 @@ def eventually(condition: Callable[[], object], patience: float = PATIENCE) -> b
 
 
 def forked(work: Callable[[], object]) -> int:
-    """A copy of this process, in a session of its own, that does some work and exits."""
+    """A copy of this process, in a session of its own, that does some work and exits.
+
+    Without what Python does at the end: that is for the process that it is a copy of.
+    """
     pid = os.fork()
     if pid:
         return pid
@@ -135,7 +137,6 @@ def forked(work: Callable[[], object]) -> int:
     except SystemExit as end:
         status = int(end.code or 0)
     finally:
-        atexit._run_exitfuncs()
         os._exit(status)
 
 

@@ -88,7 +88,7 @@ def test_full_disk_ends_a_run_early_and_keeps_the_rows(workplace, capsys, ending
         assert read_result(incomplete)[1].failure == why.removeprefix("auv-fmu: fig4 ")
 
 
-@pytest.mark.parametrize("size", [60_000, 150_000, 300_000, 500_000, 700_000, 900_000])
+@pytest.mark.parametrize("size", [60_000, 150_000, 500_000, 900_000])
 def test_full_disk_at_any_stage(workplace, capsys, size):
     """The table takes 0.2 MB, figures another 0.9 MB."""
     with small_disk(workplace / "disk", size) as disk:
@@ -154,7 +154,7 @@ def test_limit_of_the_size_of_files_is_like_a_full_disk(workplace):
     assert len(kept) > 500
 
 
-@pytest.mark.parametrize("megabytes", [160, 220, 235, 250])
+@pytest.mark.parametrize("megabytes", [200, 235])
 def test_short_memory_is_said_and_loses_no_rows(workplace, megabytes):
     """Python and numpy alone need 150 MB of address space, figures 300."""
     limit = {resource.RLIMIT_AS: megabytes * 10**6}
@@ -166,7 +166,7 @@ def test_short_memory_is_said_and_loses_no_rows(workplace, megabytes):
         assert failure(workplace / "results" / "fig4") in said[-1]
 
 
-@pytest.mark.parametrize("descriptors", [5, 7, 9, 11, 13])
+@pytest.mark.parametrize("descriptors", [7, 12])
 def test_few_descriptors(workplace, temporary, descriptors):
     status, said = called(
         "run", "fig4", "--stop-time", "0.1", limits={resource.RLIMIT_NOFILE: descriptors}
@@ -185,8 +185,7 @@ def test_folders_that_may_not_be_written(workplace):
     try:
         for arguments in (
             [*RUN, "0.1", "--out", "sealed/r"],
-            [*RUN, "0.1", "--out", "sealed/new/r"],
-            ["export", "fig4", "--out", "sealed/r"],
+            ["export", "fig4", "--out", "sealed/new"],
             ["plot", "sealed/r", "--out", "sealed/r/plot.png"],
         ):
             status, [line] = called(*arguments, before=without_privileges)
@@ -218,19 +217,19 @@ def test_no_home_and_no_temporary_folder(workplace):
 
 def under_way(folder: Path) -> bool:
     """Whether rows are on their way into a folder."""
-    return any(path.stat().st_size for path in folder.glob(".unfinished-*/result.csv"))
+    return any(path.stat().st_size > 1e5 for path in folder.glob(".unfinished-*/result.csv"))
 
 
-def running(*arguments: str) -> subprocess.Popen[str]:
+def running() -> subprocess.Popen[str]:
     """A run of hours that has begun to write rows."""
-    process = start(*RUN, "200000", *arguments)
+    process = start("run", "fig4", "--stop-time", "200000")
     assert eventually(lambda: under_way(Path("results/fig4"))), process.communicate()[1]
     return process
 
 
 @pytest.mark.parametrize(
     "signals",
-    [[signal.SIGTERM], [signal.SIGHUP], [signal.SIGINT] * 5, [signal.SIGTERM, signal.SIGINT] * 2],
+    [[signal.SIGTERM], [signal.SIGHUP], [signal.SIGINT] * 5],
 )
 def test_signals_end_a_run_and_lose_nothing(workplace, temporary, signals):
     process = running()
@@ -243,10 +242,24 @@ def test_signals_end_a_run_and_lose_nothing(workplace, temporary, signals):
     folder = workplace / "results" / "fig4"
     assert "fig4 interrupted at t = " in error.splitlines()[-1]
     assert failure(folder).startswith("interrupted at t = ")
+    assert not list(folder.glob("*.png"))
     kept = rows(folder)
     assert np.array_equal(kept[:, 0], 0.02 * np.arange(len(kept)))
     assert not [name for name in contents(folder) if name.startswith(".")]
     assert list(temporary.iterdir()) == []
+
+
+def test_a_killed_run_leaves_the_earlier_result_as_it_was(workplace):
+    assert main([*RUN, "0.1"]) == 0
+    before = contents(workplace)
+    process = running()
+    process.kill()
+    process.communicate()
+    after = contents(workplace)
+    assert {name: after[name] for name in after if ".unfinished-" not in name} == before
+    assert len(after) > len(before)
+    assert main([*RUN, "0.1"]) == 0
+    assert contents(workplace).keys() == before.keys()
 
 
 def test_the_end_of_the_terminal_means_nothing_under_nohup(workplace):
@@ -264,8 +277,15 @@ def busy(process: subprocess.Popen[str], temporary: Path) -> bool:
     return len(members(process.pid)) > 1 and any(temporary.glob("auvfmu-*/*/*"))
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
-@pytest.mark.parametrize("command", ["build", "report"])
+@pytest.mark.parametrize(
+    ("command", "number"),
+    [
+        ("build", signal.SIGTERM),
+        ("build", signal.SIGKILL),
+        ("report", signal.SIGHUP),
+        ("report", signal.SIGKILL),
+    ],
+)
 def test_children_end_with_their_parent(workplace, temporary, command, number):
     """And what was good stays good, byte for byte; nothing stays but what the next one removes."""
     out = workplace / "out"
