@@ -75,7 +75,7 @@ def _answer(interrupts: Interrupts) -> None:
     """Tell the user at once what happens now, from within the handler of the signal."""
     text = "stopping: writing what was computed and drawing it; once more leaves the figures out"
     if interrupts.urgent:
-        text = "stopping at once: what was computed is kept, figures are left out"
+        text = "stopping at once, without figures; a third time ends an FMU that does not return"
     # print could have been interrupted itself, and must not be entered a second time.
     with suppress(OSError):
         os.write(2, f"auv-fmu: {text}\n".encode())

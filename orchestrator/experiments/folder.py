@@ -71,7 +71,7 @@ def replaced(folder: Path, keep: Callable[[], bool] = lambda: False) -> Iterator
             unfinished.chmod(folder.stat().st_mode)
             try:
                 yield unfinished
-                _publish(unfinished, place_of(unfinished, folder))
+                publish(unfinished, folder)
             except (OSError, MemoryError) as error:
                 rest = _rest(unfinished, folder) if keep() else ""
                 raise InputError(_cannot_write(folder, error, rest)) from error
@@ -84,6 +84,13 @@ def replaced(folder: Path, keep: Callable[[], bool] = lambda: False) -> Iterator
             with suppress(OSError):
                 # Fails where there is something in it.
                 folder.rmdir()
+
+
+def publish(unfinished: Path, folder: Path) -> Path:
+    """Have a folder that is whole take its place, which is given back."""
+    place = place_of(unfinished, folder)
+    _publish(unfinished, place)
+    return place
 
 
 def settle(folder: Path) -> None:

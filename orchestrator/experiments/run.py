@@ -21,7 +21,7 @@ from orchestrator.analysis.sensors import velocities_reaching
 from orchestrator.analysis.signals import CONTROLLER, THETA_HAT
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError, reason
-from orchestrator.experiments.folder import place_of, replaced
+from orchestrator.experiments.folder import place_of, publish, replaced
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.experiments.record import Clock, write_record
 from orchestrator.experiments.scenario import Scenario
@@ -32,10 +32,15 @@ from orchestrator.master.progress import Progress
 from orchestrator.master.row import KINDS
 from orchestrator.master.selection import Selection, check_interval, matches, matching
 from orchestrator.master.simulation import simulate
+from orchestrator.system.leftovers import process_folder
 from orchestrator.system.structure import System
 
 #: A file that keeps room for what is written last, so that a full disk does not cost the record.
 _SPARE, _SPARE_BYTES = ".spare", 65536
+
+
+#: Exit status of a process that a run has to end with.
+_FAILED = 1
 
 
 @dataclass(frozen=True)
@@ -121,7 +126,14 @@ def run_into(
                     say(f"warning: {prepared.scenario.name}: {caution}")
                 target = unfinished / prepared.scenario.name if done else unfinished
                 target.mkdir(exist_ok=True)
-                done.append(_run(target, prepared, files, columns))
+                run = _Running(target, prepared, files, columns)
+
+                def give_up(run: _Running = run) -> None:
+                    _give_up(run, done, unfinished, folder, command, clock, say)
+
+                with interrupts.insistence(give_up):
+                    ending = simulate(prepared.system, prepared.experiment, run.observers)
+                done.append(run.ended(ending))
                 for caution in cautions_after(done[-1].seen):
                     say(f"warning: {prepared.scenario.name}: {caution}")
                 if interrupts:
@@ -142,28 +154,68 @@ def run_into(
                 f"with it, in {unfinished.name}"
             )
         spare.unlink()
-        # The record of the first names the files of all, so it comes last.
-        for run in reversed(done):
-            write_metrics(run.folder, run.metrics)
-            write_record(run.folder, run.prepared, run.seen.header, run.ending, command, clock)
+        _write_ends(done, command, clock)
         place = place_of(unfinished, folder)
     return [Finished(place, run.prepared.scenario.name, run.metrics, run.ending) for run in done]
 
 
-def _run(folder: Path, prepared: Prepared, files: Files, columns: Sequence[str] | None) -> _Done:
-    metrics = Metrics()
-    # Without figures the cautions alone look at what was seen.
-    seen = VisibleRows() if files.figures else VisibleRows(THETA_HAT[:1])
-    table = FORMATS[files.format](folder / f"result.{files.format}")
-    observers: list[Observer] = [
-        Selection(table, files.interval, columns),
-        CertificatesFile(folder / "certificates.csv", files.interval),
-        metrics,
-        seen,
-        Progress(prepared.scenario.name),
-    ]
-    ending = simulate(prepared.system, prepared.experiment, observers)
-    return _Done(folder, prepared, metrics_json(metrics, prepared), seen, ending)
+class _Running:
+    """A run and the observers of its rows."""
+
+    def __init__(
+        self, folder: Path, prepared: Prepared, files: Files, columns: Sequence[str] | None
+    ) -> None:
+        self._folder, self._prepared = folder, prepared
+        self._metrics = Metrics()
+        # Without figures the cautions alone look at what was seen.
+        self._seen = VisibleRows() if files.figures else VisibleRows(THETA_HAT[:1])
+        self._table = FORMATS[files.format](folder / f"result.{files.format}")
+        self.observers: list[Observer] = [
+            Selection(self._table, files.interval, columns),
+            CertificatesFile(folder / "certificates.csv", files.interval),
+            self._metrics,
+            self._seen,
+            Progress(prepared.scenario.name),
+        ]
+
+    def ended(self, ending: Ending) -> _Done:
+        """When its observers have been told the end."""
+        values = metrics_json(self._metrics, self._prepared)
+        return _Done(self._folder, self._prepared, values, self._seen, ending)
+
+    def given_up(self) -> _Done:
+        """Without what else can end it."""
+        ending = Ending("was ended: an FMU did not return from its step")
+        self._table.end(ending)
+        values = {"scenario": self._prepared.scenario.name, "failure": ending.failure}
+        return _Done(self._folder, self._prepared, values, self._seen, ending)
+
+
+def _give_up(
+    run: _Running,
+    done: Sequence[_Done],
+    unfinished: Path,
+    folder: Path,
+    command: Sequence[str],
+    clock: Clock,
+    say: Callable[[str], None],
+) -> None:
+    """Keep what is there and end the process; the thread that steps the FMUs never will."""
+    try:
+        (unfinished / _SPARE).unlink()
+        _write_ends([*done, last := run.given_up()], command, clock)
+        place = publish(unfinished, folder)
+        say(f"{last.prepared.scenario.name} {last.ending.failure}; its rows are in {place}")
+        rmtree(process_folder(), ignore_errors=True)
+    finally:
+        os._exit(_FAILED)
+
+
+def _write_ends(done: Sequence[_Done], command: Sequence[str], clock: Clock) -> None:
+    """Write what is written last; the record of the first names the files of all."""
+    for run in reversed(done):
+        write_metrics(run.folder, run.metrics)
+        write_record(run.folder, run.prepared, run.seen.header, run.ending, command, clock)
 
 
 def _draw(

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import atexit
+import os
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 #: Ctrl-C, what a batch system sends, and the end of the terminal.
 _STOPS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
 
+
+#: After so many signals, somebody does not want to wait any more.
+_INSISTENCE = 3
 
 #: Exit status of a process that a signal has ended, less the number of the signal.
 _SIGNALLED = 128
@@ -24,6 +28,11 @@ class Interrupts:
     Python raises KeyboardInterrupt wherever it is, which may be inside an FMU: PythonFMU would
     then release its objects twice and crash the process. So signals are collected instead, and
     the loop asks after every step whether there are any.
+
+    Attributes:
+        signals: their numbers.
+        hand_over: tells observers of the last rows, before the process is given up.
+
     """
 
     def __init__(self, announce: Callable[[Interrupts], None] | None = None) -> None:
@@ -35,6 +44,7 @@ class Interrupts:
         """
         self.signals: list[int] = []
         self._announce = announce
+        self.hand_over: Callable[[], None] = lambda: None
 
     def __bool__(self) -> bool:
         """Whether somebody wants the work to end."""
@@ -44,6 +54,42 @@ class Interrupts:
     def urgent(self) -> bool:
         """Whether it is to end without what takes long: asked twice, or not from the keyboard."""
         return len(self.signals) > 1 or any(number != signal.SIGINT for number in self.signals)
+
+    @contextmanager
+    def insistence(self, give_up: Callable[[], None]) -> Iterator[None]:
+        """Within the context, have the third signal end the process, whatever an FMU does.
+
+        Args:
+            give_up: ends the process, from another thread.
+
+        """
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        end_of_thread, end_of_signals = os.pipe()
+        os.set_blocking(end_of_signals, False)
+        before = signal.set_wakeup_fd(end_of_signals, warn_on_full_buffer=False)
+        leaving = threading.Lock()
+        # A thread, because Python answers no signal as long as an FMU computes.
+        arguments = (end_of_thread, give_up, leaving)
+        threading.Thread(target=self._count, args=arguments, daemon=True).start()
+        try:
+            yield
+        finally:
+            # Not while it is giving up.
+            leaving.acquire()
+            signal.set_wakeup_fd(before)
+            os.close(end_of_signals)
+
+    def _count(self, numbers: int, give_up: Callable[[], None], leaving: threading.Lock) -> None:
+        n = 0
+        while number := os.read(numbers, 1):
+            n += number[0] in _STOPS
+            if n >= _INSISTENCE and leaving.acquire(blocking=False):
+                with suppress(Exception):
+                    self.hand_over()
+                give_up()
+        os.close(numbers)
 
     def take(self, number: int, _frame: Any) -> None:
         """Collect a signal: a handler for :func:`signal.signal`."""

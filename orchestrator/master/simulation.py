@@ -49,6 +49,7 @@ def simulate(system: System, experiment: Experiment, observers: Sequence[Observe
         steps = schedule(system, plan, instances, row)
         with _told(header, observers) as tell:
             blocks = Blocks(len(row.values), observers)
+            interrupts.hand_over = blocks.hand_over
             try:
                 failure = _advance(experiment, steps, row.values, blocks, interrupts, log)
             except NotKept as error:

@@ -23,6 +23,8 @@ from pathlib import Path
 from shutil import copytree, rmtree
 from unittest.mock import patch
 
+from tqdm import trange
+
 from orchestrator.commands.main import main as auv_fmu
 from orchestrator.experiments.bundle import current_fmus
 from orchestrator.experiments.folder import settle
@@ -153,7 +155,7 @@ def main() -> int:
         os.environ["TMPDIR"] = str(temporary)
         attacks = [Attack(name, Path(folder)) for name in options.only or WRITERS]
         counts: Counter[str] = Counter()
-        for k in range(options.runs):
+        for k in trange(options.runs, unit="kill"):
             # Half of them about the end, where files take their places.
             begin = draw.choice((0.0, 0.9))
             attacks[k % len(attacks)].kill(draw.uniform(begin, 1.1), counts)
