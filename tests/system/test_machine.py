@@ -26,6 +26,7 @@ from orchestrator.experiments import record
 from orchestrator.experiments.bundle import current_fmus
 from orchestrator.experiments.stored import read_result
 from orchestrator.master.files import read_rows
+from orchestrator.system.leftovers import claimed
 from support.machine import (
     called,
     contents,
@@ -372,6 +373,15 @@ def test_a_folder_that_is_deleted_ends_the_run_early(workplace):
     assert process.returncode == 2
     assert "moved or deleted while it was written" in line
     assert not Path("results").exists()
+
+
+@pytest.mark.parametrize("command", [["run", "fig4"], ["export", "fig4"], ["build"], ["report"]])
+def test_a_folder_that_another_process_writes_into_is_left_alone(workplace, capsys, command):
+    (workplace / "r").mkdir()
+    with claimed(workplace / "r"):
+        assert main([*command, "--out", "r"]) == 2
+    assert "another run is writing into r; wait for it" in capsys.readouterr().err
+    assert contents(workplace) == {}
 
 
 @pytest.mark.parametrize("hours", [-1000, 1000])
