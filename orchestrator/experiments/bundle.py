@@ -93,7 +93,10 @@ def run_fmus(module: str, folder: Path, *options: str) -> list[Path]:
         InputError: it failed.
 
     """
-    process = run_module(f"fmus.{module}", "--out", str(folder), *options)
+    try:
+        process = run_module(f"fmus.{module}", "--out", str(folder), *options)
+    except OSError as error:
+        raise InputError(f"the FMUs cannot be built: {reason(error)}") from error
     if process.returncode != 0:
         raise InputError(last_line(process.stderr))
     return [Path(line) for line in process.stdout.splitlines()]

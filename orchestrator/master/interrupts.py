@@ -72,7 +72,9 @@ class Interrupts:
         leaving = threading.Lock()
         # A thread, because Python answers no signal as long as an FMU computes.
         arguments = (end_of_thread, give_up, leaving)
-        threading.Thread(target=self._count, args=arguments, daemon=True).start()
+        with suppress(RuntimeError):
+            # Where none can be had, insistence is not heard.
+            threading.Thread(target=self._count, args=arguments, daemon=True).start()
         try:
             yield
         finally:
