@@ -24,6 +24,9 @@ from orchestrator.master.interrupts import Interrupts, held_interrupts
 #: How long the loop waits before it asks whether it shall stop [s].
 _PATIENCE = 0.1
 
+#: How often a process without parent is told to leave before it is ended.
+_REMINDERS = 50
+
 _Key = TypeVar("_Key", bound=Hashable)
 
 
@@ -129,10 +132,12 @@ def _follow() -> None:
     parent = parent_process()
     assert parent is not None
     parent.join()
-    while True:
+    for _ in range(_REMINDERS):
         # A run takes the first one to end.
         os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(_PATIENCE)
+    # What SIGTERM raises may be lost in a callback.
+    os._exit(1)
 
 
 def _leave(*_: Any) -> None:
