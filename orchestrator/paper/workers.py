@@ -5,26 +5,28 @@ from __future__ import annotations
 import logging
 import os
 import signal
-import sys
 import threading
 import time
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from itertools import islice
 from multiprocessing import active_children, get_context, parent_process
+from multiprocessing.process import BaseProcess
+from shutil import rmtree
 from typing import Any, TypeVar
 
 from tqdm import tqdm
 
 from orchestrator.errors import InputError, reason
 from orchestrator.master.interrupts import Interrupts, held_interrupts
+from orchestrator.system.leftovers import process_folder
 
 #: How long the loop waits before it asks whether it shall stop [s].
 _PATIENCE = 0.1
 
-#: How often a process without parent is told to leave before it is ended.
+#: How often a process is told to leave before it is ended.
 _REMINDERS = 50
 
 _Key = TypeVar("_Key", bound=Hashable)
@@ -87,11 +89,22 @@ def workers() -> Iterator[Workers]:
         try:
             yield Workers(pool, n, interrupts)
         except BaseException:
-            for process in set(active_children()) - others:
-                process.terminate()
+            _end(set(active_children()) - others)
             raise
         finally:
             pool.shutdown(cancel_futures=True)
+
+
+def _end(processes: Collection[BaseProcess]) -> None:
+    """Have processes leave: a run takes the first word to end, and an FMU may hear none."""
+    for _ in range(_REMINDERS):
+        for process in processes:
+            process.terminate()
+        time.sleep(_PATIENCE)
+        if not any(process.is_alive() for process in processes):
+            return
+    for process in processes:
+        process.kill()
 
 
 @contextmanager
@@ -141,6 +154,6 @@ def _follow() -> None:
 
 
 def _leave(*_: Any) -> None:
-    # Once: the way out is not to be cut short.
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    sys.exit()
+    # At once: what a task raises, the pool takes for its result, and goes on with the next.
+    rmtree(process_folder(), ignore_errors=True)
+    os._exit(1)

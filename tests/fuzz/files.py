@@ -49,8 +49,9 @@ from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.files import CsvFile
 from orchestrator.master.observer import Observer
 from orchestrator.master.table import Table
+from orchestrator.system.leftovers import _process_folder
 from orchestrator.system.ssp.writing import ssp_bytes
-from orchestrator.system.unpacking import _process_folder, _unpacked
+from orchestrator.system.unpacking import _unpacked
 
 from . import files_mutators as mutators
 from .files_oracle import agreement

@@ -11,6 +11,7 @@ import pytest
 from orchestrator.errors import InputError
 from orchestrator.system import unpacking
 from orchestrator.system.component import read_component
+from orchestrator.system.leftovers import process_folder
 from orchestrator.system.ssp.reading import read_ssp
 
 STRUCTURE, DESCRIPTION = "SystemStructure.ssd", "modelDescription.xml"
@@ -165,7 +166,7 @@ def test_archive_that_cannot_be_unpacked_leaves_nothing(dist: Path, tmp_path: Pa
     at = content.find(b"PK\x03\x04", 1000) + 200
     content[at] ^= 0xFF
     archive.write_bytes(content)
-    place = Path(unpacking._process_folder().name)
+    place = process_folder()
     before = {*place.iterdir()}
     with pytest.raises(InputError, match="Bad CRC-32"):
         read_ssp(archive)
