@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 
@@ -33,7 +34,7 @@ def refusal(resources: str, guid: str) -> str:
 
 def forget(resources: str) -> None:
     """Take a folder off sys.path."""
-    if resources in sys.path:
+    with suppress(ValueError):
         sys.path.remove(resources)
 
 
