@@ -1,4 +1,4 @@
-"""What FMUs leave behind: `python benchmarks/leaks.py [N]`.
+"""What FMUs leave behind: `python benchmarks/leaks.py [N] [--only WORD]`.
 
 Makes an instance, initialises and steps it, saves, serialises and restores its state, resets and
 frees it, N times, 10,000 if no number is given. Prints the resident memory after a tenth of the
@@ -105,7 +105,9 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("n", type=int, nargs="?", default=10_000, help="default: %(default)s")
-    n = parser.parse_args().n
+    parser.add_argument("--only", default="", help="rows with this word in their names")
+    options = parser.parse_args()
+    n = options.n
     counts = [str(n // 10), str(n)]
     print(f"{'FMU':30} {'host':6} {n // 10:>8} cycles {n:>8} cycles {'left of a cycle':>16}")
     with TemporaryDirectory(prefix="auvfmu") as temporary:
@@ -113,6 +115,8 @@ def main() -> None:
         source = Path(__file__).with_name("cycles.c")
         subprocess.run([str(compiler()), "-O2", "-o", host, source, "-ldl"], check=True)
         for name, folder in rows(Path(temporary)):
+            if options.only not in name:
+                continue
             library = folder / "binaries/linux64" / f"{identifier(folder)}.so"
             python = [sys.executable, __file__, _HOST, str(folder)]
             c = [str(host), str(library), (folder / "resources").as_uri()]

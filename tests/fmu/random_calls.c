@@ -120,7 +120,6 @@ static int state(handle c) {
     size += status == 0 && once_in(RARELY) ? 1 - 2 * below(2) : 0;
     char *bytes = malloc(size + (status != 0));
     if (CALL("SerializeFMUstate", "", (handle, handle, char *, size_t))(c, one, bytes, size) == 0) {
-        if (once_in(2)) bytes[below((unsigned int)size)] ^= (char)(1 << below(8));
         status = CALL("DeSerializeFMUstate", "", (handle, const char *, size_t, handle *))(
             c, maybe(bytes), once_in(RARELY) ? 0 : size, maybe(place));
     }
