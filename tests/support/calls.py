@@ -109,9 +109,11 @@ class Draw:
     freed: list[str] = field(default_factory=list)
     foreign: bytes = b"{}"
     time: float = 0.0
+    #: What slots of this instance begin with.
+    prefix: str = ""
 
     def slot(self) -> str:
-        return f"s{self.random.randrange(4)}"
+        return f"{self.prefix}s{self.random.randrange(4)}"
 
     def any_of(self, variables: list[Variable]) -> Variable | None:
         return self.random.choice(variables) if variables else None

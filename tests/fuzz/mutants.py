@@ -1,0 +1,126 @@
+"""Mutated states: none is taken that a fresh instance could not have reached."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite
+from random import Random
+
+from fuzz.reachable import faults, without_checksum
+from support import states
+from support.calls import Draw
+from support.raw import Description, Host, Library, Status, instance
+
+#: Steps of the runs whose states are mutated, and their length [s].
+STEPS, H = 4, 0.02
+
+#: What no state of those runs has, to tell an instance that has taken none.
+_MARK = 123.5
+
+
+class Taken(Exception):
+    """A state that should have been refused, or that did harm."""
+
+
+def reached(library: Library, seed: int) -> list[bytes]:
+    """States that legal calls lead to: one in each mode, one with a refusal."""
+    random = Random(seed)
+    found: list[bytes] = []
+    with instance(library) as host:
+        draw = Draw(random, host.description)
+        found.append(host.content())
+        host.setup(random.choice((0.0, 2.0)))
+        for variable in draw.settable("Real"):
+            if random.random() < 0.5:
+                host.set("Real", [variable.reference], [draw.good_value(variable)])
+        host.enter()
+        found.append(host.content())
+        host.exit()
+        for k in range(STEPS):
+            inputs = host.description.of("input")
+            host.set("Real", [v.reference for v in inputs], [draw.good_value(v) for v in inputs])
+            assert host.step(k * H, H) == Status.OK
+            found.append(host.content())
+        host.get("Real", [len(host.description.variables)])
+        found.append(host.content())
+        host.call("fmi2Terminate")
+        found.append(host.content())
+    return found
+
+
+def _marked(host: Host) -> None:
+    """A run that no other is like."""
+    host.setup(_MARK)
+    for variable in [*host.description.of("input"), *host.description.of("parameter", "Real")][:1]:
+        host.set("Real", [variable.reference], [_MARK])
+    assert host.enter() == host.exit() == host.step(_MARK, H) == Status.OK
+
+
+class Trials:
+    """Mutated states of one FMU, one after the other, on one instance."""
+
+    def __init__(self, host: Host, bases: Sequence[bytes], others: Sequence[bytes]) -> None:
+        self._host, self._bases, self._others = host, bases, [*bases, *others]
+        self._samples = [said for said in map(without_checksum, bases) if said is not None]
+        _marked(host)
+        self._marked = host.get_state()
+        self._content = states.without_refusals(host.content())
+        self._values = host.values()
+        self.taken = 0
+
+    def __call__(self, seed: int) -> None:
+        """Try the mutant of a seed.
+
+        Raises:
+            Taken: it was taken, or did harm.
+
+        """
+        random = Random(seed)
+        base = random.choice(self._bases)
+        mutant = states.mutant(base, random, self._others)
+        try:
+            self._try(mutant.content, base)
+        except AssertionError as error:
+            raise Taken(f"{mutant.said}: {error}") from error
+
+    def _try(self, content: bytes, base: bytes) -> None:
+        host = self._host
+        status, state = host.deserialised(content)
+        if state is None:
+            assert status == Status.Error, status.name
+        else:
+            assert status == Status.OK, status.name
+            assert host.set_state(state) == Status.OK
+            assert host.free_state(state) == Status.OK
+            values = {**host.values(), "fault": False}
+            if values == {**self._values, "fault": False}:
+                self._check_refused()
+            else:
+                self.taken += 1
+                self._check_taken(content)
+        assert host.set_state(self._marked) == Status.OK
+        assert not host.fault()
+
+    def _check_refused(self) -> None:
+        host = self._host
+        assert states.without_refusals(host.content()) == self._content, "changed, though refused"
+        assert host.fault(), "refused without a fault"
+        assert host.step(_MARK + H, H) == Status.Discard, "a step after a refused state"
+
+    def _check_taken(self, content: bytes) -> None:
+        host = self._host
+        said = without_checksum(host.content())
+        if said is not None:
+            wrong = faults(said, host.description, self._samples)
+            assert not wrong, f"taken with {wrong[0]}"
+        for name, value in host.values().items():
+            assert not isinstance(value, float) or isfinite(value), f"taken with {name} = {value}"
+        status = host.step(0.0, self._length(host.description))
+        assert status in (Status.OK, Status.Discard), status.name
+        for name, value in host.values().items():
+            assert not isinstance(value, float) or isfinite(value), f"{name} = {value} after a step"
+
+    def _length(self, description: Description) -> float:
+        """A step of few internal steps, whatever h_max has become."""
+        longest = [v for v in description.variables if v.name == "h_max"]
+        return min([H, *(10.0 * self._host.value(v) for v in longest)])

@@ -1,0 +1,236 @@
+"""Fuzz FMUs with sequences of calls and with mutated states: `PYTHONPATH=tests python -m fuzz.sequences`.
+
+Sequences come out of seeds and are held against the model that is made from docs/status.md, and
+against a second instance that gets the good calls alone. FMUs are native code, so everything runs
+in processes of its own; what makes one crash, hang or answer otherwise is shrunk by playing shorter
+sequences again, and printed as calls.
+
+hypothesis has a machine for this (RuleBasedStateMachine). It shrinks in the process that the FMU
+has just ended, and spends 18 ms on a sequence of 30 empty rules; these take less with their calls.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+import zipfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from fuzz.generator import generated
+from fuzz.mutants import Taken, Trials, reached
+from fuzz.player import Difference, Sequence_, play
+from support.raw import Host, Library
+from support.worker import Lost, Worker
+
+#: Sequences or mutants in one task, and the longest time for one of them [s].
+BATCH, PATIENCE = 25, 30.0
+
+#: Shrinking ends after so many replays.
+MOST_REPLAYS = 300
+
+#: Runs whose states are mutated.
+RUNS = 6
+
+
+class Task(NamedTuple):
+    """What a process is asked: to attack with `sequences` or `states` out of seeds, to `make` the
+    sequence of a seed, to `show` one, or to `play` it.
+    """
+
+    kind: str
+    seeds: Sequence[int] = ()
+    sequence: Sequence_ | None = None
+
+
+class Finding(NamedTuple):
+    """A seed and what came of it."""
+
+    seed: int
+    what: str
+
+
+def serve(folders: Mapping[str, Path], name: str) -> Callable[[Task], Any]:
+    """Prepare a process for tasks on an FMU; the others lend it company and states."""
+    libraries = {name: Library(folders[name]), **{n: Library(f) for n, f in folders.items()}}
+    foreign = [content for n in libraries if n != name for content in reached(libraries[n], 0)]
+    descriptions = {n: library.description for n, library in libraries.items()}
+    mutants: list[Trials] = []
+
+    def sequence_of(seed: int) -> Sequence_:
+        return generated(seed, name, descriptions, foreign[-1])
+
+    def do(task: Task) -> Any:
+        if task.kind == "states":
+            if not mutants:
+                mutants.append(_mutants(libraries[name], foreign))
+            return [f for seed in task.seeds for f in _tried(mutants[0], seed)]
+        if task.kind == "sequences":
+            return [f for seed in task.seeds for f in _played(sequence_of(seed), libraries, seed)]
+        if task.sequence is None:
+            return sequence_of(task.seeds[0])
+        if task.kind == "show":
+            return task.sequence.shown(libraries)
+        return _played(task.sequence, libraries, 0)
+
+    return do
+
+
+def _mutants(library: Library, foreign: Sequence[bytes]) -> Trials:
+    host = Host(library)
+    assert host.instantiate()
+    bases = [content for seed in range(RUNS) for content in reached(library, seed)]
+    return Trials(host, bases, foreign)
+
+
+def _played(sequence: Sequence_, libraries: Mapping[str, Library], seed: int) -> list[Finding]:
+    try:
+        play(sequence, libraries)
+    except Difference as difference:
+        return [Finding(seed, str(difference))]
+    return []
+
+
+def _tried(trials: Trials, seed: int) -> list[Finding]:
+    try:
+        trials(seed)
+    except Taken as taken:
+        return [Finding(seed, str(taken))]
+    return []
+
+
+class Fuzzer:
+    """One FMU under attack."""
+
+    def __init__(self, folders: Mapping[str, Path], name: str) -> None:
+        self.name, self._folders = name, folders
+        self._worker: Worker[Task, Any] = Worker(serve, folders, name)
+
+    def __enter__(self) -> Fuzzer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._worker.close()
+
+    def attack(self, kind: str, seeds: Sequence[int]) -> Iterator[list[Finding]]:
+        """Findings of one batch of seeds after the other; a seed that ends the process is one."""
+        for first in range(0, len(seeds), BATCH):
+            batch = seeds[first : first + BATCH]
+            found = self._ask(Task(kind, batch))
+            if isinstance(found, Lost):
+                found = [f for seed in batch for f in self._alone(kind, seed)]
+            yield found
+
+    def _alone(self, kind: str, seed: int) -> list[Finding]:
+        found = self._ask(Task(kind, [seed]))
+        return [Finding(seed, found.why)] if isinstance(found, Lost) else found
+
+    def _ask(self, task: Task) -> Any:
+        return self._worker.ask(task, PATIENCE * max(1, len(task.seeds) // 5))
+
+    def sequence(self, seed: int) -> Sequence_:
+        made: Sequence_ = self._ask(Task("make", [seed]))
+        return made
+
+    def show(self, sequence: Sequence_) -> str:
+        """A sequence as a text to be read."""
+        return "\n".join(f"    {line}" for line in self._ask(Task("show", (), sequence)))
+
+    def replay(self, sequence: Sequence_) -> str:
+        """What comes of a sequence; empty: nothing."""
+        found = self._ask(Task("play", (), sequence))
+        if isinstance(found, Lost):
+            return found.why
+        return found[0].what if found else ""
+
+    def shrunk(self, sequence: Sequence_) -> Sequence_:
+        """A sequence that still fails, and no action of which can be left out."""
+        actions, replays = [*sequence.actions], 0
+        size = len(actions) // 2
+        while size and replays < MOST_REPLAYS:
+            first = 0
+            while first < len(actions) and replays < MOST_REPLAYS:
+                fewer = actions[:first] + actions[first + size :]
+                replays += 1
+                if self.replay(sequence._replace(actions=fewer)):
+                    actions = fewer
+                else:
+                    first += size
+            size //= 2
+        return sequence._replace(actions=actions)
+
+
+@contextmanager
+def unpacked(fmus: Sequence[Path]) -> Iterator[dict[str, Path]]:
+    """Folders of unpacked FMUs, by name."""
+    with tempfile.TemporaryDirectory(prefix="auv_fmu_fuzz_") as temporary:
+        folders = {}
+        for fmu in fmus:
+            folders[fmu.stem] = Path(temporary, fmu.stem)
+            with zipfile.ZipFile(fmu) as archive:
+                archive.extractall(folders[fmu.stem])
+        yield folders
+
+
+def _report(fuzzer: Fuzzer, kind: str, finding: Finding, *, shrink: bool) -> None:
+    print(f"\n{fuzzer.name}, {kind} {finding.seed}: {finding.what}")
+    if kind == "states":
+        return
+    sequence = fuzzer.sequence(finding.seed)
+    if shrink:
+        sequence = fuzzer.shrunk(sequence)
+        print(f"shrunk: {fuzzer.replay(sequence) or 'not seen again'}")
+    print(fuzzer.show(sequence), flush=True)
+
+
+def main() -> int:
+    """Command line of the module."""
+    parser = argparse.ArgumentParser(prog="python -m fuzz.sequences", description=__doc__)
+    parser.add_argument("--fmus", type=Path, default=Path("fmus/dist"), help="folder of FMUs")
+    parser.add_argument("--only", nargs="*", help="names of FMUs")
+    parser.add_argument("--runs", type=int, default=10_000, help="sequences, and states, an FMU")
+    parser.add_argument("--first", type=int, default=0, help="first seed")
+    parser.add_argument("--kind", choices=("sequences", "states"), help="default: both")
+    parser.add_argument("--show", type=int, metavar="SEED", help="print a sequence and play it")
+    parser.add_argument("--most", type=int, default=5, help="findings to shrink, of each kind")
+    options = parser.parse_args()
+    failed = 0
+    with unpacked(sorted(options.fmus.glob("*.fmu"))) as folders:
+        if not folders:
+            parser.error(f"no FMUs in {options.fmus}: python -m fmus.packaging.build")
+        for name in options.only or folders:
+            with Fuzzer(folders, name) as fuzzer:
+                if options.show is not None:
+                    sequence = fuzzer.sequence(options.show)
+                    print(fuzzer.show(sequence))
+                    print(fuzzer.replay(sequence) or "all as the table says")
+                    continue
+                for kind in [options.kind] if options.kind else ["sequences", "states"]:
+                    failed += _attacked(fuzzer, kind, options)
+    return 1 if failed else 0
+
+
+def _attacked(fuzzer: Fuzzer, kind: str, options: argparse.Namespace) -> int:
+    """How many findings there are."""
+    findings: list[Finding] = []
+    start, done = time.monotonic(), 0
+    for found in fuzzer.attack(kind, range(options.first, options.first + options.runs)):
+        findings += found
+        done = min(done + BATCH, options.runs)
+        rate = done / (time.monotonic() - start)
+        print(f"\r{fuzzer.name}: {done} {kind}, {len(findings)} findings, {rate:.0f}/s",
+              end="", file=sys.stderr, flush=True)  # fmt: skip
+    print(file=sys.stderr)
+    print(f"{fuzzer.name}: {done} {kind}, {len(findings)} findings, "
+          f"{time.monotonic() - start:.0f} s", flush=True)  # fmt: skip
+    for finding in findings[: options.most]:
+        _report(fuzzer, kind, finding, shrink=True)
+    return len(findings)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
