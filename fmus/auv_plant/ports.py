@@ -14,6 +14,10 @@ from fmus.ports.quantities import ETA, NU, POSITION, TAU, TAU_W, VELOCITY
 from fmus.ports.vehicle import CONTROL_POINT, VEHICLE
 
 _ROLL, _LIMITS, _LOCALISATION = RollAxis(), Limits(), Localisation()
+
+#: Largest standard deviation [m]: with it, no finite position becomes an infinite measurement.
+_FARTHEST = 1e6
+
 _COMMAND = inputs("tau", TAU, "Commanded force and moments")
 
 
@@ -59,6 +63,7 @@ PARAMETERS = ParameterSet(
             "m",
             "Standard deviation of each measured coordinate; the paper gives none",
             minimum=0.0,
+            maximum=_FARTHEST,
         ),
         seed=Port(
             "noise.seed",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import hypot, isclose, isfinite
 from random import Random
 from typing import Any, NamedTuple, TypedDict
 
@@ -16,6 +17,9 @@ from fmus.slave.component import Component
 
 #: The measured control point among the outputs.
 _Y = slices([port for port in PORTS if port.causality == "output"])["y"]
+
+#: Share of its length by which a normalised quaternion is off.
+_ROUNDING = 1e-12
 
 
 class Inputs(NamedTuple):
@@ -50,7 +54,7 @@ class AuvPlant(Component[PlantState, Inputs, Outputs, Parameters]):
 
     def begin(self, inputs: Inputs, t: float) -> tuple[PlantState, Outputs]:
         chosen = self.parameters
-        self._random = Random(chosen.noise.seed)
+        self._random = plant.white_noise(chosen.noise.seed)
         x, y, z, phi, theta, psi = chosen.eta0
         state = plant.initial_state((x, y, z), (phi, theta, psi), chosen.nu0)
         return state, _seen(chosen, state, _limited(chosen, inputs.tau))
@@ -64,20 +68,30 @@ class AuvPlant(Component[PlantState, Inputs, Outputs, Parameters]):
             state = plant.step(chosen.vehicle, chosen.roll, state, tau, inputs.tau_w, h)
         return state, _seen(chosen, state, tau)
 
-    def sample(self, values: list[float]) -> None:
+    def sample(self, values: list[float]) -> Vector3:
         gauss = self._random.gauss
         n = gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)
         x, y, z = values[_Y]
-        values[_Y] = plant.measure((x, y, z), n, self.parameters.noise.std)
+        values[_Y] = measured = plant.measure((x, y, z), n, self.parameters.noise.std)
+        return measured
+
+    def check_state(self, state: PlantState) -> None:
+        if not isclose(hypot(*state.quaternion), 1.0, rel_tol=_ROUNDING):
+            raise Refusal("its quaternion is not of length one")
 
     def hidden_state(self) -> Any:
         return self._random.getstate() if self._state is not None else None
 
     def restore_hidden_state(self, hidden: Any) -> None:
-        if hidden is not None:
-            restored = Random()
-            restored.setstate(hidden)
-            self._random = restored
+        generator = Random()
+        generator.setstate(hidden)
+        # Some of what setstate takes it changes in silence, or only gauss finds out about.
+        *_, following = hidden
+        if generator.getstate() != hidden or type(following) not in (float, type(None)):
+            raise Refusal("its noise generator is in no state that it can be in")
+        if not isfinite(following or 0.0):
+            raise Refusal("its noise is not finite")
+        self._random = generator
 
 
 def _limited(chosen: Parameters, tau: Vector3) -> Vector3:

@@ -20,6 +20,22 @@ from fmus.ports.port import FAULT, Port
 
 _HTML = Path(__file__).with_name("page.html")
 
+_REFUSALS = """\
+## What is refused
+
+A value out of its range or not finite, a value reference that is not there or of another type, an
+output or a fixed parameter set during the run, a call out of order, a state that no run can have
+led to: such a call changes nothing, is logged with status fmi2Discard, and raises `fault`.
+PythonFMU answers it with fmi2OK, so the steps tell: **every fmi2DoStep after it ends with
+fmi2Discard and changes nothing until it is mended**, a value by a good value of the same variable,
+anything by fmi2Reset or by restoring a state.
+
+A step that cannot be taken, because its size is negative or not finite, or because its result would
+not be finite, ends with fmi2Discard and leaves everything as it was, noise included; the next good
+step is taken. `fault` stays true until fmi2Reset or until a state without it is restored.
+
+The whole table of calls, states and bad arguments is `docs/status.md` of the project."""
+
 _EXAMPLE = """\
 ## Example
 
@@ -33,18 +49,18 @@ In Python:
     result = fmpy.simulate_fmu("{name}.fmu", stop_time=10.0, output_interval=0.02)
 
 A step longer than `h_max`, where there is such a parameter, is split evenly with held inputs.
-`fault` tells that an input, a parameter or a step was refused, and the log says why.
 
 **A refused parameter does not show in a bare `fmpy.simulate_fmu`: the result has two rows, with
 `fault` true, and there is no text. Add `debug_logging=True` to read the reason.**"""
 
 
 def page(name: str) -> str:
-    """The page of a component in Markdown: what it is, its ports, its parameters, an example."""
+    """The page of a component in Markdown: what it is, its ports, what it refuses, an example."""
     module = components()[name]
     text = (folder_of(module) / "page.md").read_text(encoding="utf-8").strip()
     ports: Sequence[Port] = (*import_module(module.replace(".slave", ".ports")).PORTS, FAULT)
-    return "\n\n".join((text, *_tables(ports), _EXAMPLE.format(name=name))) + "\n"
+    parts = (text, *_tables(ports), _REFUSALS, _EXAMPLE.format(name=name))
+    return "\n\n".join(parts) + "\n"
 
 
 def _tables(ports: Sequence[Port]) -> Iterator[str]:

@@ -65,11 +65,11 @@ def unpacking(
     if not places:
         nothing = made()
         return lambda values: nothing
-    text = "".join(
-        f"({''.join(f'values[{i}], ' for i in range(place.start, place.stop))}), "
-        for place in places
+    names = [f"x{i}" for i in range(len(ports))]
+    text = "".join(f"({', '.join(names[place])},), " for place in places)
+    return _compiled(
+        f"({', '.join(names)},) = values\n return make(made, ({text}))", "values", made
     )
-    return _compiled(f"lambda values: make(made, ({text}))", made)
 
 
 def packing(given: type[T], ports: Sequence[Port]) -> Callable[[T], list[float]]:
@@ -84,17 +84,19 @@ def packing(given: type[T], ports: Sequence[Port]) -> Callable[[T], list[float]]
 
     """
     groups = ", ".join(f"*groups[{name!r}]" for name in _hold(given, ports, {}))
-    return _compiled(f"lambda groups: [{groups}]", given)
+    return _compiled(f"return [{groups}]", "groups", given)
 
 
-def _compiled(function: str, made: type) -> Callable[..., Any]:
+def _compiled(body: str, argument: str, made: type) -> Callable[..., Any]:
     """A function from its text.
 
     It runs once a step in each component, and a loop over the groups costs several times the
     same thing written out.
     """
-    compiled: Callable[..., Any] = eval(function, {"made": made, "make": tuple.__new__})
-    return compiled
+    scope: dict[str, Any] = {"made": made, "make": tuple.__new__}
+    exec(f"def function({argument}):\n {body}", scope)
+    function: Callable[..., Any] = scope["function"]
+    return function
 
 
 Field = Union[Port, tuple[Port, ...], "ParameterSet[Any]"]

@@ -6,15 +6,20 @@ documentation and the tests all read these declarations, directly or through the
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import isfinite
 from typing import Union
 
 from auv_fmu.euler import STEP
 from fmus.ports.quantities import Members, member_name
 
 Value = Union[float, int, bool, str]
+
+#: Python's types of the values of FMI's types.
+_TYPES = {"Real": (float, int), "Integer": (int,), "Boolean": (bool,), "String": (str,)}
+
+_LARGEST = sys.float_info.max
 
 #: Smallest value of a parameter that must be positive. FMI knows only inclusive bounds.
 POSITIVE = 1e-9
@@ -58,20 +63,20 @@ class Port:
         """The value, if this port can take it.
 
         Raises:
-            Refusal: it is not finite, out of range, or not one of the choices.
+            Refusal: it is of another type, not finite, out of range, or not one of the choices.
 
         """
-        if self.kind == "String":
+        if type(value) not in _TYPES[self.kind]:
+            raise Refusal(f"{self.name} = {value!r:.20}: must be a {self.kind}")
+        if isinstance(value, str):
             if value not in self.choices:
                 raise Refusal(f"{self.name} = {value!r}: use one of {', '.join(self.choices)}")
-            return value
-        number = float(value)
-        if not isfinite(number):
-            raise Refusal(f"{self.name} = {number}: must be finite")
-        if self.minimum is not None and number < self.minimum:
-            raise Refusal(f"{self.name} = {number:g}: must be at least {self.minimum:g}")
-        if self.maximum is not None and number > self.maximum:
-            raise Refusal(f"{self.name} = {number:g}: must be at most {self.maximum:g}")
+        elif not -_LARGEST <= value <= _LARGEST:
+            raise Refusal(f"{self.name} = {value!r:.20}: must be finite")
+        elif self.minimum is not None and value < self.minimum:
+            raise Refusal(f"{self.name} = {value:g}: must be at least {self.minimum:g}")
+        elif self.maximum is not None and value > self.maximum:
+            raise Refusal(f"{self.name} = {value:g}: must be at most {self.maximum:g}")
         return value
 
     def meaning(self, value: Value) -> object:

@@ -1,7 +1,9 @@
-"""What PythonFMU calls to pass values, and how a refusal is told: values, faults and messages.
+"""What PythonFMU calls to pass values, and how a refusal is told: values, modes and messages.
 
-No exception leaves a callback: PythonFMU would report fmi2Fatal and release its objects twice. A
-refusal is logged, raises `fault`, and ends the next step with fmi2Discard.
+No exception leaves a callback: PythonFMU would report fmi2Fatal and release its objects twice. It
+cannot be told that a call was refused either, so every refusal means the same: it is logged,
+`fault` rises, nothing else changes, and steps end with fmi2Discard until it is mended; a value by a
+good value of the same port, everything by a reset or by a state that is restored.
 """
 
 from __future__ import annotations
@@ -17,7 +19,22 @@ from pythonfmu.enums import Fmi2Status
 from fmus.ports.port import Port, Refusal, Value
 from fmus.slave.store import MISSING, Store
 
-INSTANTIATED, INITIALISING, STEPPING = "instantiated", "initialising", "stepping"
+INSTANTIATED, INITIALISING, STEPPING, TERMINATED = MODES = (
+    "instantiated",
+    "initialising",
+    "stepping",
+    "terminated",
+)
+
+#: Different messages that an instance logs: a host may step on after a refusal for ever.
+MOST_MESSAGES = 100
+
+#: Characters of a message: some hosts have a buffer of 1 or 2 kB for them.
+_LONGEST_MESSAGE = 500
+
+#: What is refused, where it is neither a port nor a call: a reference that belongs to no port, and
+#: the initialisation with the values that there are.
+REFERENCE, INITIALISATION = "value reference", "initialisation"
 
 
 class Callbacks(Fmi2Slave):  # type: ignore[misc]
@@ -42,7 +59,12 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
     def _retune(self, parameters: dict[str, Value]) -> None:
         """Let parameters act from the next step; raise what speaks against them."""
 
-    # Faults and messages
+    # Refusals and messages
+
+    def _refuse(self, what: str, why: str) -> None:
+        """Take no step until what was refused is mended."""
+        self._store.refused[what] = why
+        self._report(why)
 
     def _report(self, message: str, key: str | None = None) -> None:
         """Raise `fault` and log."""
@@ -54,17 +76,31 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
         The host adds the name of the instance.
         """
-        if (key or message) not in self._said:
-            self._said.add(key or message)
-            # FMI defines a log message as a format: a host would take a % for a directive.
-            self.log(message.replace("%", "%%"), status)
+        said = key or message
+        if said in self._said or len(self._said) >= MOST_MESSAGES:
+            return
+        self._said.add(said)
+        if len(self._said) == MOST_MESSAGES:
+            message += "; what comes after this is not logged"
+        # PythonFMU ends the process over a message that is no UTF-8. And FMI defines a message as
+        # a format: a host would take a % for a directive.
+        text = message[:_LONGEST_MESSAGE].encode("utf-8", "backslashreplace").decode()
+        self.log(text.replace("%", "%%"), status)
 
-    def _guarded(self, action: str, function: Callable[[], None]) -> None:
-        """Run a callback's body; whatever it raises is reported instead."""
+    def _attempt(self, what: str, refused: str, action: Callable[[], None]) -> None:
+        """Do something that is refused if it raises, and mended if it does not."""
         try:
-            function()
+            action()
         except BaseException as error:
-            self._report(f"{action}: {type(error).__name__}: {error}")
+            self._refuse(what, f"{refused}: {explained(error)}")
+        else:
+            self._store.refused.pop(what, None)
+
+    def _follows(self, call: str, mode: str) -> bool:
+        """Whether a call comes in the one mode that it is allowed in; else it is refused."""
+        if self._mode != mode:
+            self._refuse(call, f"{call} is not allowed when {self._mode}")
+        return self._mode == mode
 
     # Values
 
@@ -115,36 +151,42 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
             try:
                 values.append(self._store.get(reference, kind))
             except Refusal as refusal:
-                self._report(str(refusal))
+                self._refuse(REFERENCE, str(refusal))
                 values.append(MISSING[kind])
         return values
 
     def _set(self, vrs: list[int], values: Sequence[Value], kind: str) -> None:
         for reference, value in zip(vrs, values):
+            name = REFERENCE
             try:
                 port = self._store.port(reference, kind)
-                if port.causality == "input":
-                    self._store.accept(port, value)
-                    self._store.set_input(reference, float(value))
-                else:
-                    self._set_parameter(port, value)
-                self._stale = self._mode == INITIALISING
+                name = port.name
+                self._change(port, reference, value)
             except BaseException as error:
-                self._report(str(error))
+                self._refuse(name, explained(error))
+            else:
+                self._store.refused.pop(name, None)
+                self._stale = self._mode == INITIALISING
 
-    def _set_parameter(self, port: Port, value: Value) -> None:
-        if port.causality != "parameter":
+    def _change(self, port: Port, reference: int, value: Value) -> None:
+        if port.causality == "output":
             raise Refusal(f"{port.name} is an output and cannot be set")
+        if self._mode == TERMINATED:
+            raise Refusal(f"{port.name} cannot be set after fmi2Terminate")
         if port.variability == "fixed" and self._mode == STEPPING:
             raise Refusal(f"{port.name} is fixed and cannot be set after the initialisation")
         store = self._store
-        store.accept(port, value)
-        parameters = {**store.parameters, port.name: value}
-        if self._mode != STEPPING:
-            store.parameters = parameters
+        port.checked(value)
+        if port.causality == "input":
+            store.set_input(reference, float(value))
             return
-        try:
+        parameters = {**store.parameters, port.name: value}
+        if self._mode == STEPPING:
             self._retune(parameters)
-        except Exception as error:
-            store.refused[port.name] = str(error)
-            raise
+        else:
+            store.parameters = parameters
+
+
+def explained(error: BaseException) -> str:
+    """What speaks against something; what is no refusal of ours is named as what it is."""
+    return str(error) if isinstance(error, Refusal) else f"{type(error).__name__}: {error}"

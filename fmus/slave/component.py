@@ -11,7 +11,7 @@ PythonFMU turns a Python class into an FMU. What it leaves to the class is done 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import ceil, isfinite
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar, get_args, get_origin
 from xml.etree.ElementTree import Element
@@ -23,14 +23,34 @@ from auv_fmu.euler import STEP
 from fmus.ports.description import complete
 from fmus.ports.groups import ParameterSet, packing, unpacking
 from fmus.ports.port import H_MAX, Refusal, Value
-from fmus.slave.callbacks import INITIALISING, STEPPING, Callbacks
-from fmus.slave.state import Snapshot, checked, from_bytes, to_bytes
+from fmus.slave.callbacks import (
+    INITIALISATION,
+    INITIALISING,
+    INSTANTIATED,
+    STEPPING,
+    TERMINATED,
+    Callbacks,
+    explained,
+)
+from fmus.slave.shape import measuring
+from fmus.slave.state import Snapshot, checked, from_bytes, to_bytes, unusable
 
 #: A step may exceed `h_max` by this share without being split: hosts round their time.
 ROUNDING = 1e-9
 
 #: Longest step of a component that has no internal steps [s].
 _NO_LIMIT = 1e300
+
+#: Largest norm of a state. No vehicle comes near it, and from a state below it a step with sane
+#: inputs is always finite: one wild sample must not be the end of a run.
+LARGEST_STATE = 1e100
+
+#: Why no step is taken in the other modes.
+_NOT_STEPPING = {
+    INSTANTIATED: "not initialised",
+    INITIALISING: "not initialised",
+    TERMINATED: "terminated",
+}
 
 #: More internal steps than this in one communication step are taken for a mistake.
 MOST_INTERNAL_STEPS = 1_000_000
@@ -78,15 +98,26 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
     ) -> tuple[State, Outputs]:
         """State and outputs after n internal steps of h seconds with held inputs."""
 
-    def sample(self, values: list[float]) -> None:
-        """Change the outputs in place once a communication point, after the step was accepted."""
+    def sample(self, values: list[float]) -> Sequence[float]:
+        """Change outputs in place once a communication point, after all were found finite.
+
+        Returns:
+            What was put into them.
+
+        """
+        return ()
+
+    def check_state(self, state: State) -> None:
+        """Raise Refusal if no run can have led to a state, each number of which is finite."""
 
     def hidden_state(self) -> Any:
         """What a component keeps outside its state: JSON-safe, immutable."""
         return None
 
     def restore_hidden_state(self, hidden: Any) -> None:
-        """Take back what :meth:`hidden_state` gave."""
+        """Take back what :meth:`hidden_state` gave; raise, and change nothing, if it did not."""
+        if hidden is not None:
+            raise Refusal("this component keeps nothing outside its state")
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         """Hold the types of the component against its ports."""
@@ -99,6 +130,11 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         }
         cls._unpack = staticmethod(unpacking(inputs, ports["input"], cls.group_of))
         cls._pack = staticmethod(packing(outputs, ports["output"]))
+        cls._norm = staticmethod(measuring(cls._state_type))
+        cls._samples = cls.sample is not Component.sample
+        # PythonFMU looks methods up by names that miss Python's cache: the first class has them.
+        for name in ("do_step", "get_real", "set_real", "get_boolean"):
+            setattr(cls, name, getattr(cls, name))
         meant = {port.name for port in cls.parameter_set.ports}
         if {port.name for port in ports["parameter"]} - {H_MAX.name} != meant:
             raise TypeError(f"{cls.__name__}: not every parameter has a meaning, or a port")
@@ -114,38 +150,40 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
     def setup_experiment(
         self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
     ) -> None:
-        if isfinite(start_time):
+        def take() -> None:
+            if not isfinite(start_time):
+                raise Refusal(f"start time {start_time}: must be finite")
+            if stop_time is not None and not stop_time >= start_time:
+                raise Refusal(f"stop time {stop_time}: must not be before {start_time}")
             self._start_time = start_time
-        else:
-            self._report(f"start time {start_time}: must be finite")
+
+        if self._follows("fmi2SetupExperiment", INSTANTIATED):
+            self._attempt("fmi2SetupExperiment", "experiment refused", take)
 
     def enter_initialization_mode(self) -> None:
-        self._mode = INITIALISING
-        self._stale = True
+        if self._follows("fmi2EnterInitializationMode", INSTANTIATED):
+            self._mode = INITIALISING
+            self._stale = True
 
     def exit_initialization_mode(self) -> None:
-        self._refresh()
-        self._mode = STEPPING
+        if self._follows("fmi2ExitInitializationMode", INITIALISING):
+            self._refresh()
+            self._mode = STEPPING
+
+    def terminate(self) -> None:
+        if self._follows("fmi2Terminate", STEPPING):
+            self._mode = TERMINATED
 
     def _refresh(self) -> None:
         if self._stale:
             self._stale = False
-            self._guarded("initialisation refused", self._begin)
+            self._attempt(INITIALISATION, "initialisation refused", self._begin)
 
     def _begin(self) -> None:
         store = self._store
-        store.refused.pop("initialisation", None)
-        try:
-            self._adopt(store.parameters, self._meaning(store.parameters))
-            state, outputs = self.begin(self._unpack(store.inputs), self._start_time)
-            values = self._pack(outputs)
-            if not isfinite(sum(values)):
-                raise Refusal("an output is not finite")
-        except Exception as error:
-            store.refused["initialisation"] = str(error)
-            raise
-        self._state, store.outputs = state, values
-        self.sample(values)
+        self._adopt(store.parameters, self._meaning(store.parameters))
+        state, outputs = self.begin(self._unpack(store.inputs), self._start_time)
+        self._accept(state, self._pack(outputs))
 
     def _meaning(self, values: dict[str, Value]) -> tuple[Parameters, float]:
         """What the values of all parameters come to, and the longest step with them [s]."""
@@ -171,7 +209,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         try:
             store = self._store
             if store.refused or self._mode != STEPPING:
-                raise Refusal("; ".join(store.refused.values()) or "not initialised")
+                raise Refusal("; ".join(store.refused.values()) or _NOT_STEPPING[self._mode])
             if 0.0 < step_size <= self._longest_step and isfinite(current_time):
                 n = 1
             else:
@@ -185,16 +223,24 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
                 step_size / n,
                 n,
             )
-            values = self._pack(outputs)
-            if not isfinite(sum(values)):
-                raise Refusal("an output is no longer finite")
-            self._state, store.outputs = state, values
-            self.sample(values)
+            self._accept(state, self._pack(outputs))
         except BaseException as error:
-            what = str(error) if isinstance(error, Refusal) else f"{type(error).__name__}: {error}"
+            what = explained(error)
             self._report(f"step refused at t = {current_time:g} s: {what}", key=what)
             return False
         return True
+
+    def _accept(self, state: State, values: list[float]) -> None:
+        """Take over state and outputs, if no number of theirs is out of bounds."""
+        if not self._norm(state) <= LARGEST_STATE:
+            raise Refusal(f"the state is not finite, or beyond {LARGEST_STATE:g}")
+        if not isfinite(sum(values)):
+            # What is finite may still be too large to be added up.
+            for reference, value in zip(self._store.output_references, values):
+                self._store.ports[reference].checked(value)
+        if self._samples and not isfinite(sum(self.sample(values))):
+            raise Refusal("a sampled output is not finite")
+        self._state, self._store.outputs = state, values
 
     def _internal_steps(self, current_time: float, step_size: float) -> int:
         if not isfinite(current_time) or not isfinite(step_size):
@@ -212,9 +258,13 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         """Names class and version: the modules of a built FMU carry a hash of their contents."""
         return f"{type(self).__module__}.{type(self).__qualname__}"
 
-    def _get_fmu_state(self) -> Snapshot:
+    def _get_fmu_state(self) -> Mapping[str, Any]:
         self._refresh()
         store = self._store
+        try:
+            hidden = self.hidden_state()
+        except BaseException as error:
+            return unusable(explained(error))
         return Snapshot(
             identity=self._identity(),
             mode=self._mode,
@@ -223,26 +273,28 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
             inputs=list(store.inputs),
             outputs=list(store.outputs),
             state=self._state,
-            hidden=self.hidden_state(),
+            hidden=hidden,
             fault=store.fault,
             refused=dict(store.refused),
         )
 
     def _set_fmu_state(self, state: Mapping[str, Any]) -> None:
-        self._guarded("state refused", lambda: self._restore(state))
+        self._attempt("fmi2SetFMUstate", "state refused", lambda: self._restore(state))
 
     def _restore(self, saved: Mapping[str, Any]) -> None:
         store = self._store
-        wanted = checked(saved, self._identity(), store)
+        wanted = checked(saved, self._identity(), store, self._state_type)
         if wanted["state"] is None:
             self._state, store.parameters = None, wanted["parameters"]
         else:
-            state = self._state_type._make(wanted["state"])
             meaning = self._meaning(wanted["parameters"])
+            if not self._norm(wanted["state"]) <= LARGEST_STATE:
+                raise Refusal(f"beyond {LARGEST_STATE:g}")
+            self.check_state(wanted["state"])
             # Nothing of this instance has changed so far, and nothing can fail after this.
             self.restore_hidden_state(wanted["hidden"])
             self._adopt(wanted["parameters"], meaning)
-            self._state = state
+            self._state = wanted["state"]
         store.inputs, store.outputs = wanted["inputs"], wanted["outputs"]
         store.fault, store.refused = wanted["fault"], wanted["refused"]
         self._mode, self._start_time = wanted["mode"], wanted["start_time"]

@@ -1,12 +1,15 @@
-"""The state of an FMU: complete, exact, in memory and as bytes."""
+"""The state of an FMU: complete, exact, in memory and as bytes, and checked before it is taken."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from binascii import crc32
+from collections.abc import Mapping, Sequence
 from typing import Any, TypedDict
 
 from fmus.ports.port import Refusal, Value
+from fmus.slave.callbacks import INITIALISATION, INSTANTIATED, MODES
+from fmus.slave.shape import frozen, restored
 from fmus.slave.store import Store
 
 
@@ -25,54 +28,105 @@ class Snapshot(TypedDict):
     refused: dict[str, str]
 
 
+#: Key of what speaks against bytes or a snapshot: PythonFMU asks for them where nothing can be
+#: reported, so they are refused when they are set.
+_UNUSABLE = "unusable"
+
+#: Key of the checksum in the bytes of a state.
+_CHECKSUM = "checksum"
+
+
+def unusable(why: str) -> dict[str, Any]:
+    """What stands for a state that there is none of."""
+    return {_UNUSABLE: why}
+
+
 def to_bytes(snapshot: Mapping[str, Any]) -> bytes:
-    """JSON, which gives every float back bit for bit."""
-    return json.dumps(snapshot).encode("utf-8")
+    """JSON, which gives every float back bit for bit, with a checksum."""
+    try:
+        return _text({**snapshot, _CHECKSUM: _checksum(snapshot)})
+    except (TypeError, ValueError, RecursionError) as error:
+        return _text(unusable(f"it is not fit for JSON: {error}"))
 
 
 def from_bytes(content: bytes) -> dict[str, Any]:
-    """What was made into bytes; what is no state at all becomes an empty one.
-
-    It is refused when it is set: nothing can be reported where PythonFMU calls this.
-    """
+    """What was made into bytes; what is no state at all is refused when it is set."""
     try:
         saved = json.loads(content)
-    except ValueError:
-        saved = None
-    return saved if isinstance(saved, dict) else {}
+        if not isinstance(saved, dict):
+            return unusable("the bytes are not those of a state")
+        checksum = saved.pop(_CHECKSUM, None)
+        if _UNUSABLE not in saved and checksum != _checksum(saved):
+            return unusable("the bytes were changed since they were written")
+    except (ValueError, RecursionError):
+        return unusable("the bytes are not those of a state")
+    return saved
 
 
-def checked(saved: Mapping[str, Any], identity: str, store: Store) -> Snapshot:
+def _text(value: Mapping[str, Any]) -> bytes:
+    return json.dumps(value, sort_keys=True).encode("utf-8")
+
+
+def _checksum(snapshot: Mapping[str, Any]) -> int:
+    return crc32(_text(snapshot))
+
+
+def checked(saved: Mapping[str, Any], identity: str, store: Store, kind: type) -> Snapshot:
     """A copy of what was saved, if it can be a state of this component.
 
+    Args:
+        saved: in memory, or from bytes.
+        identity: of the component.
+        store: of an instance of it.
+        kind: type of its state.
+
     Raises:
-        Refusal: it belongs to another component or version, or has other ports.
-        Exception: a part is missing or of another type.
+        Refusal: it belongs to another component or version, or no run can have led to it.
 
     """
+    if _UNUSABLE in saved:
+        raise Refusal(str(saved[_UNUSABLE]))
     if saved.get("identity") != identity:
         raise Refusal(f"not a state of {identity}")
-    copy = Snapshot(
+    if saved.keys() != Snapshot.__annotations__.keys():
+        raise Refusal("it has other parts")
+    mode, state = saved["mode"], saved["state"]
+    if mode not in MODES or (mode == INSTANTIATED and state is not None):
+        raise Refusal(f"mode {mode!r:.40} does not go with its state")
+    if not isinstance(saved["fault"], bool):
+        raise Refusal("its fault is neither true nor false")
+    parameters = saved["parameters"]
+    declared = [port for port in store.ports if port.causality == "parameter"]
+    if not isinstance(parameters, dict) or parameters.keys() != store.parameters.keys():
+        raise Refusal("it has other parameters")
+    return Snapshot(
         identity=identity,
-        mode=str(saved["mode"]),
-        start_time=float(saved["start_time"]),
-        parameters=dict(saved["parameters"]),
-        inputs=[float(value) for value in saved["inputs"]],
-        outputs=[float(value) for value in saved["outputs"]],
-        state=_frozen(saved["state"]),
-        hidden=_frozen(saved["hidden"]),
-        fault=bool(saved["fault"]),
-        refused=dict(saved["refused"]),
+        mode=mode,
+        start_time=restored(float, saved["start_time"]),
+        parameters={port.name: port.checked(parameters[port.name]) for port in declared},
+        inputs=_values(store, store.input_references, saved["inputs"]),
+        outputs=_values(store, store.output_references, saved["outputs"]),
+        state=None if state is None else restored(kind, state),
+        hidden=frozen(saved["hidden"]),
+        fault=saved["fault"],
+        refused=_refused(saved),
     )
-    if (len(copy["inputs"]), len(copy["outputs"]), copy["parameters"].keys()) != (
-        len(store.inputs),
-        len(store.outputs),
-        store.parameters.keys(),
-    ):
-        raise Refusal("a state with other ports")
-    return copy
 
 
-def _frozen(value: Any) -> Any:
-    """Lists, as JSON gives them, back to the tuples that states are made of."""
-    return tuple(map(_frozen, value)) if isinstance(value, (list, tuple)) else value
+def _values(store: Store, references: Sequence[int], values: Any) -> list[float]:
+    if not isinstance(values, (list, tuple)) or len(values) != len(references):
+        raise Refusal("it has other ports")
+    for reference, value in zip(references, values):
+        store.ports[reference].checked(value)
+    return [*values]
+
+
+def _refused(saved: Mapping[str, Any]) -> dict[str, str]:
+    refused = saved["refused"]
+    if not isinstance(refused, dict) or not all(isinstance(v, str) for v in refused.values()):
+        raise Refusal("what it refused is no text")
+    if refused and not saved["fault"]:
+        raise Refusal("it refused something without a fault")
+    if saved["state"] is None and saved["mode"] != INSTANTIATED and INITIALISATION not in refused:
+        raise Refusal("it is initialised and has no state")
+    return dict(refused)

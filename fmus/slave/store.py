@@ -57,7 +57,8 @@ class Store:
 
         """
         if not 0 <= reference < len(self.ports) or self.ports[reference].kind != kind:
-            raise Refusal(f"no {kind} has the value reference {reference}")
+            # PythonFMU hands references from 2^31 over as negative numbers.
+            raise Refusal(f"no {kind} has the value reference {reference % 2**32}")
         return self.ports[reference]
 
     def get(self, reference: int, kind: str) -> Value:
@@ -75,20 +76,6 @@ class Store:
         if port.causality == "input":
             return self.inputs[self.input_references.index(reference)]
         return self.outputs[self.output_references.index(reference)]
-
-    def accept(self, port: Port, value: Value) -> None:
-        """Check a value, and remember a refused one until a good one has come.
-
-        Raises:
-            Refusal: the port cannot take it.
-
-        """
-        try:
-            port.checked(value)
-        except Refusal as refusal:
-            self.refused[port.name] = str(refusal)
-            raise
-        self.refused.pop(port.name, None)
 
     def set_input(self, reference: int, value: float) -> None:
         """Change one input."""

@@ -99,7 +99,12 @@ def quaternion_rates(quaternion: Vector4, omega: Vector3) -> Vector4:
 
 
 def normalised(quaternion: Vector4) -> Vector4:
-    """The unit quaternion of the same direction."""
+    """The unit quaternion of the same direction.
+
+    Raises:
+        ZeroDivisionError: it has none, being zero.
+
+    """
     a, b, c, d = quaternion
     norm = sqrt(a * a + b * b + c * c + d * d)
     return a / norm, b / norm, c / norm, d / norm

@@ -6,7 +6,6 @@ Everything else that runs this loop is held against it.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from random import Random
 from typing import NamedTuple
 
 from auv_fmu import motion_planner, output_feedback, plant
@@ -70,7 +69,7 @@ def closed_loop(steps: int, setting: Setting = PAPER) -> Iterator[Instant]:
     roll, waves = setting.roll, setting.disturbance
     tau_min, tau_max = setting.limits
     std, seed = setting.localisation
-    gauss = Random(seed).gauss
+    gauss = plant.white_noise(seed).gauss
     state = plant.initial_state(setting.eta_0[:3], setting.eta_0[3:], setting.nu_0)
     planned = motion_planner.initial_state(setting.eta_d0)
     for k in range(steps + 1):

@@ -7,6 +7,7 @@ of samples (reading 12).
 
 from __future__ import annotations
 
+from math import degrees, radians
 from typing import NamedTuple
 
 from auv_fmu.attitude import rotate, rotation_from_euler
@@ -20,7 +21,15 @@ TAU_D: Vector3 = (5.0, 1.0, 2.0)
 #: Initial posture of section 4.1: x, y, z [m], theta, psi [rad].
 ETA_D0: Vector5 = (0.0, 0.0, -2.0, 0.0, 0.0)
 
+#: Steepest pitch of the reference [rad]. At 90 degrees (1) has a pole: near it the yaw turns as
+#: fast as one likes, and a step leaps over it.
+STEEPEST = radians(85.0)
+
 _UNDISTURBED = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class SteepReference(ArithmeticError):
+    """The reference vehicle stands on its nose or on its tail."""
 
 
 class PlannerState(NamedTuple):
@@ -61,8 +70,16 @@ def motion(vehicle: Vehicle, state: PlannerState, tau_d: Vector3) -> Motion:
         state: of the reference vehicle.
         tau_d: (tau_ud, tau_qd, tau_rd) [N, N.m].
 
+    Raises:
+        SteepReference: the pitch is steeper than :data:`STEEPEST`.
+
     """
     _, theta, psi, nu = state
+    if not -STEEPEST <= theta <= STEEPEST:
+        raise SteepReference(
+            f"the pitch of the reference is {degrees(theta):.1f} degrees; (1) has a pole at 90, so "
+            f"it must stay within {degrees(STEEPEST):g}"
+        )
     rotation = rotation_from_euler(0.0, theta, psi)
     return Motion(rotation, accelerations(vehicle, nu, -rotation[0][2], tau_d, _UNDISTURBED))
 
@@ -74,9 +91,6 @@ def step(state: PlannerState, moving: Motion, h: float) -> PlannerState:
         state: at the beginning of the step.
         moving: its motion.
         h: step [s].
-
-    Raises:
-        ZeroDivisionError: the cosine of the pitch angle is exactly zero.
 
     """
     (x, y, z), theta, psi, (u, v, w, q, r) = state

@@ -8,6 +8,7 @@ roll adds to (2) enter through tau_w, so (2) stands once and is met exactly when
 
 from __future__ import annotations
 
+from random import Random
 from typing import NamedTuple
 
 from auv_fmu.attitude import (
@@ -151,6 +152,16 @@ def outputs(state: PlantState, ell: float) -> PlantOutputs:
         control_point(position, rotation, ell),
         control_point_velocity(rotation, nu, ell),
     )
+
+
+def white_noise(seed: int) -> Random:
+    """The generator of the localisation system's noise, another one for each seed.
+
+    Args:
+        seed: any 32-bit integer. Random takes the magnitude of its seed.
+
+    """
+    return Random(seed % 2**32)
 
 
 def measure(y: Vector3, n: Vector3, std: float) -> Vector3:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf, nan
+from math import inf, isfinite, nan, radians
 
 import pytest
 
@@ -134,12 +134,188 @@ def test_a_tunable_parameter_acts_from_the_next_step():
     assert driver.get("fault") is False
 
 
-def test_unknown_value_references_are_reported_and_do_no_harm(driver):
-    assert driver.slave.get_real([10_000, -1]) == [0.0, 0.0]
-    driver.slave.set_real([10_000], [1.0])
-    driver.slave.set_boolean([0], [True])
+REFUSED_CALLS = {
+    "unknown reference read": lambda slave: slave.get_real([10_000]),
+    "negative reference read": lambda slave: slave.get_real([-1]),
+    "unknown reference set": lambda slave: slave.set_real([10_000], [1.0]),
+    "wrong type read": lambda slave: slave.get_boolean([0]),
+    "wrong type set": lambda slave: slave.set_string([0], ["one"]),
+    "output set": lambda slave: slave.set_real([output_of(slave)], [1.0]),
+    "fixed parameter set": lambda slave: slave.set_real([fixed_of(slave)], [1.0]),
+    "empty state": lambda slave: slave._set_fmu_state({}),
+    "truncated state": lambda slave: slave._set_fmu_state(
+        slave._fmu_state_from_bytes(slave._fmu_state_to_bytes(slave._get_fmu_state())[:-9])
+    ),
+    "experiment set up again": lambda slave: slave.setup_experiment(0.0),
+    "initialisation entered again": lambda slave: slave.enter_initialization_mode(),
+    "initialisation left again": lambda slave: slave.exit_initialization_mode(),
+}
+
+
+def output_of(slave) -> int:
+    return slave._store.output_references[0]
+
+
+def fixed_of(slave) -> int:
+    return next(r for r, port in enumerate(slave.ports) if port.variability == "fixed")
+
+
+@pytest.mark.parametrize("call", REFUSED_CALLS)
+def test_after_a_refused_call_no_step_is_taken_until_a_state_is_restored(driver, call):
+    driver.excite(1)
+    driver.step()
+    before, saved = driver.outputs(), driver.slave._get_fmu_state()
+    if call == "fixed parameter set" and driver.component.__name__ == "DisturbanceGenerator":
+        pytest.skip("all of its parameters are tunable")
+    REFUSED_CALLS[call](driver.slave)
     assert driver.get("fault") is True
+    assert driver.messages()
+    for _ in range(2):
+        assert not driver.step()
+    assert driver.outputs() == before
+    driver.slave._set_fmu_state(saved)
+    assert driver.get("fault") is False
     assert driver.step()
+
+
+def test_values_of_unknown_references_are_zero(driver):
+    assert driver.slave.get_real([10_000, -1]) == [0.0, 0.0]
+
+
+def test_reference_beyond_two_to_the_31_is_named_as_the_host_knows_it(driver):
+    """PythonFMU hands references over as signed numbers."""
+    driver.slave.get_real([-1])
+    assert "4294967295" in driver.messages()[0]
+
+
+@pytest.mark.parametrize("start", [nan, inf, -inf])
+def test_bad_start_time_is_refused_and_a_good_one_cures_it(start):
+    for mended in (False, True):
+        slave = component("DisturbanceGenerator")(instance_name="under_test")
+        slave.setup_experiment(start)
+        if mended:
+            slave.setup_experiment(1.0)
+        slave.enter_initialization_mode()
+        slave.exit_initialization_mode()
+        assert slave.do_step(1.0, 0.02) is mended
+        assert slave._store.fault is True
+
+
+@pytest.mark.parametrize("stop", [nan, -1.0, -inf])
+def test_bad_stop_time_is_refused(driver, stop):
+    slave = driver.component(instance_name="under_test")
+    slave.setup_experiment(0.0, stop)
+    assert slave._store.fault is True
+
+
+def test_initialisation_cannot_be_left_before_it_was_entered():
+    slave = component("AuvPlant")(instance_name="under_test")
+    slave.exit_initialization_mode()
+    slave.enter_initialization_mode()
+    slave.exit_initialization_mode()
+    assert not slave.do_step(0.0, 0.02)
+
+
+def test_after_the_end_nothing_is_set_or_stepped_and_everything_can_be_read(driven):
+    driven.excite(1)
+    driven.step()
+    before = driven.outputs()
+    driven.slave.terminate()
+    assert driven.get("fault") is False
+    assert not driven.step()
+    assert "terminated" in driven.messages()[0]
+    driven.slave.set_real([0], [7.0])
+    assert driven.get(first_input(driven)) != 7.0
+    assert driven.outputs() == before
+
+
+@pytest.mark.parametrize(
+    ("name", "start", "sample"),
+    [
+        ("PdController", {}, {"y__x": 1e155}),
+        ("ObserverController", {}, {"dy_d__x": 1e150}),
+        ("AuvPlant", {}, {"tau_w__p": 1e300}),
+        ("AuvPlant", {}, {"tau_w__p": -1e300}),
+        ("AuvPlant", {"tau_max__u": 1e300}, {"tau__u": 1e300}),
+    ],
+)
+def test_one_wild_sample_is_refused_and_the_run_goes_on_after_it(name, start, sample):
+    driver, calm = ClassInstance(name, **start), ClassInstance(name, **start)
+    driver.set(**sample)
+    assert not driver.step()
+    driver.set(**dict.fromkeys(sample, 0.0))
+    for k in range(3):
+        for other in (driver, calm):
+            other.excite(k)
+            assert other.step()
+    assert driver.outputs() == calm.outputs()
+
+
+def test_initial_values_without_a_next_step_are_refused():
+    driver = ClassInstance("AuvPlant", nu0__p=1e160)
+    assert "initialisation refused" in driver.messages()[0]
+    assert not driver.step()
+
+
+def test_outputs_that_are_only_too_large_to_be_added_up_are_taken():
+    largest = 1.7e308
+    driver = ClassInstance("DisturbanceGenerator", A_f=largest, A_d=0.0)
+    driver.slave.set_real(driver.references("input"), [1.0] * 6)
+    assert driver.step()
+    assert driver.outputs() == [largest] * 6
+
+
+@pytest.mark.parametrize("std", [1e7, 1e308])
+def test_noise_that_could_hide_a_finite_position_is_refused(std):
+    assert ClassInstance("AuvPlant", noise__std=std).get("fault") is True
+
+
+def test_largest_noise_leaves_the_largest_position_finite():
+    driver = ClassInstance("AuvPlant", noise__std=1e6, eta0__x=1e100)
+    for _ in range(100):
+        assert driver.step()
+    assert all(isfinite(value) for value in driver.outputs())
+
+
+def test_noise_of_a_refused_step_is_not_lost():
+    """y after a refused step is y without it: the same numbers are drawn."""
+    driver, calm = ClassInstance("AuvPlant"), ClassInstance("AuvPlant")
+    driver.set(tau_w__p=1e300)
+    driver.step()
+    driver.set(tau_w__p=0.0)
+    for other in (driver, calm):
+        assert other.step()
+    assert driver.get("y.z") == calm.get("y.z")
+
+
+def test_each_seed_has_a_noise_of_its_own():
+    seeds = [0, 1, -1, 2**31 - 1, -(2**31)]
+    assert len({ClassInstance("AuvPlant", noise__seed=seed).get("y.x") for seed in seeds}) == 5
+
+
+@pytest.mark.parametrize("pitch", [89.0, 90.0, -90.0, 100.0, 180.0])
+def test_reference_does_not_start_steeper_than_its_equations_allow(pitch):
+    driver = ClassInstance("MotionPlanner", eta0__theta=radians(pitch))
+    assert f"{pitch:.1f} degrees" in driver.messages()[0]
+    assert not driver.step()
+
+
+@pytest.mark.parametrize("h_max", [0.02, 0.002])
+def test_reference_stops_before_the_pole(h_max):
+    """A moment that turns it over: the path ends where its pitch does, whatever the step."""
+    driver = ClassInstance("MotionPlanner", tau_d__q=100.0, h_max=h_max)
+    while driver.step():
+        assert abs(driver.get("eta_d.theta")) <= radians(85.0)
+    assert "pole" in driver.messages()[0]
+    assert driver.time < 10.0
+
+
+def test_messages_are_bounded():
+    driver = ClassInstance("AuvPlant")
+    for k in range(1000):
+        driver.slave.get_real([10_000 + k])
+    assert len(driver.messages()) == 100
+    assert len(driver.slave._store.refused) == 1
 
 
 @pytest.mark.parametrize("h", [-0.02, nan, inf, -inf])

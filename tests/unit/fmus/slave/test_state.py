@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import json
-from math import nan
+from collections.abc import Callable
+from math import inf, nan
+from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from fmus.slave.state import Snapshot
 from support.instances import NAMES, WITH_INPUTS, ClassInstance
 
 
@@ -20,19 +25,178 @@ def driven(request: pytest.FixtureRequest) -> ClassInstance:
     return ClassInstance(request.param)
 
 
-@pytest.mark.parametrize("key", ["hidden", "inputs", "outputs", "parameters"])
-def test_state_that_is_refused_is_not_applied_in_part(key: str):
-    whole, other = ClassInstance("AuvPlant"), ClassInstance("AuvPlant", m11=50.0)
-    whole.step(), other.step()
-    spoiled = {**other.slave._get_fmu_state(), key: {"m11": 50.0} if key == "parameters" else [1]}
-    whole.slave._set_fmu_state(spoiled)
-    assert whole.get("fault") is True
-    untouched = ClassInstance("AuvPlant")
-    untouched.step()
-    for driver in (whole, untouched):
-        driver.excite(3)
+def spoiled(saved: Snapshot, key: str, value: Any) -> dict[str, Any]:
+    """A state with one part changed, as its bytes would bring it back if their checksum agreed."""
+    return json.loads(json.dumps({**saved, key: value}))
+
+
+def with_parameter(name: str, value: Any) -> Callable[[Snapshot], Any]:
+    return lambda saved: {**saved["parameters"], name: value}
+
+
+def with_input(value: Any) -> Callable[[Snapshot], Any]:
+    return lambda saved: [value, *saved["inputs"][1:]]
+
+
+def with_generator(place: int, value: Any) -> Callable[[Snapshot], Any]:
+    """The noise generator's version, numbers and kept second number of the pair."""
+
+    def change(saved: Snapshot) -> Any:
+        hidden = [saved["hidden"][0], [*saved["hidden"][1]], saved["hidden"][2]]
+        hidden[place] = value(hidden[place]) if callable(value) else value
+        return hidden
+
+    return change
+
+
+#: Of AuvPlant: key of the state, and what another value of it is made of.
+SPOILED = {
+    "parameter out of range": ("parameters", with_parameter("m11", -25.0)),
+    "parameter not finite": ("parameters", with_parameter("m11", nan)),
+    "parameter infinite": ("parameters", with_parameter("ell", inf)),
+    "parameter too large for a float": ("parameters", with_parameter("ell", 10**400)),
+    "parameter of another type": ("parameters", with_parameter("m11", "25")),
+    "truth value for a number": ("parameters", with_parameter("m11", True)),
+    "number for an integer": ("parameters", with_parameter("noise.seed", 1.5)),
+    "list for a parameter": ("parameters", with_parameter("m11", [25.0])),
+    "parameter too many": ("parameters", with_parameter("m99", 1.0)),
+    "parameters missing": ("parameters", lambda saved: {"m11": 50.0}),
+    "parameters in a list": ("parameters", lambda saved: [*saved["parameters"].items()]),
+    "limits that do not fit": ("parameters", lambda saved: {
+        **saved["parameters"], "tau_min.u": 0.0, "tau_max.u": 0.0,
+    }),
+    "input not finite": ("inputs", with_input(nan)),
+    "input of another type": ("inputs", with_input(None)),
+    "inputs missing": ("inputs", lambda saved: [1.0]),
+    "inputs no list": ("inputs", lambda saved: 7),
+    "outputs missing": ("outputs", lambda saved: []),
+    "output not finite": ("outputs", lambda saved: [inf, *saved["outputs"][1:]]),
+    "mode bogus": ("mode", lambda saved: "bogus"),
+    "mode of another type": ("mode", lambda saved: ["stepping"]),
+    "state before the initialisation": ("mode", lambda saved: "instantiated"),
+    "no state after the initialisation": ("state", lambda saved: None),
+    "state of another shape": ("state", lambda saved: [*saved["state"], [0.0]]),
+    "state flat": ("state", lambda saved: [0.0, 0.0, 0.0]),
+    "state not finite": ("state", lambda saved: [[nan, 0.0, 0.0], *saved["state"][1:]]),
+    "state of text": ("state", lambda saved: [["a", "b", "c"], *saved["state"][1:]]),
+    "state of truth values": ("state", lambda saved: [[True] * 3, *saved["state"][1:]]),
+    "state out of bounds": ("state", lambda saved: [[1e120, 0.0, 0.0], *saved["state"][1:]]),
+    "zero quaternion": ("state", lambda saved: [
+        saved["state"][0], [0.0] * 4, saved["state"][2],
+    ]),
+    "long quaternion": ("state", lambda saved: [
+        saved["state"][0], [1.0, 0.0, 1.0, 0.0], saved["state"][2],
+    ]),
+    "generator of another version": ("hidden", with_generator(0, 2)),
+    "generator of no version": ("hidden", with_generator(0, "three")),
+    "generator too short": ("hidden", with_generator(1, lambda numbers: numbers[:-2])),
+    "generator with a negative number": ("hidden", with_generator(1, lambda n: [-1, *n[1:]])),
+    "generator with a large number": ("hidden", with_generator(1, lambda n: [2**32, *n[1:]])),
+    "generator with a fraction": ("hidden", with_generator(1, lambda n: [0.5, *n[1:]])),
+    "generator with text to come": ("hidden", with_generator(2, "0.5")),
+    "generator with no number to come": ("hidden", with_generator(2, nan)),
+    "no generator": ("hidden", lambda saved: None),
+    "generator of no parts": ("hidden", lambda saved: [1]),
+    "start time not finite": ("start_time", lambda saved: inf),
+    "start time of another type": ("start_time", lambda saved: "0"),
+    "fault of another type": ("fault", lambda saved: 0),
+    "refusals without a fault": ("refused", lambda saved: {"m11": "no"}),
+    "refusals of another type": ("refused", lambda saved: ["m11"]),
+    "part too many": ("more", lambda saved: 1),
+    "another component": ("identity", lambda saved: "something else"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", SPOILED)
+def test_state_that_no_run_can_have_led_to_is_refused_whole(what: str):
+    plant, untouched = ClassInstance("AuvPlant"), ClassInstance("AuvPlant", m11=50.0)
+    for driver in (plant, untouched):
+        driver.excite(1)
+        driver.step()
+    saved = untouched.slave._get_fmu_state()
+    before = plant.slave._get_fmu_state()
+    key, change = SPOILED[what]
+    plant.slave._set_fmu_state(spoiled(saved, key, change(saved)))
+    assert plant.get("fault") is True
+    assert plant.messages()[0].startswith("state refused: ")
+    assert not plant.step()
+    after = plant.slave._get_fmu_state()
+    assert {**after, "fault": False, "refused": {}} == before
+    plant.slave._set_fmu_state(saved)
+    for driver in (plant, untouched):
+        driver.excite(2)
         assert driver.step()
-    assert whole.outputs() == untouched.outputs()
+    assert plant.outputs() == untouched.outputs(), "a good state is taken after a bad one"
+
+
+@pytest.mark.parametrize("key", Snapshot.__annotations__)
+def test_state_with_a_part_missing_is_refused(driver, key):
+    saved = dict(driver.slave._get_fmu_state())
+    del saved[key]
+    driver.slave._set_fmu_state(saved)
+    assert not driver.step()
+
+
+#: Bytes that are no state at all.
+NO_STATES = {
+    "nothing": b"",
+    "no text": b"\x00 not a state \xff",
+    "a list": b"[1, 2]",
+    "a number": b"1",
+    "two thousand lists": b"[" * 2000,
+    "a hundred thousand objects": b'{"a":' * 100_000,
+    "half a number": b'{"mode": 1e',
+    "a number without end": b'{"start_time": ' + b"9" * 10_000 + b"}",
+    "an empty object": b"{}",
+}
+
+
+@pytest.mark.parametrize("what", NO_STATES)
+def test_bytes_that_are_no_state_are_refused(driver, what):
+    driver.slave._set_fmu_state(driver.slave._fmu_state_from_bytes(NO_STATES[what]))
+    assert driver.get("fault") is True
+    assert not driver.step()
+
+
+@given(place=st.integers(0), byte=st.integers(0, 255))
+def test_no_changed_byte_of_a_state_is_overlooked(place, byte):
+    """What is accepted is the same state, written in another way."""
+    driver = ClassInstance("ObserverController")
+    driver.excite(1)
+    driver.step()
+    saved = driver.slave._get_fmu_state()
+    content = bytearray(driver.slave._fmu_state_to_bytes(saved))
+    content[place % len(content)] = byte
+    driver.slave._set_fmu_state(driver.slave._fmu_state_from_bytes(bytes(content)))
+    assert driver.get("fault") or driver.slave._get_fmu_state() == saved
+
+
+def test_state_that_is_not_fit_for_bytes_says_so():
+    driver = ClassInstance("AuvPlant")
+    content = driver.slave._fmu_state_to_bytes({"hidden": object()})
+    driver.slave._set_fmu_state(driver.slave._fmu_state_from_bytes(content))
+    assert "JSON" in driver.messages()[0]
+
+
+def test_text_of_a_state_is_no_trap_for_the_message(driver):
+    """Half of a surrogate pair is text to JSON, and cannot be handed to a host."""
+    saved = driver.slave._fmu_state_from_bytes(b'{"unusable": "\\ud800%s' + b"x" * 10_000 + b'"}')
+    driver.slave._set_fmu_state(saved)
+    [message] = driver.messages()
+    assert "\\ud800%%s" in message
+    assert len(message.encode("utf-8")) < 600
+
+
+def test_state_from_before_the_initialisation_brings_an_instance_back_there(driver):
+    fresh = driver.component(instance_name="fresh")
+    driver.slave._set_fmu_state(fresh._get_fmu_state())
+    assert not driver.slave.do_step(0.0, 0.02)
+    driver.slave.enter_initialization_mode()
+    driver.slave.exit_initialization_mode()
+    assert driver.step()
+    other = ClassInstance(driver.component.__name__)
+    other.step()
+    assert driver.outputs() == other.outputs()
 
 
 @pytest.mark.parametrize("serialised", [False, True])
@@ -65,7 +229,7 @@ def test_state_of_another_component_or_version_is_refused(driver):
     driver.slave._set_fmu_state(driver.slave._fmu_state_from_bytes(b"[1, 2]"))
     assert driver.get("fault") is True
     after = driver.slave._get_fmu_state()
-    assert {**after, "fault": False} == before
+    assert {**after, "fault": False, "refused": {}} == before
 
 
 def test_saved_state_does_not_change_with_the_run(driver):
