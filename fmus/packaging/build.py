@@ -44,7 +44,7 @@ def fingerprint() -> str:
     digest = hashlib.sha256()
     for root in (*_FOLDERS.values(), _PYTHONFMU):
         for path in sorted(root.rglob("*")):
-            if path.suffix in (".py", ".md", ".html", ".png", ".c", ".so", ".dll"):
+            if path.suffix in (".py", ".md", ".html", ".png", ".c", ".h", ".so", ".dll"):
                 digest.update(f"{path.relative_to(root)}\0".encode())
                 digest.update(path.read_bytes())
     for text in (documentation.licences(), version("markdown-it-py")):

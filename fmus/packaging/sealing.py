@@ -17,6 +17,9 @@ from pathlib import Path, PurePosixPath
 _RESOURCES = "resources/"
 _SLAVE_MODULE = "resources/slavemodule.txt"
 _DESCRIPTION = "modelDescription.xml"
+
+#: Where the loader finds the GUID: a library knows the folder of resources alone.
+_GUID_FILE = "resources/guid.txt"
 _GUID = re.compile(rb'guid="[^"]*"')
 
 #: The oldest time a zip archive can hold: the time of a build is no part of its result.
@@ -53,9 +56,10 @@ def seal(entries: dict[str, bytes], destination: Path) -> None:
     for name in sorted(entries):
         digest.update(f"{name}\0{len(entries[name])}\0".encode())
         digest.update(entries[name])
-    guid = uuid.UUID(bytes=digest.digest()[:16])
+    guid = f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}".encode()
     entries = _renamed(entries, digest.hexdigest()[:12])
-    entries[_DESCRIPTION] = _GUID.sub(f'guid="{{{guid}}}"'.encode(), entries[_DESCRIPTION], count=1)
+    entries[_DESCRIPTION] = _GUID.sub(b'guid="' + guid + b'"', entries[_DESCRIPTION], count=1)
+    entries[_GUID_FILE] = guid
     write_archive(destination, entries, zipfile.ZIP_DEFLATED)
 
 

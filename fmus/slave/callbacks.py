@@ -82,10 +82,8 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         self._said.add(said)
         if len(self._said) == MOST_MESSAGES:
             message += "; what comes after this is not logged"
-        # PythonFMU ends the process over a message that is no UTF-8. And FMI defines a message as
-        # a format: a host would take a % for a directive.
-        text = message[:_LONGEST_MESSAGE].encode("utf-8", "backslashreplace").decode()
-        self.log(text.replace("%", "%%"), status)
+        # FMI defines a log message as a format: a host would take a % for a directive.
+        self.log(message[:_LONGEST_MESSAGE].replace("%", "%%"), status)
 
     def _attempt(self, what: str, refused: str, action: Callable[[], None]) -> None:
         """Do something that is refused if it raises, and mended if it does not."""

@@ -8,6 +8,7 @@ globals and a new one as the locals, and searches the locals for the class.
 - The search never frees what it makes of each base of each class it meets: more than a kilobyte
   an instance.
 - It puts the resources folder on sys.path and never takes it off; it never frees the path either.
+- It takes it for granted that messages and strings can be encoded, and ends the process otherwise.
 - Its library frees the object that watches over the interpreter twice when the process ends,
   which now and then ends in "corrupted double-linked list" and an exit status of 134.
 """
@@ -33,22 +34,43 @@ def settle(slave: type, module: dict[str, Any], found: dict[str, Any]) -> None:
     # A search that finds no class ends in the module's attribute with the empty name.
     module[""] = slave
     if found is module:
+        _let_speak_clearly(slave)
         return
     found.clear()
     # What is one reference short is given back, what has one too many is relieved of it.
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(module))
-    if sys.path and _resources_of(sys.path[0], module["__name__"]):
-        path = sys.path.pop(0)
+    # Other threads may have put other folders before it.
+    script = module["__name__"]
+    own = next((i for i, folder in enumerate(sys.path) if _resources_of(folder, script)), None)
+    if own is not None:
+        path = sys.path.pop(own)
         _release_interpreter(Path(path))
         same_but_ours = f"{path}/"
         if sys.getrefcount(path) == sys.getrefcount(same_but_ours) + 1:
             ctypes.pythonapi.Py_DecRef(ctypes.py_object(path))
 
 
+def _let_speak_clearly(slave: Any) -> None:
+    """Have a class of slaves log and return nothing but text that can be encoded."""
+    log, get_string = slave.log, slave.get_string
+
+    def clear_log(self: Any, msg: object, *args: Any, **kwargs: Any) -> None:
+        log(self, _encodable(msg), *args, **kwargs)
+
+    def clear_get_string(self: Any, vrs: list[int]) -> list[str]:
+        return [_encodable(value) for value in get_string(self, vrs)]
+
+    slave.log, slave.get_string = clear_log, clear_get_string
+
+
+def _encodable(text: object) -> str:
+    return str(text).encode("utf-8", "replace").decode("utf-8")
+
+
 def _resources_of(folder: str, script: str) -> bool:
     try:
         return Path(folder, "slavemodule.txt").read_text(encoding="utf-8").strip() == script
-    except OSError:
+    except (OSError, ValueError):
         return False
 
 
@@ -62,7 +84,8 @@ def _release_interpreter(resources: Path) -> None:
         return
     for library in resources.parent.glob("binaries/linux64/*.so"):
         try:
-            loaded = ctypes.CDLL(str(library), mode=os.RTLD_LAZY | os.RTLD_NOLOAD)
+            # Under the interpreter lock: a thread may be making another instance.
+            loaded = ctypes.PyDLL(str(library), mode=os.RTLD_LAZY | os.RTLD_NOLOAD)
             loaded.finalizePythonInterpreter()
         except (OSError, AttributeError):
             # Not the library that runs this instance, or one that has no such function.

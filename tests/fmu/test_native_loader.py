@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sysconfig
@@ -11,12 +12,18 @@ import fmpy
 import pytest
 
 from fmus.packaging.loader import compiler
+from fmus.packaging.own import build_own
 from orchestrator.experiments import bundle
 from support.instances import NAMES
 
 LIBPYTHON = Path(
     str(sysconfig.get_config_var("LIBDIR")), str(sysconfig.get_config_var("INSTSONAME"))
 )
+
+CHROOT = shutil.which("chroot")
+
+#: Processes a test with threads.
+REPETITIONS = 5
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
 needs_libpython = pytest.mark.skipif(
@@ -26,14 +33,25 @@ needs_libpython = pytest.mark.skipif(
 pytestmark = needs_compiler
 
 
-def compiled_host(folder: Path, *options: str) -> Path:
-    host = folder / "host"
-    source = Path(__file__).with_name("host.c")
-    subprocess.run(
-        [str(compiler()), "-Wall", "-Werror", "-g", *options, "-o", host, source, "-ldl"],
-        check=True,
-    )
-    return host
+def compile_c(source: Path, target: Path, *options: str) -> Path:
+    command = [str(compiler()), "-Wall", "-Wextra", "-Werror", "-g", "-pthread", *options]
+    subprocess.run([*command, "-o", target, source, "-ldl"], check=True)
+    return target
+
+
+def compiled_host(folder: Path, *options: str, name: str = "host") -> Path:
+    return compile_c(Path(__file__).with_name(f"{name}.c"), folder / name, *options)
+
+
+def preloaded(folder: Path, text: str) -> str:
+    """A library that is put before the C library's functions."""
+    source = folder / "preloaded.c"
+    source.write_text(f"#define _GNU_SOURCE\n{text}")
+    return str(compile_c(source, folder / "preloaded.so", "-shared", "-fPIC"))
+
+
+#: A host that finds this Python's libpython, as one does where it is installed.
+FINDS_LIBPYTHON = ("-Wl,--disable-new-dtags", f"-Wl,-rpath,{LIBPYTHON.parent}")
 
 
 def unpacked(dist: Path, folder: Path) -> list[str]:
@@ -60,8 +78,7 @@ def run(host: Path, *arguments: str, under: tuple[str, ...] = (), **environment:
 
 @pytest.fixture
 def with_libpython(tmp_path: Path) -> Path:
-    """A host that finds this Python's libpython, as one does where it is installed."""
-    return compiled_host(tmp_path, "-Wl,--disable-new-dtags", f"-Wl,-rpath,{LIBPYTHON.parent}")
+    return compiled_host(tmp_path, *FINDS_LIBPYTHON)
 
 
 @needs_libpython
@@ -81,7 +98,6 @@ def test_path_with_special_characters_is_no_trap(dist: Path, tmp_path: Path, wit
 
 #: Makes every libpython unfindable, as on a machine that has none.
 NO_LIBPYTHON = """
-#define _GNU_SOURCE
 #include <dlfcn.h>
 #include <string.h>
 void *dlopen(const char *name, int flags) {
@@ -92,14 +108,122 @@ void *dlopen(const char *name, int flags) {
 
 
 def test_without_a_libpython_the_host_is_told_what_is_missing(dist: Path, tmp_path: Path):
-    host, source, shim = compiled_host(tmp_path), tmp_path / "shim.c", tmp_path / "shim.so"
-    source.write_text(NO_LIBPYTHON)
-    command = [str(compiler()), "-shared", "-fPIC", "-o", shim, source, "-ldl"]
-    subprocess.run(command, check=True)
-    process = run(host, *unpacked(dist, tmp_path), LD_PRELOAD=str(shim))
+    shim = preloaded(tmp_path, NO_LIBPYTHON)
+    process = run(compiled_host(tmp_path), *unpacked(dist, tmp_path), LD_PRELOAD=shim)
     assert process.returncode == 4
-    assert "[hosted] status 3, logStatusError: no Python in this process" in process.stdout
+    assert "[hosted] status 3, logStatusError: fmi2Instantiate: no Python" in process.stdout
     assert "libpython3.9 to libpython3.13" in process.stdout
+
+
+def libraries_of(program: Path) -> list[Path]:
+    """The shared libraries that a program is linked against."""
+    found = subprocess.run(["ldd", program], check=True, capture_output=True, text=True).stdout
+    return [Path(word) for word in found.split() if word.startswith("/")]
+
+
+@pytest.mark.skipif(
+    os.geteuid() != 0 or CHROOT is None, reason="only root may change the root folder"
+)
+def test_machine_with_nothing_but_a_c_library_tells_what_is_missing(dist: Path, tmp_path: Path):
+    host, arguments = compiled_host(tmp_path), unpacked(dist, tmp_path)
+    for library in libraries_of(host):
+        target = tmp_path / library.relative_to("/")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(library, target)
+    inside = [argument.replace(str(tmp_path), "") for argument in arguments]
+    process = run(Path("/host"), *inside, under=(str(CHROOT), str(tmp_path)))
+    assert process.returncode == 4
+    assert "libpython3.9 to libpython3.13" in process.stdout
+
+
+@needs_libpython
+@pytest.mark.parametrize("count", [2, 5])
+def test_threads_that_instantiate_at_the_same_moment(dist: Path, tmp_path: Path, count: int):
+    """One interpreter starts, whoever comes first."""
+    host = compiled_host(tmp_path, *FINDS_LIBPYTHON, name="threads")
+    arguments = unpacked(dist, tmp_path)[: 2 * count]
+    for _ in range(REPETITIONS):
+        process = run(host, *arguments)
+        assert (process.returncode, process.stdout) == (0, f"{count} threads\n"), process.stderr
+
+
+@needs_libpython
+@pytest.mark.parametrize(
+    "variable",
+    [
+        "PYTHONHOME=/nowhere", "PYTHONPATH=/nowhere", "PYTHONPLATLIBDIR=nowhere",
+        "PYTHONIOENCODING=nonsense", "PYTHONHASHSEED=nonsense", "PYTHONMALLOC=nonsense",
+        "PYTHONUTF8=nonsense", "PYTHONTRACEMALLOC=nonsense", "PYTHONINTMAXSTRDIGITS=1",
+        "PYTHONWARNINGS=error", "PATH=/nowhere", "LC_ALL=nonsense",
+    ],
+)  # fmt: skip
+def test_no_variable_keeps_python_from_starting(dist, tmp_path, with_libpython, variable: str):
+    name, value = variable.split("=")
+    process = run(with_libpython, *unpacked(dist, tmp_path)[:2], **{name: value})
+    assert process.returncode == 0, process.stdout + process.stderr
+
+
+#: A libpython that the host has for itself alone, and a watch over what must not be nested: the
+#: dynamic linker holds one lock while it goes through the libraries, another while it loads one.
+PRIVATE_PYTHON = """
+#include <dlfcn.h>
+#include <link.h>
+#include <stdlib.h>
+static _Thread_local int inside;
+static int (*visit)(struct dl_phdr_info *, size_t, void *);
+__attribute__((constructor)) static void load(void) {
+    if (dlopen(getenv("LIBPYTHON"), RTLD_LAZY | RTLD_LOCAL) == NULL) exit(42);
+}
+void *dlopen(const char *name, int flags) {
+    void *(*real)(const char *, int) = (void *(*)(const char *, int))dlsym(RTLD_NEXT, "dlopen");
+    if (inside) exit(43);
+    return real(name, flags);
+}
+static int visiting(struct dl_phdr_info *info, size_t size, void *data) {
+    inside = 1;
+    int done = visit(info, size, data);
+    inside = 0;
+    return done;
+}
+int dl_iterate_phdr(int (*callback)(struct dl_phdr_info *, size_t, void *), void *data) {
+    int (*real)(int (*)(struct dl_phdr_info *, size_t, void *), void *) =
+        (int (*)(int (*)(struct dl_phdr_info *, size_t, void *), void *))dlsym(
+            RTLD_NEXT, "dl_iterate_phdr");
+    visit = callback;
+    return real(visiting, data);
+}
+"""
+
+
+@needs_libpython
+def test_python_that_a_host_has_for_itself_is_used(dist: Path, tmp_path: Path):
+    """And no library is loaded while the dynamic linker goes through them."""
+    host, shim = compiled_host(tmp_path), preloaded(tmp_path, PRIVATE_PYTHON)
+    arguments = unpacked(dist, tmp_path)[:2]
+    process = run(host, *arguments, LD_PRELOAD=shim, LIBPYTHON=str(LIBPYTHON))
+    assert process.returncode == 0, process.stdout
+
+
+#: A slave of somebody else that says what it does.
+TALKATIVE = """
+from pythonfmu import Fmi2Slave
+
+class Talkative(Fmi2Slave):
+    def do_step(self, t, h):
+        print("a step")
+        return True
+"""
+
+
+@needs_libpython
+def test_what_a_slave_prints_is_there_when_the_host_ends(tmp_path: Path):
+    (tmp_path / "talkative.py").write_text(TALKATIVE)
+    fmpy.extract(build_own(tmp_path / "talkative.py", tmp_path), unzipdir=tmp_path / "fmu")
+    host = compiled_host(tmp_path, *FINDS_LIBPYTHON, name="threads")
+    folder = tmp_path / "fmu"
+    process = run(host, str(folder / "binaries/linux64/Talkative.so"), str(folder / "resources"))
+    assert process.stdout.count("a step\n") == 20
+    assert process.returncode == 0
 
 
 @needs_libpython

@@ -9,7 +9,16 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-_SOURCE = Path(__file__).with_name("loader.c")
+#: The sources; loader.h says what each is for.
+FOLDER = Path(__file__).parent
+
+#: How they are compiled, in their folder, into a library.
+FLAGS = (
+    "-std=gnu11", "-shared", "-fPIC", "-fvisibility=hidden", "-pthread",
+    # Python holds on to it, so it must stay until the process ends.
+    "-Wl,-z,nodelete",
+    *(path.name for path in sorted(FOLDER.glob("*.c"))), "-ldl",
+)  # fmt: skip
 
 #: Where PythonFMU's own library goes when the loader takes its name.
 _LINUX = "binaries/linux64/"
@@ -36,10 +45,8 @@ def compiled() -> bytes:
     with TemporaryDirectory(prefix="auv_fmu_loader_") as folder:
         library = Path(folder, "loader.so")
         process = subprocess.run(
-            [command, "-shared", "-fPIC", "-O2", "-s", "-fvisibility=hidden", "-Wall", "-Wextra",
-             # It has registered work for the end of the process, so it must stay until then.
-             "-Wl,-z,nodelete", "-Wl,--build-id=none", "-o", str(library), str(_SOURCE), "-ldl"],
-            capture_output=True, text=True, check=False,
+            [command, "-O2", "-s", "-Wl,--build-id=none", "-o", str(library), *FLAGS],
+            cwd=FOLDER, capture_output=True, text=True, check=False,
         )  # fmt: skip
         if process.returncode != 0:
             raise OSError(f"the native loader does not compile: {process.stderr.strip()}")

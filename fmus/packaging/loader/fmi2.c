@@ -1,0 +1,306 @@
+/* The functions of FMI 2.0: what is sound goes on to PythonFMU. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "loader.h"
+
+/* More values in one call than any FMU has. PythonFMU takes lists for granted that it cannot get.
+ */
+enum { MOST_VALUES = 1 << 20 };
+
+/* More bytes than any state has. */
+static const size_t MOST_BYTES = (size_t)1 << 30;
+
+static string wrong_size(size_t n, const void *array) {
+    if (n > MOST_VALUES) return "more values than there can be";
+    return n > 0 && array == NULL ? "no array" : NULL;
+}
+
+static string wrong_values(size_t n, const void *references, const void *values) {
+    return references == NULL ? wrong_size(n, NULL) : wrong_size(n, values);
+}
+
+static string wrong_strings(size_t n, const string texts[]) {
+    string wrong = wrong_size(n, texts);
+    for (size_t i = 0; i < n && wrong == NULL; i++) {
+        if (texts[i] == NULL) wrong = "a string is NULL";
+        else if (!is_utf8(texts[i])) wrong = "a string is not UTF-8";
+    }
+    return wrong;
+}
+
+/* What PythonFMU answers to a function of its own. */
+#define TO_PYTHONFMU(call, name, parameters, arguments)                                          \
+    do {                                                                                         \
+        static int(*forward) parameters;                                                         \
+        if (forward == NULL) forward = (int(*) parameters)pythonfmu_function(#name);             \
+        (call).status = forward == NULL ? FMI2_FATAL : forward arguments;                        \
+    } while (0)
+
+/* A function that is forwarded as it is if nothing is wrong with its arguments. */
+#define FORWARD(name, when, wrong, parameters, arguments)                                        \
+    EXPORT int name parameters {                                                                 \
+        call this = begin(c, #name, when);                                                       \
+        if (GOES_ON(this, wrong)) {                                                              \
+            c = this.instance->slave;                                                            \
+            TO_PYTHONFMU(this, name, parameters, arguments);                                     \
+        }                                                                                        \
+        return end(&this);                                                                       \
+    }
+
+EXPORT string fmi2GetTypesPlatform(void) { return "default"; }
+
+EXPORT string fmi2GetVersion(void) { return "2.0"; }
+
+/* Making and freeing */
+
+static void free_slave(component slave) {
+    ((void (*)(component))pythonfmu_function("fmi2FreeInstance"))(slave);
+}
+
+static component new_slave(instance *it, string guid, string path, int visible, char *why) {
+    typedef component (*instantiate)(string, int, string, string, const callbacks *, int, int);
+    instantiate forward = (instantiate)pythonfmu_function("fmi2Instantiate");
+    component slave = forward(it->host.name, CO_SIMULATION, guid, path, &it->heard, visible, 1);
+    /* PythonFMU's watch over an interpreter that it has not started: it would free it twice when
+     * the process ends. */
+    ((void (*)(void))pythonfmu_function("finalizePythonInterpreter"))();
+    if (exception(why) && slave != NULL) {
+        free_slave(slave);
+        slave = NULL;
+    }
+    if (slave == NULL) forget(path);
+    return slave;
+}
+
+static component new_component(instance *it, string guid, string path, int visible, char *why) {
+    component handle = NULL;
+    if (!loaded(why)) return NULL;
+    int lock = py.PyGILState_Ensure();
+    if (preflight(path, guid, why)) it->slave = new_slave(it, guid, path, visible, why);
+    if (it->slave != NULL) {
+        handle = new_handle(INSTANCE, it, NULL);
+        if (handle == NULL) free_slave(it->slave);
+    }
+    py.PyGILState_Release(lock);
+    return handle;
+}
+
+EXPORT component fmi2Instantiate(string name, int type, string guid, string location,
+                                 const callbacks *functions, int visible, int logging) {
+    char why[WHY] = "the slave cannot be made", *path = NULL;
+    string wrong = name == NULL              ? "the instance has no name"
+                   : !is_utf8(name)          ? "the name of the instance is not UTF-8"
+                   : type != CO_SIMULATION   ? "this FMU is for co-simulation only"
+                   : location == NULL        ? "there is no resource location"
+                   : guid && !is_utf8(guid) ? "the GUID is not UTF-8"
+                                             : NULL;
+    instance *it = new_instance(name != NULL && is_utf8(name) ? name : "?", functions, logging);
+    component handle = NULL;
+    if (it == NULL) return NULL;
+    if (wrong != NULL) {
+        snprintf(why, sizeof why, "%s", wrong);
+    } else if (plain_path(location, &path, why)) {
+        handle = new_component(it, guid, path, visible, why);
+    }
+    free(path);
+    if (handle == NULL) {
+        if (!it->host.told) complain(&it->host, FMI2_ERROR, "fmi2Instantiate: %s", why);
+        release_instance(it);
+    }
+    return handle;
+}
+
+static int free_state(instance *it, void *state) {
+    call this = {.instance = it};
+    TO_PYTHONFMU(this, fmi2FreeFMUstate, (component, void **), (it->slave, &state));
+    return this.status;
+}
+
+EXPORT void fmi2FreeInstance(component c) {
+    if (c == NULL) return;
+    call this = begin(c, "fmi2FreeInstance", ALWAYS);
+    void *state;
+    if (this.instance == NULL) return;
+    /* What is lost may have been freed by PythonFMU in part: it is left alone. */
+    int sound = this.instance->condition != LOST;
+    while ((state = state_of(c)) != NULL) {
+        if (sound) free_state(this.instance, thing_of(state, STATE));
+        drop(state);
+    }
+    if (sound) free_slave(this.instance->slave);
+    drop(c);
+    instance *it = this.instance;
+    end(&this);
+    release_instance(it);
+}
+
+EXPORT int fmi2Reset(component c) {
+    call this = begin(c, "fmi2Reset", ALWAYS);
+    if (GOES_ON(this, NULL)) {
+        TO_PYTHONFMU(this, fmi2Reset, (component), (this.instance->slave));
+        if (this.status == FMI2_OK) this.instance->condition = SOUND;
+    }
+    return end(&this);
+}
+
+/* Messages are chosen here: PythonFMU would keep errors back, too. */
+EXPORT int fmi2SetDebugLogging(component c, int on, size_t n, const string names[]) {
+    call this = begin(c, "fmi2SetDebugLogging", ALWAYS);
+    if (GOES_ON(this, wrong_strings(n, names)) && !choose(&this.instance->host, on, n, names)) {
+        refuse(&this, "no memory");
+    }
+    return end(&this);
+}
+
+/* Modes and steps */
+
+FORWARD(fmi2SetupExperiment, NOT_AFTER_ERROR, NULL,
+        (component c, int has_tolerance, double tolerance, double start, int has_stop, double stop),
+        (c, has_tolerance, tolerance, start, has_stop, stop))
+FORWARD(fmi2EnterInitializationMode, NOT_AFTER_ERROR, NULL, (component c), (c))
+FORWARD(fmi2ExitInitializationMode, NOT_AFTER_ERROR, NULL, (component c), (c))
+FORWARD(fmi2Terminate, NOT_AFTER_ERROR, NULL, (component c), (c))
+FORWARD(fmi2DoStep, NOT_AFTER_ERROR, NULL, (component c, double time, double step, int no_set),
+        (c, time, step, no_set))
+FORWARD(fmi2CancelStep, NOT_AFTER_ERROR, NULL, (component c), (c))
+
+/* Values */
+
+#define GET(name, type)                                                                          \
+    FORWARD(name, ALWAYS, wrong_values(n, r, v),                                                 \
+            (component c, const reference r[], size_t n, type v[]), (c, r, n, v))
+#define SET(name, type, wrong)                                                                   \
+    FORWARD(name, NOT_AFTER_ERROR, wrong, (component c, const reference r[], size_t n, type v[]), \
+            (c, r, n, v))
+
+GET(fmi2GetReal, double)
+GET(fmi2GetInteger, int)
+GET(fmi2GetBoolean, int)
+GET(fmi2GetString, string)
+SET(fmi2SetReal, const double, wrong_values(n, r, v))
+SET(fmi2SetInteger, const int, wrong_values(n, r, v))
+SET(fmi2SetBoolean, const int, wrong_values(n, r, v))
+SET(fmi2SetString, const string, r == NULL ? wrong_size(n, r) : wrong_strings(n, v))
+
+/* States */
+
+static string wrong_state(void *state) {
+    return thing_of(state, STATE) == NULL ? "not a live state of this FMU" : NULL;
+}
+
+/* Where there is a state or NULL. */
+static string wrong_place(void **state) {
+    return state == NULL ? "NULL" : *state == NULL ? NULL : wrong_state(*state);
+}
+
+/* Hands a state that PythonFMU has made over to the host, in the place of one that it has had. */
+static void hand_over(call *this, component owner, void *made, void **state) {
+    void *before = thing_of(*state, STATE);
+    if (this->status != FMI2_OK) return;
+    if (before != NULL) {
+        replace(*state, made, owner);
+        free_state(this->instance, before);
+    } else if ((*state = new_handle(STATE, made, owner)) == NULL) {
+        free_state(this->instance, made);
+        refuse(this, "no memory");
+    }
+}
+
+EXPORT int fmi2GetFMUstate(component c, void **state) {
+    call this = begin(c, "fmi2GetFMUstate", ALWAYS);
+    if (GOES_ON(this, wrong_place(state))) {
+        void *made = NULL;
+        TO_PYTHONFMU(this, fmi2GetFMUstate, (component, void **), (this.instance->slave, &made));
+        hand_over(&this, c, made, state);
+    }
+    return end(&this);
+}
+
+EXPORT int fmi2SetFMUstate(component c, void *state) {
+    call this = begin(c, "fmi2SetFMUstate", ALWAYS);
+    if (GOES_ON(this, wrong_state(state))) {
+        TO_PYTHONFMU(this, fmi2SetFMUstate, (component, void *),
+                     (this.instance->slave, thing_of(state, STATE)));
+        if (this.status == FMI2_OK) this.instance->condition = SOUND;
+    }
+    return end(&this);
+}
+
+EXPORT int fmi2FreeFMUstate(component c, void **state) {
+    call this = begin(c, "fmi2FreeFMUstate", ALWAYS);
+    if (GOES_ON(this, wrong_place(state)) && *state != NULL) {
+        void *object = thing_of(*state, STATE);
+        drop(*state);
+        *state = NULL;
+        this.status = free_state(this.instance, object);
+    }
+    return end(&this);
+}
+
+/* Both functions below ask for the size; the state must not go away between two questions. */
+static size_t size_of_state(call *this, void *object) {
+    size_t size = 0;
+    TO_PYTHONFMU(*this, fmi2SerializedFMUstateSize, (component, void *, size_t *),
+                 (this->instance->slave, object, &size));
+    return size;
+}
+
+EXPORT int fmi2SerializedFMUstateSize(component c, void *state, size_t *size) {
+    call this = begin(c, "fmi2SerializedFMUstateSize", ALWAYS);
+    if (GOES_ON(this, size == NULL ? "NULL" : wrong_state(state))) {
+        *size = size_of_state(&this, thing_of(state, STATE));
+    }
+    return end(&this);
+}
+
+/* PythonFMU copies as many bytes as it is told, however many there are. */
+EXPORT int fmi2SerializeFMUstate(component c, void *state, char bytes[], size_t size) {
+    call this = begin(c, "fmi2SerializeFMUstate", ALWAYS);
+    if (GOES_ON(this, bytes == NULL ? "NULL" : wrong_state(state))) {
+        void *object = thing_of(state, STATE);
+        py.Py_IncRef(object);
+        size_t needed = size_of_state(&this, object);
+        if (GOES_ON(this, size != needed ? "the size is not that of the state" : NULL)) {
+            TO_PYTHONFMU(this, fmi2SerializeFMUstate, (component, void *, char *, size_t),
+                         (this.instance->slave, object, bytes, size));
+        }
+        py.Py_DecRef(object);
+    }
+    return end(&this);
+}
+
+EXPORT int fmi2DeSerializeFMUstate(component c, const char bytes[], size_t size, void **state) {
+    call this = begin(c, "fmi2DeSerializeFMUstate", ALWAYS);
+    if (GOES_ON(this, bytes == NULL ? "NULL" : wrong_place(state)) &&
+        GOES_ON(this, size == 0 || size > MOST_BYTES ? "no state has that size" : NULL)) {
+        void *made = NULL;
+        TO_PYTHONFMU(this, fmi2DeSerializeFMUstate, (component, const char *, size_t, void **),
+                     (this.instance->slave, bytes, size, &made));
+        hand_over(&this, c, made, state);
+    }
+    return end(&this);
+}
+
+/* What PythonFMU has no answer to, or hardly one */
+
+FORWARD(fmi2GetDirectionalDerivative, ALWAYS, NULL,
+        (component c, const reference u[], size_t nu, const reference k[], size_t nk,
+         const double dk[], double du[]),
+        (c, u, nu, k, nk, dk, du))
+FORWARD(fmi2SetRealInputDerivatives, NOT_AFTER_ERROR, NULL,
+        (component c, const reference r[], size_t n, const int order[], const double v[]),
+        (c, r, n, order, v))
+FORWARD(fmi2GetRealOutputDerivatives, ALWAYS, NULL,
+        (component c, const reference r[], size_t n, const int order[], double v[]),
+        (c, r, n, order, v))
+
+#define STATUS(name, type)                                                                       \
+    FORWARD(name, ALWAYS, v == NULL ? "NULL" : NULL, (component c, int kind, type *v), (c, kind, v))
+
+STATUS(fmi2GetStatus, int)
+STATUS(fmi2GetRealStatus, double)
+STATUS(fmi2GetIntegerStatus, int)
+STATUS(fmi2GetBooleanStatus, int)
+STATUS(fmi2GetStringStatus, string)

@@ -1,0 +1,100 @@
+/* The instance that the host holds, and what every call begins and ends with.
+ *
+ * A call holds the global interpreter lock from its beginning to its end, and its instance is
+ * marked: a call of the same instance from another thread waits, one from the host's logger is
+ * refused.
+ */
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include "loader.h"
+
+/* Between two looks whether an instance is still in a call [us]. */
+enum { WAIT = 100 };
+
+/* The logger that PythonFMU gets. */
+static void hear(void *environment, string name, int status, string category, string text, ...) {
+    (void)name;
+    tell(environment, status, category, text);
+}
+
+instance *new_instance(string name, const callbacks *functions, int logging) {
+    instance *it = calloc(1, sizeof *it);
+    if (it == NULL) return NULL;
+    it->heard = (callbacks){.logger = hear, .environment = &it->host};
+    if (!listen(&it->host, name, functions, logging)) {
+        free(it);
+        return NULL;
+    }
+    return it;
+}
+
+void release_instance(instance *it) {
+    release_listener(&it->host);
+    free(it);
+}
+
+/* The instance behind a handle, when no other thread is in a call of it. */
+static instance *awaited(component handle) {
+    instance *it;
+    while ((it = thing_of(handle, INSTANCE)) != NULL && it->busy &&
+           !pthread_equal(it->thread, pthread_self())) {
+        void *thread = py.PyEval_SaveThread();
+        usleep(WAIT);
+        py.PyEval_RestoreThread(thread);
+    }
+    return it;
+}
+
+call begin(component handle, string function, when when) {
+    call this = {.function = function, .status = FMI2_ERROR};
+    instance *it = NULL;
+    if (python_runs()) {
+        this.lock = py.PyGILState_Ensure();
+        it = awaited(handle);
+        if (it == NULL || it->busy) py.PyGILState_Release(this.lock);
+    }
+    if (it == NULL || it->busy) {
+        /* There is nobody else to tell: a logger that calls would do so again. */
+        fprintf(stderr, "%s: %s\n", function,
+                it == NULL ? "not a live instance of this FMU" : "called by the logger");
+        return this;
+    }
+    this.instance = it;
+    it->busy = 1;
+    it->thread = pthread_self();
+    if (it->condition == LOST) {
+        this.status = FMI2_FATAL;
+    } else if (it->condition == SOUND || when == ALWAYS) {
+        this.status = FMI2_OK;
+    }
+    return this;
+}
+
+/* The arguments are wrong: the instance is in FMI's error state from now on. */
+int refuse(call *this, string wrong) {
+    this->status = FMI2_ERROR;
+    this->instance->condition = IN_ERROR;
+    complain(&this->instance->host, FMI2_ERROR, "%s: %s", this->function, wrong);
+    return 0;
+}
+
+int sound(call *this, string wrong) { return wrong == NULL || refuse(this, wrong); }
+
+int end(call *this) {
+    instance *it = this->instance;
+    char why[WHY];
+    if (it == NULL) return this->status;
+    /* PythonFMU leaves an exception where it does not look for one; a Python host would stumble
+     * over it later. */
+    if (exception(why) && this->status < FMI2_ERROR) refuse(this, why);
+    if (this->status == FMI2_FATAL && it->condition != LOST) {
+        it->condition = LOST;
+        if (!it->host.told) complain(&it->host, FMI2_FATAL, "%s: failed for good", this->function);
+    }
+    it->busy = 0;
+    py.PyGILState_Release(this->lock);
+    return this->status;
+}

@@ -1,0 +1,161 @@
+/* What the parts of the loader know of each other.
+ *
+ * python.c     finds Python and starts it, once a process
+ * preflight.c  has preflight.py find out whether PythonFMU can make an instance
+ * handles.c    tells what is alive from what is not
+ * messages.c   what the host is told
+ * text.c       UTF-8, and the resource location
+ * guard.c      the instance that the host holds, and what every call begins and ends with
+ * fmi2.c       the functions of FMI 2.0
+ *
+ * A function that can fail writes a reason into `why`, of WHY characters, and gives 0.
+ */
+#ifndef LOADER_H
+#define LOADER_H
+
+#include <pthread.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define EXPORT __attribute__((visibility("default")))
+
+enum { WHY = 1024 };
+
+/* FMI */
+
+enum { FMI2_OK, FMI2_WARNING, FMI2_DISCARD, FMI2_ERROR, FMI2_FATAL };
+enum { CO_SIMULATION = 1 };
+
+typedef void *component;
+typedef const char *string;
+typedef unsigned int reference;
+
+/* fmi2CallbackFunctions, of which only the logger is used. */
+typedef struct {
+    void (*logger)(void *, string, int, string, string, ...);
+    void *(*allocate)(size_t, size_t);
+    void (*release)(void *);
+    void (*step_finished)(void *, int);
+    void *environment;
+} callbacks;
+
+/* text.c */
+
+int is_utf8(string text);
+int plain_path(string uri, char **path, char *why);
+
+/* python.c */
+
+/* Of Python's functions those that are used here, under their own names. */
+#define PYTHON_FUNCTIONS(F)                                                                      \
+    F(int, Py_IsInitialized, (void))                                                             \
+    F(void, PyPreConfig_InitIsolatedConfig, (void *))                                            \
+    F(python_status, Py_PreInitialize, (const void *))                                           \
+    F(void, PyConfig_InitIsolatedConfig, (void *))                                               \
+    F(python_status, Py_InitializeFromConfig, (const void *))                                    \
+    F(void, PyConfig_Clear, (void *))                                                            \
+    F(void *, PyEval_SaveThread, (void))                                                         \
+    F(void, PyEval_RestoreThread, (void *))                                                      \
+    F(int, PyGILState_Ensure, (void))                                                            \
+    F(void, PyGILState_Release, (int))                                                           \
+    F(int, PyRun_SimpleStringFlags, (string, void *))                                            \
+    F(void *, PyRun_StringFlags, (string, int, void *, void *, void *))                          \
+    F(void *, PyDict_New, (void))                                                                \
+    F(void *, PyDict_GetItemString, (void *, string))                                            \
+    F(void *, PyObject_CallFunction, (void *, string, ...))                                      \
+    F(void *, PyObject_Repr, (void *))                                                           \
+    F(string, PyUnicode_AsUTF8, (void *))                                                        \
+    F(void *, PyErr_Occurred, (void))                                                            \
+    F(void, PyErr_Fetch, (void **, void **, void **))                                            \
+    F(void, PyErr_Clear, (void))                                                                 \
+    F(void, Py_IncRef, (void *))                                                                 \
+    F(void, Py_DecRef, (void *))
+
+typedef struct {
+    int type;
+    string function, message;
+    int exit_code;
+} python_status;
+
+#define DECLARE(type, name, parameters) type(*name) parameters;
+typedef struct {
+    PYTHON_FUNCTIONS(DECLARE)
+} python_functions;
+#undef DECLARE
+
+extern python_functions py;
+
+int loaded(char *why);
+int python_runs(void);
+void *pythonfmu_function(string name);
+uint64_t next_serial(void);
+int exception(char *why);
+
+/* The global interpreter lock is the only lock of what follows. */
+
+/* preflight.c */
+
+int preflight(string resources, string guid, char *why);
+void forget(string resources);
+
+/* handles.c */
+
+typedef enum { FREE, INSTANCE, STATE } kind;
+
+void *new_handle(kind kind, void *thing, void *owner);
+void *thing_of(void *handle, kind kind);
+void replace(void *handle, void *thing, void *owner);
+void drop(void *handle);
+void *state_of(void *owner);
+
+/* messages.c */
+
+typedef struct {
+    callbacks host;
+    char *name;
+    int logging;
+    size_t n;
+    char **categories;
+    int told; /* whether the host has got a message of an error */
+} listener;
+
+int listen(listener *host, string name, const callbacks *functions, int logging);
+int choose(listener *host, int logging, size_t n, const string categories[]);
+void release_listener(listener *host);
+void tell(listener *host, int status, string category, string text);
+void complain(listener *host, int status, string format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+/* guard.c */
+
+typedef struct {
+    listener host;
+    callbacks heard; /* what PythonFMU gets for callbacks */
+    component slave; /* PythonFMU's own instance */
+    enum { SOUND, IN_ERROR, LOST } condition;
+    int busy;
+    pthread_t thread; /* that is in a call */
+} instance;
+
+/* A call between its beginning and its end. */
+typedef struct {
+    instance *instance; /* NULL: there is none, and no lock to give back */
+    string function;
+    int status;
+    int lock;
+} call;
+
+/* Whether a call is let through in FMI's error state. */
+typedef enum { NOT_AFTER_ERROR, ALWAYS } when;
+
+/* Whether a call may be forwarded: only then it is looked at what is wrong with its arguments. */
+#define GOES_ON(call, wrong) ((call).status == FMI2_OK && sound(&(call), wrong))
+
+instance *new_instance(string name, const callbacks *functions, int logging);
+void release_instance(instance *it);
+call begin(component handle, string function, when when);
+int sound(call *this, string wrong);
+int refuse(call *this, string wrong);
+int end(call *this);
+
+#endif

@@ -1,0 +1,53 @@
+/* Has preflight.py find out whether PythonFMU can make an instance: it would end the process. */
+#include <stdio.h>
+
+#include "loader.h"
+
+enum { FILE_INPUT = 257 };
+
+extern const char source[] __attribute__((visibility("hidden")));
+__asm__(".pushsection .rodata\n"
+        "source: .incbin \"preflight.py\"\n"
+        ".byte 0\n"
+        ".popsection\n");
+
+/* A function of preflight.py; NULL with an exception set. */
+static void *function(string name) {
+    static void *namespace;
+    if (namespace == NULL) {
+        void *fresh = py.PyDict_New();
+        void *done =
+            fresh == NULL ? NULL : py.PyRun_StringFlags(source, FILE_INPUT, fresh, fresh, NULL);
+        if (done == NULL) {
+            py.Py_DecRef(fresh);
+            return NULL;
+        }
+        py.Py_DecRef(done);
+        namespace = fresh;
+    }
+    return py.PyDict_GetItemString(namespace, name);
+}
+
+int preflight(string resources, string guid, char *why) {
+    void *refusal = function("refusal");
+    void *words = refusal == NULL
+                      ? NULL
+                      : py.PyObject_CallFunction(refusal, "ss", resources, guid != NULL ? guid : "");
+    string text = words == NULL ? NULL : py.PyUnicode_AsUTF8(words);
+    int good = text != NULL && text[0] == '\0';
+    if (text != NULL) {
+        snprintf(why, WHY, "%s", text);
+    } else if (!exception(why)) {
+        snprintf(why, WHY, "the loader is broken");
+    }
+    py.Py_DecRef(words);
+    return good;
+}
+
+/* Takes a resources folder off sys.path, where PythonFMU leaves it. */
+void forget(string resources) {
+    char why[WHY];
+    void *forget = function("forget");
+    if (forget != NULL) py.Py_DecRef(py.PyObject_CallFunction(forget, "s", resources));
+    exception(why);
+}

@@ -1,0 +1,549 @@
+"""What no slave can be told: wrong pointers, dead handles, text that is none, FMUs without a slave.
+
+None of it may end the host. Each test is one class of mistakes, on one small FMU: the guard is the
+loader's, and the same for all.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import shutil
+import sys
+import threading
+from collections.abc import Iterator
+from ctypes import c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import pytest
+
+from fmus.packaging.loader import compiler
+from fmus.packaging.own import build_own
+from support.raw_fmi import (
+    DISCARD,
+    ERROR,
+    FATAL,
+    MODEL_EXCHANGE,
+    OK,
+    RawFmu,
+)  # fmt: skip
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
+
+#: A Real input and the String parameter of the controller, and what is no UTF-8.
+NOT_UTF8 = [b"\xff", b"\xc0\xaf", b"\xed\xa0\x80", b"\xf4\x90\x80\x80", b"\xe2\x82", b"\x80"]
+
+
+@pytest.fixture(scope="module")
+def folder(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    target = tmp_path_factory.mktemp("guarded")
+    fmpy.extract(dist / "ObserverController.fmu", unzipdir=target)
+    return target
+
+
+@pytest.fixture
+def fmu(folder: Path) -> RawFmu:
+    return RawFmu(folder)
+
+
+@pytest.fixture
+def component(fmu: RawFmu) -> Iterator[int]:
+    made = fmu.initialised()
+    yield made
+    fmu.FreeInstance(made)
+
+
+def reference(folder: Path, name: str) -> Any:
+    [found] = (
+        variable.valueReference
+        for variable in fmpy.read_model_description(folder).modelVariables
+        if variable.name == name
+    )
+    return (c_uint * 1)(found)
+
+
+def steps(fmu: RawFmu, component: int) -> int:
+    status: int = fmu.DoStep(component, 0.0, 0.02, 1)
+    return status
+
+
+# Instances
+
+
+@pytest.mark.parametrize(
+    ("what", "arguments"),
+    [
+        ("has no name", {"name": None}),
+        *(("name of the instance is not UTF-8", {"name": b"a" + bad}) for bad in NOT_UTF8),
+        ("GUID is not UTF-8", {"guid": b"\xff"}),
+        ("is not that of this FMU", {"guid": b"{00000000-0000-0000-0000-000000000000}"}),
+        ("co-simulation only", {"kind": MODEL_EXCHANGE}),
+        ("co-simulation only", {"kind": 77}),
+        ("no resource location", {"location": None}),
+        ("not UTF-8", {"location": b"file:///tmp/%ff"}),
+        ("zero byte", {"location": b"file:///tmp%00/x"}),
+        ("%%20", {"location": b"file:///tmp/a%2520b"}),
+        ("No such file", {"location": b"file:///nowhere"}),
+        ("slavemodule.txt", {"location": b"file://"}),
+        ("File name too long", {"location": b"file:///" + 100_000 * b"x"}),
+    ],
+)
+def test_instance_that_cannot_be_is_null_with_one_message(fmu, what, arguments):
+    before = list(sys.path)
+    assert fmu.instantiate(**arguments, logging=0) is None
+    [message] = fmu.messages
+    assert what in message.text
+    assert (message.status, message.category) == (ERROR, "logStatusError")
+    assert sys.path == before
+
+
+def test_guid_is_that_of_the_description_or_not_stated(fmu: RawFmu, folder: Path):
+    stated = fmpy.read_model_description(folder).guid.encode()
+    for guid in (None, b"", stated):
+        made = fmu.instantiate(guid=guid)
+        assert made
+        fmu.FreeInstance(made)
+    assert fmu.messages == []
+
+
+@pytest.mark.parametrize(
+    ("files", "what"),
+    [
+        ({"slavemodule.txt": None}, "slavemodule.txt"),
+        ({"slavemodule.txt": b""}, "names no module"),
+        ({"slavemodule.txt": b"../x"}, "names no module"),
+        ({"slavemodule.txt": b"\xff\xfe\x00"}, "UnicodeDecodeError"),
+        ({"slavemodule.txt": b"absent"}, "absent.py"),
+        ({"slavemodule.txt": b"os", "os.py": b"x = 1"}, "another module os"),
+        ({"guid.txt": None}, "guid.txt"),
+        ({"{script}.py": None}, ".py"),
+        ({"slavemodule.txt": b"guarded_a", "guarded_a.py": b""}, "holds no slave"),
+        ({"slavemodule.txt": b"guarded_b", "guarded_b.py": b"class A: pass"}, "holds no slave"),
+        ({"slavemodule.txt": b"guarded_c", "guarded_c.py": b"x = ("}, "SyntaxError"),
+        ({"slavemodule.txt": b"guarded_d", "guarded_d.py": b"\xff\xfe\xfd"}, "SyntaxError"),
+        ({"slavemodule.txt": b"guarded_e", "guarded_e.py": b"x = 1\0"}, "Error"),
+        ({"slavemodule.txt": b"guarded_f", "guarded_f.py": b"raise SystemExit(3)"}, "SystemExit"),
+        ({"slavemodule.txt": b"guarded_g", "guarded_g.py": b"import no_such"}, "no_such"),
+        ({"slavemodule.txt": b"guarded_h", "guarded_h.py": b"1 / 0 # \xc3\xbc"}, "ZeroDivision"),
+        ({"slavemodule.txt": b"guarded_i",
+          "guarded_i.py": b"class Fmi2Slave: pass\nclass A(Fmi2Slave):\n"
+                          b"    def __init__(self, **_): raise ValueError('not today')"},
+         "not today"),
+        ({"slavemodule.txt": b"guarded_j",
+          "guarded_j.py": b"class Fmi2Slave: pass\nclass A(Fmi2Slave):\n"
+                          b"    def __init__(self, **_): pass"},
+         "_get_log_queue"),
+        ({"slavemodule.txt": b"guarded_k",
+          "guarded_k.py": b"class Fmi2Slave: pass\nclass A(Fmi2Slave):\n"
+                          b"    def __init__(self, **_): pass\n"
+                          b"    def _get_log_queue(self): return []\n"
+                          b"if __name__ != 'guarded_k' or globals() is not locals(): 1 / 0"},
+         "exception set"),
+    ],
+)  # fmt: skip
+def test_folder_without_a_slave_is_null_with_one_message(fmu, folder, tmp_path, files, what):
+    resources = tmp_path / "resources"
+    shutil.copytree(folder / "resources", resources)
+    script = (resources / "slavemodule.txt").read_text()
+    for name, content in files.items():
+        path = resources / name.format(script=script)
+        path.unlink(missing_ok=True)
+        if content is not None:
+            path.write_bytes(content)
+    before = list(sys.path)
+    assert fmu.instantiate(location=resources.as_uri().encode(), logging=0) is None
+    [message] = fmu.messages
+    assert what in message.text
+    assert message.status in (ERROR, FATAL)
+    assert sys.path == before
+    made = fmu.instantiate()
+    assert made, "the sound one still works"
+    fmu.FreeInstance(made)
+
+
+def test_library_beside_the_loader_is_found_where_the_loader_was(folder, tmp_path, monkeypatch):
+    """A host may load by a path from the current folder, and then go elsewhere."""
+    libraries = "binaries/linux64"
+    for name in ("ours", "theirs"):
+        shutil.copytree(folder / libraries, tmp_path / name / libraries)
+    (tmp_path / "theirs" / libraries / "ObserverController_pythonfmu.so").write_text("planted")
+    monkeypatch.chdir(tmp_path / "ours")
+    fmu = RawFmu(Path())
+    monkeypatch.chdir(tmp_path / "theirs")
+    made = fmu.instantiate(location=(folder / "resources").as_uri().encode())
+    assert made, fmu.messages
+    fmu.FreeInstance(made)
+
+
+@pytest.mark.parametrize("logger", [False, True])
+def test_host_without_a_logger_is_survived(fmu: RawFmu, capfd, logger: bool):
+    nothing = (c_void_p * 5)() if logger else None
+    made = fmu.instantiate(callbacks=nothing)
+    assert fmu.SetReal(made, None, 1, None) == ERROR
+    fmu.FreeInstance(made)
+    assert "raw: logStatusError: fmi2SetReal: no array" in capfd.readouterr().err
+
+
+# Arguments
+
+ONE = (c_uint * 1)(0)
+REALS, INTEGERS = (c_double * 2)(), (c_int * 2)()
+STRINGS = (c_char_p * 1)(b"tanh")
+TOO_MANY = 2**31
+
+#: Function, arguments that cannot be forwarded.
+WRONG = [
+    *(
+        (f"{verb}{kind}", arguments)
+        for kind, values in (("Real", REALS), ("Integer", INTEGERS), ("Boolean", INTEGERS),
+                             ("String", STRINGS))
+        for verb in ("Get", "Set")
+        for arguments in ((None, 1, values), (ONE, 1, None), (None, 1, None),
+                          (ONE, TOO_MANY, values), (ONE, 2**64 - 1, values))
+    ),
+    ("SetString", (ONE, 1, (c_char_p * 1)())),
+    *(("SetString", (ONE, 1, (c_char_p * 1)(bad))) for bad in NOT_UTF8),
+    ("SetDebugLogging", (1, 1, None)),
+    ("SetDebugLogging", (1, 1, (c_char_p * 1)())),
+    ("SetDebugLogging", (1, 1, (c_char_p * 1)(b"\xff"))),
+    ("SetDebugLogging", (1, TOO_MANY, STRINGS)),
+    ("GetFMUstate", (None,)),
+    ("GetFMUstate", (c_void_p(4711),)),
+    ("SetFMUstate", (None,)),
+    ("SetFMUstate", (4711,)),
+    ("FreeFMUstate", (None,)),
+    ("FreeFMUstate", (c_void_p(4711),)),
+    ("SerializedFMUstateSize", (None, c_size_t())),
+    ("SerializedFMUstateSize", (4711, c_size_t())),
+    ("SerializedFMUstateSize", (None, None)),
+    ("SerializeFMUstate", (None, b"", 0)),
+    ("SerializeFMUstate", (4711, b"0123", 4)),
+    ("DeSerializeFMUstate", (None, 4, c_void_p())),
+    ("DeSerializeFMUstate", (b"{}", 2, None)),
+    ("DeSerializeFMUstate", (b"{}", 2, c_void_p(4711))),
+    ("DeSerializeFMUstate", (b"", 0, c_void_p())),
+    ("DeSerializeFMUstate", (b"{}", 2**63, c_void_p())),
+    *((f"Get{kind}Status", (2, None)) for kind in ("", "Real", "Integer", "Boolean", "String")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("function", "arguments"), WRONG)
+def test_wrong_argument_is_an_error_with_one_message(fmu, component, function, arguments):
+    assert getattr(fmu, function)(component, *arguments) == ERROR
+    [message] = fmu.messages
+    assert message.text.startswith(f"fmi2{function}: ")
+    assert (message.status, message.category) == (ERROR, "logStatusError")
+
+
+def test_no_values_need_no_arrays(fmu: RawFmu, component: int):
+    for kind in ("Real", "Integer", "Boolean", "String"):
+        for verb in ("Get", "Set"):
+            assert getattr(fmu, f"{verb}{kind}")(component, None, 0, None) == OK
+    assert fmu.SetDebugLogging(component, 1, 0, None) == OK
+    assert steps(fmu, component) == OK
+    assert fmu.messages == []
+
+
+def in_error(fmu: RawFmu, component: int) -> None:
+    assert fmu.SetReal(component, None, 1, None) == ERROR
+
+
+def test_error_state_lets_through_what_does_not_go_on(fmu, folder, component):
+    """Values and states can be read, nothing can be set or stepped, until reset or restored."""
+    gain = reference(folder, "k_d")
+    state, value = c_void_p(), (c_double * 1)(1.0)
+    assert fmu.GetFMUstate(component, state) == OK
+    in_error(fmu, component)
+    for kind, values in (("Real", value), ("Integer", INTEGERS), ("Boolean", INTEGERS),
+                         ("String", STRINGS)):  # fmt: skip
+        assert getattr(fmu, f"Set{kind}")(component, gain, 1, values) == ERROR
+    assert fmu.SetupExperiment(component, 0, 0.0, 0.0, 0, 0.0) == ERROR
+    for function in ("EnterInitializationMode", "ExitInitializationMode", "Terminate",
+                     "CancelStep"):  # fmt: skip
+        assert getattr(fmu, function)(component) == ERROR
+    assert steps(fmu, component) == ERROR
+    before = value[0]
+    assert fmu.GetReal(component, gain, 1, value) == OK
+    assert value[0] != before
+    other, size = c_void_p(), c_size_t()
+    assert fmu.GetFMUstate(component, other) == OK
+    assert fmu.SerializedFMUstateSize(component, other, size) == OK
+    assert fmu.FreeFMUstate(component, other) == OK
+    assert fmu.SetFMUstate(component, state) == OK
+    assert steps(fmu, component) == OK
+    in_error(fmu, component)
+    assert fmu.Reset(component) == OK
+    assert fmu.SetupExperiment(component, 0, 0.0, 0.0, 0, 0.0) == OK
+
+
+# What is not alive
+
+#: Everything that takes a component, with arguments that are right, or that nobody may look at.
+CALLS = {
+    **{f"{verb}{kind}": (ONE, 1, values)
+       for kind, values in (("Real", REALS), ("Integer", INTEGERS), ("Boolean", INTEGERS),
+                            ("String", STRINGS))
+       for verb in ("Get", "Set")},
+    "SetDebugLogging": (1, 0, None),
+    "SetupExperiment": (0, 0.0, 0.0, 0, 0.0),
+    "EnterInitializationMode": (),
+    "ExitInitializationMode": (),
+    "Terminate": (),
+    "Reset": (),
+    "GetFMUstate": (c_void_p(),),
+    "SetFMUstate": (4711,),
+    "FreeFMUstate": (c_void_p(4711),),
+    "SerializedFMUstateSize": (4711, c_size_t()),
+    "SerializeFMUstate": (4711, b"0123", 4),
+    "DeSerializeFMUstate": (b"{}", 2, c_void_p()),
+    "GetDirectionalDerivative": (ONE, 1, ONE, 1, REALS, REALS),
+    "SetRealInputDerivatives": (ONE, 1, INTEGERS, REALS),
+    "GetRealOutputDerivatives": (ONE, 1, INTEGERS, REALS),
+    "DoStep": (0.0, 0.02, 1),
+    "CancelStep": (),
+    **{f"Get{kind}Status": (2, values)
+       for kind, values in (("", INTEGERS), ("Real", REALS), ("Integer", INTEGERS),
+                            ("Boolean", INTEGERS), ("String", STRINGS))},
+}  # fmt: skip
+
+
+def dead(fmu: RawFmu) -> dict[str, int | None]:
+    """Components that are none."""
+    freed, state = fmu.initialised(), c_void_p()
+    fmu.FreeInstance(freed)
+    alive = fmu.initialised()
+    assert fmu.GetFMUstate(alive, state) == OK
+    return {
+        "NULL": None,
+        "freed": freed,
+        "a state": state.value,
+        "next to one": alive + 1,
+        "an address": ctypes.addressof(REALS),
+        "all bits": 2**64 - 1,
+    }
+
+
+def test_no_function_touches_what_is_not_alive(fmu: RawFmu, capfd):
+    for what, component in dead(fmu).items():
+        capfd.readouterr()
+        for function, arguments in CALLS.items():
+            assert getattr(fmu, function)(component, *arguments) == ERROR, (what, function)
+            expected = f"fmi2{function}: not a live instance of this FMU\n"
+            assert capfd.readouterr().err == expected
+        fmu.FreeInstance(component)
+    assert fmu.messages == []
+
+
+def test_handle_of_another_fmu_is_told_from_ones_own(fmu: RawFmu, dist: Path, tmp_path: Path):
+    fmpy.extract(dist / "MotionPlanner.fmu", unzipdir=tmp_path)
+    other = RawFmu(tmp_path)
+    theirs, ours = other.initialised(), fmu.initialised()
+    assert steps(fmu, theirs) == ERROR
+    state = c_void_p()
+    assert other.GetFMUstate(theirs, state) == OK
+    assert fmu.SetFMUstate(ours, state) == ERROR
+    fmu.FreeInstance(theirs)
+    assert steps(other, theirs) == OK
+    other.FreeInstance(theirs)
+    fmu.FreeInstance(ours)
+
+
+def test_freed_state_and_its_copies_are_dead(fmu: RawFmu, component: int):
+    state = c_void_p()
+    assert fmu.GetFMUstate(component, state) == OK
+    copy = c_void_p(state.value)
+    assert fmu.FreeFMUstate(component, state) == OK
+    assert state.value is None
+    assert fmu.FreeFMUstate(component, state) == OK, "there is nothing to free"
+    assert fmu.SetFMUstate(component, copy) == ERROR
+    assert fmu.FreeFMUstate(component, copy) == ERROR
+    assert fmu.GetFMUstate(component, copy) == ERROR
+
+
+def test_states_end_with_their_instance(fmu: RawFmu, component: int):
+    other, state = fmu.initialised(), c_void_p()
+    assert fmu.GetFMUstate(other, state) == OK
+    assert fmu.SetFMUstate(component, state) == OK
+    fmu.FreeInstance(other)
+    assert fmu.SetFMUstate(component, state) == ERROR
+
+
+def test_state_that_is_given_is_used_again(fmu: RawFmu, component: int):
+    """And holds what it is now."""
+    first, kept = c_void_p(), c_void_p()
+    assert fmu.GetFMUstate(component, first) == OK
+    before = first.value
+
+    def again(times: int) -> int:
+        for _ in range(times):
+            assert steps(fmu, component) == OK
+            assert fmu.GetFMUstate(component, first) == OK
+        gc.collect()
+        return sys.getallocatedblocks()
+
+    blocks = again(100)
+    assert again(500) - blocks < 500, "less than one object a call"
+    assert first.value == before
+    assert fmu.GetFMUstate(component, kept) == OK
+    assert serialised(fmu, component, first) == serialised(fmu, component, kept)
+
+
+def serialised(fmu: RawFmu, component: int, state: c_void_p) -> bytes:
+    size = c_size_t()
+    assert fmu.SerializedFMUstateSize(component, state, size) == OK
+    content = ctypes.create_string_buffer(size.value)
+    assert fmu.SerializeFMUstate(component, state, content, size) == OK
+    return content.raw
+
+
+@pytest.mark.parametrize("difference", [-1, 1, 1000, 2**40])
+def test_size_is_that_of_the_state(fmu: RawFmu, component: int, difference: int):
+    """PythonFMU copies as many bytes as it is told, whatever lies behind the state."""
+    state = c_void_p()
+    assert fmu.GetFMUstate(component, state) == OK
+    size = len(serialised(fmu, component, state))
+    content = ctypes.create_string_buffer(size + 1000)
+    assert fmu.SerializeFMUstate(component, state, content, size + difference) == ERROR
+    assert content.raw == bytes(size + 1000)
+
+
+# Calls within calls
+
+
+def test_logger_that_calls_back_is_refused(fmu: RawFmu, component: int, capfd):
+    answers = []
+
+    def call() -> None:
+        answers.append(steps(fmu, component))
+        fmu.FreeInstance(component)
+
+    fmu.when_told = call
+    in_error(fmu, component)
+    fmu.when_told = lambda: None
+    assert answers == [ERROR]
+    assert "fmi2FreeInstance: called by the logger" in capfd.readouterr().err
+    assert fmu.Reset(component) == OK
+
+
+def test_threads_on_one_instance_take_turns(fmu: RawFmu, component: int):
+    answers: list[int] = []
+
+    def run() -> None:
+        for _ in range(200):
+            state = c_void_p()
+            answers.append(fmu.GetFMUstate(component, state))
+            answers.append(fmu.FreeFMUstate(component, state))
+            answers.append(fmu.DoStep(component, 0.0, 0.02, 1))
+
+    threads = [threading.Thread(target=run) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert answers == [OK] * (4 * 200 * 3)
+
+
+# Slaves of other people
+
+FOREIGN = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real, String
+from pythonfmu.enums import Fmi2Status
+
+class Foreign(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.x, self.s = 1.0, "text"
+        self.register_variable(Real("x", causality=Fmi2Causality.output))
+        discrete = Fmi2Variability.discrete
+        self.register_variable(String("s", causality=Fmi2Causality.output, variability=discrete))
+
+    def exit_initialization_mode(self):
+        self.log("50% of 100%d", Fmi2Status.warning)
+
+    def do_step(self, t, h):
+        if t == 1.0:
+            raise ValueError("not at one")
+        if t == 2.0:
+            self.x = "no number"
+        if t == 3.0:
+            self.s = "\\udcff"
+            self.log("\\udcff and \\u00fc", Fmi2Status.warning)
+        return True
+"""
+
+
+@pytest.fixture(scope="module")
+def foreign_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("foreign")
+    (folder / "foreign_slave.py").write_text(FOREIGN)
+    fmpy.extract(build_own(folder / "foreign_slave.py", folder), unzipdir=folder / "unpacked")
+    return folder / "unpacked"
+
+
+@pytest.fixture
+def foreign(foreign_folder: Path) -> RawFmu:
+    return RawFmu(foreign_folder)
+
+
+def test_percent_signs_arrive_as_a_format_that_prints_them(foreign: RawFmu):
+    foreign.FreeInstance(foreign.initialised())
+    [message] = foreign.messages
+    assert message.text == "50%% of 100%%d"
+    assert message.category == "logStatusWarning"
+
+
+def test_categories_choose_messages_but_not_errors(foreign: RawFmu):
+    for categories, heard in (([b"logStatusWarning"], 1), ([b"logEvents", b"x"], 0)):
+        foreign.messages.clear()
+        made = foreign.instantiate(logging=0)
+        chosen = (c_char_p * len(categories))(*categories)
+        assert foreign.SetDebugLogging(made, 1, len(categories), chosen) == OK
+        foreign.SetupExperiment(made, 0, 0.0, 0.0, 0, 0.0)
+        foreign.EnterInitializationMode(made)
+        foreign.ExitInitializationMode(made)
+        assert len(foreign.messages) == heard
+        assert foreign.DoStep(made, 1.0, 0.1, 1) == FATAL
+        assert "not at one" in foreign.messages[-1].text
+        foreign.FreeInstance(made)
+
+
+def test_after_fatal_nobody_is_called(foreign: RawFmu):
+    made, other, state = foreign.initialised(), foreign.initialised(), c_void_p()
+    assert foreign.GetFMUstate(made, state) == OK
+    foreign.messages.clear()
+    assert foreign.DoStep(made, 1.0, 0.1, 1) == FATAL
+    [message] = foreign.messages
+    assert "ValueError('not at one')" in message.text
+    for function, arguments in CALLS.items():
+        assert getattr(foreign, function)(made, *arguments) == FATAL, function
+    foreign.FreeInstance(made)
+    assert foreign.DoStep(made, 0.0, 0.1, 1) == ERROR, "freed, and nothing more"
+    assert foreign.DoStep(other, 0.0, 0.1, 1) == OK
+    foreign.FreeInstance(other)
+
+
+def test_value_of_another_type_is_told_in_the_call_that_meets_it(foreign, foreign_folder):
+    made, value = foreign.initialised(), (c_double * 1)()
+    x = reference(foreign_folder, "x")
+    assert foreign.GetReal(made, x, 1, value) == OK
+    assert foreign.DoStep(made, 2.0, 0.1, 1) == OK
+    assert foreign.GetReal(made, x, 1, value) in (ERROR, FATAL)
+    assert "fmi2GetReal" in foreign.messages[-1].text or "getReal" in foreign.messages[-1].text
+    foreign.FreeInstance(made)
+
+
+def test_text_of_a_slave_that_cannot_be_encoded_is_survived(foreign, foreign_folder):
+    made, value = foreign.initialised(), (c_char_p * 1)()
+    foreign.messages.clear()
+    assert foreign.DoStep(made, 3.0, 0.1, 1) == OK
+    assert [message.text for message in foreign.messages] == ["? and ü"]
+    assert foreign.GetString(made, reference(foreign_folder, "s"), 1, value) == OK
+    assert value[0] == b"?"
+    foreign.FreeInstance(made)
+
+
+def test_refusal_of_a_step_is_no_error(fmu: RawFmu, component: int):
+    assert fmu.DoStep(component, 0.0, -1.0, 1) == DISCARD
+    assert steps(fmu, component) == OK
