@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from random import Random
 
 from fuzz.model import Model, keep
@@ -58,7 +59,9 @@ _ON_NOTHING = ("fmi2DoStep", "fmi2Reset", "fmi2EnterInitializationMode", "fmi2Ge
 class _World:
     """What a sequence has come to, as far as the model knows."""
 
-    def __init__(self, random: Random, fmus: Mapping[str, Description], foreign: bytes) -> None:
+    def __init__(
+        self, random: Random, fmus: Mapping[str, Description], foreign: Mapping[str, bytes]
+    ) -> None:
         self.random, self.fmus, self.foreign = random, fmus, foreign
         self.known: dict[str, Model | None] = dict.fromkeys(fmus)
         self.freed_once: set[str] = set()
@@ -95,7 +98,9 @@ class _World:
         own = sorted(slot for slot in self.models if slot.startswith(f"{name}."))
         foreign = sorted(s for s in self.models if s not in own and s.split(".")[0] in same)
         freed = sorted(
-            s for s in self.freed if (s.split(".")[0] in same if others else s.startswith(f"{name}."))
+            s
+            for s in self.freed
+            if (s.split(".")[0] in same if others else s.startswith(f"{name}."))
         )
         return Draw(
             self.random,
@@ -103,14 +108,14 @@ class _World:
             own,
             foreign if others else [],
             freed,
-            self.foreign,
+            self.foreign[self.fmus[name].name],
             0.0 if known is None else known.time,
             f"{name}.",
         )
 
 
 def generated(
-    seed: int, fmu: str, descriptions: Mapping[str, Description], foreign: bytes
+    seed: int, fmu: str, descriptions: Mapping[str, Description], foreign: Mapping[str, bytes]
 ) -> Sequence_:
     """The sequence of a seed.
 
@@ -118,7 +123,7 @@ def generated(
         seed: of everything that is drawn.
         fmu: that it is about.
         descriptions: of this FMU and those that may run beside it.
-        foreign: a serialised state of another FMU.
+        foreign: to each of them, a serialised state of another.
 
     """
     random = Random(f"{seed} {fmu}")
@@ -164,9 +169,10 @@ def _call(world: _World, name: str, others: bool) -> Call:
         call = _extreme(draw)
         if call is not None:
             return call
-    sensible = random.random() < SENSIBLE
-    keys = [key for key in _ALPHABET if not sensible or _is_good(known, key)]
-    weights = [_weight(known, key) if sensible else min(_WEIGHTS.get(key, 1), 1) for key in keys]
+    keys, weights = _ALPHABET, _RARELY
+    if random.random() < SENSIBLE:
+        stuck = known.in_error or bool(known.blocks) or known.mode == "terminated"
+        keys, weights = _good_keys(known.state), _weights(known.state, stuck)
     while True:
         [key] = random.choices(keys, weights)
         arguments = CASES[key](draw)
@@ -174,16 +180,22 @@ def _call(world: _World, name: str, others: bool) -> Call:
             return Call(*key, arguments)
 
 
-def _is_good(known: Model, key: tuple[str, str]) -> bool:
-    cell = rows()[key].cells[known.state]
-    return cell.answer.name in ("OK", "new", "restored")
+@cache
+def _good_keys(state: str) -> list[tuple[str, str]]:
+    """What is answered well in a state."""
+    good = ("OK", "new", "restored")
+    return [key for key in _ALPHABET if rows()[key].cells[state].answer.name in good]
 
 
-def _weight(known: Model, key: tuple[str, str]) -> float:
-    weight = _WEIGHTS.get(key, 1)
-    stuck = known.in_error or bool(known.blocks) or known.mode == "terminated"
-    out = key[0] == "fmi2Reset" or key == ("fmi2SetFMUstate", "a state")
-    return weight + 10 if stuck and out else weight
+@cache
+def _weights(state: str, stuck: bool) -> list[float]:
+    """How likely each of these is; where an instance is stuck, what gets it out is likelier."""
+    out = {("fmi2Reset", ""): 10.0, ("fmi2SetFMUstate", "a state"): 10.0}
+    return [_WEIGHTS.get(key, 1.0) + stuck * out.get(key, 0.0) for key in _good_keys(state)]
+
+
+#: Where anything may come, nothing comes often.
+_RARELY = [min(_WEIGHTS.get(key, 1.0), 1.0) for key in _ALPHABET]
 
 
 def _extreme(draw: Draw) -> Call | None:

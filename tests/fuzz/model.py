@@ -77,7 +77,9 @@ class Model:
 
     def _port_of(self, call: Call, reference: int) -> str:
         kind = call.function[len("fmi2Set") :]
-        found = [v for v in self.description.variables if (v.reference, v.kind) == (reference, kind)]
+        found = [
+            v for v in self.description.variables if (v.reference, v.kind) == (reference, kind)
+        ]
         return found[0].name if found and call.function.startswith("fmi2Set") else _REFERENCE
 
     def _refused(self, call: Call, bad_only: bool) -> set[str]:

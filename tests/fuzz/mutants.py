@@ -60,7 +60,8 @@ class Trials:
     """Mutated states of one FMU, one after the other, on one instance."""
 
     def __init__(self, host: Host, bases: Sequence[bytes], others: Sequence[bytes]) -> None:
-        self._host, self._bases, self._others = host, bases, [*bases, *others]
+        self._host, self._bases = host, bases
+        self._lenders = [said for said in map(states.read, [*bases, *others]) if said is not None]
         self._samples = [said for said in map(without_checksum, bases) if said is not None]
         _marked(host)
         self._marked = host.get_state()
@@ -77,7 +78,7 @@ class Trials:
         """
         random = Random(seed)
         base = random.choice(self._bases)
-        mutant = states.mutant(base, random, self._others)
+        mutant = states.mutant(base, random, self._lenders)
         try:
             self._try(mutant.content, base)
         except AssertionError as error:

@@ -17,6 +17,7 @@ import tempfile
 import time
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,6 +27,8 @@ from fuzz.mutants import Taken, Trials, reached
 from fuzz.player import Difference, Sequence_, play
 from support.raw import Host, Library
 from support.worker import Lost, Worker
+
+KINDS = ("sequences", "states")
 
 #: Sequences or mutants in one task, and the longest time for one of them [s].
 BATCH, PATIENCE = 25, 30.0
@@ -57,17 +60,21 @@ class Finding(NamedTuple):
 def serve(folders: Mapping[str, Path], name: str) -> Callable[[Task], Any]:
     """Prepare a process for tasks on an FMU; the others lend it company and states."""
     libraries = {name: Library(folders[name]), **{n: Library(f) for n, f in folders.items()}}
-    foreign = [content for n in libraries if n != name for content in reached(libraries[n], 0)]
+    contents = {n: reached(library, 0) for n, library in libraries.items()}
     descriptions = {n: library.description for n, library in libraries.items()}
+    # Each FMU's state is foreign to the one before it.
+    foreign = dict(zip(contents, [states[-1] for states in [*contents.values()][1:]]))
+    foreign[[*contents][-1]] = contents[name][-1]
     mutants: list[Trials] = []
 
     def sequence_of(seed: int) -> Sequence_:
-        return generated(seed, name, descriptions, foreign[-1])
+        return generated(seed, name, descriptions, foreign)
 
     def do(task: Task) -> Any:
         if task.kind == "states":
             if not mutants:
-                mutants.append(_mutants(libraries[name], foreign))
+                others = [content for n in contents if n != name for content in contents[n]]
+                mutants.append(_mutants(libraries[name], others))
             return [f for seed in task.seeds for f in _tried(mutants[0], seed)]
         if task.kind == "sequences":
             return [f for seed in task.seeds for f in _played(sequence_of(seed), libraries, seed)]
@@ -116,14 +123,14 @@ class Fuzzer:
     def __exit__(self, *_: object) -> None:
         self._worker.close()
 
-    def attack(self, kind: str, seeds: Sequence[int]) -> Iterator[list[Finding]]:
-        """Findings of one batch of seeds after the other; a seed that ends the process is one."""
+    def attack(self, kind: str, seeds: Sequence[int]) -> Iterator[tuple[int, list[Finding]]]:
+        """How many seeds were tried, and findings; a seed that ends the process is one."""
         for first in range(0, len(seeds), BATCH):
             batch = seeds[first : first + BATCH]
             found = self._ask(Task(kind, batch))
             if isinstance(found, Lost):
                 found = [f for seed in batch for f in self._alone(kind, seed)]
-            yield found
+            yield first + len(batch), found
 
     def _alone(self, kind: str, seed: int) -> list[Finding]:
         found = self._ask(Task(kind, [seed]))
@@ -163,6 +170,15 @@ class Fuzzer:
             size //= 2
         return sequence._replace(actions=actions)
 
+    def explained(self, kind: str, finding: Finding) -> str:
+        """A finding as a text to be read, with the calls that lead to it."""
+        said = f"{self.name}, {kind}, seed {finding.seed}: {finding.what}"
+        if kind != "sequences":
+            return said
+        sequence = self.shrunk(self.sequence(finding.seed))
+        again = self.replay(sequence) or "not seen again"
+        return f"{said}\nshrunk: {again}\n{self.show(sequence)}"
+
 
 @contextmanager
 def unpacked(fmus: Sequence[Path]) -> Iterator[dict[str, Path]]:
@@ -176,15 +192,32 @@ def unpacked(fmus: Sequence[Path]) -> Iterator[dict[str, Path]]:
         yield folders
 
 
-def _report(fuzzer: Fuzzer, kind: str, finding: Finding, *, shrink: bool) -> None:
-    print(f"\n{fuzzer.name}, {kind} {finding.seed}: {finding.what}")
-    if kind == "states":
-        return
-    sequence = fuzzer.sequence(finding.seed)
-    if shrink:
-        sequence = fuzzer.shrunk(sequence)
-        print(f"shrunk: {fuzzer.replay(sequence) or 'not seen again'}")
-    print(fuzzer.show(sequence), flush=True)
+def attack(
+    fuzzer: Fuzzer, kind: str, seeds: Sequence[int], most: int, progress: Callable[[str], None]
+) -> list[str]:
+    """Attack an FMU and tell of it.
+
+    Args:
+        fuzzer: of the FMU.
+        kind: `sequences` or `states`.
+        seeds: of them.
+        most: findings that are shrunk.
+        progress: is told how far it is.
+
+    Returns:
+        A summary, and a text for each finding.
+
+    """
+    findings: list[Finding] = []
+    start = time.monotonic()
+    for done, found in fuzzer.attack(kind, seeds):
+        findings += found
+        progress(f"{fuzzer.name}: {done} of {len(seeds)} {kind}, {len(findings)} findings")
+    summary = (
+        f"{fuzzer.name}: {len(seeds)} {kind}, {len(findings)} findings, "
+        f"{time.monotonic() - start:.0f} s"
+    )
+    return [summary, *(fuzzer.explained(kind, finding) for finding in findings[:most])]
 
 
 def main() -> int:
@@ -194,42 +227,36 @@ def main() -> int:
     parser.add_argument("--only", nargs="*", help="names of FMUs")
     parser.add_argument("--runs", type=int, default=10_000, help="sequences, and states, an FMU")
     parser.add_argument("--first", type=int, default=0, help="first seed")
-    parser.add_argument("--kind", choices=("sequences", "states"), help="default: both")
+    parser.add_argument("--kind", choices=KINDS, help="default: both")
     parser.add_argument("--show", type=int, metavar="SEED", help="print a sequence and play it")
     parser.add_argument("--most", type=int, default=5, help="findings to shrink, of each kind")
+    parser.add_argument("--jobs", type=int, default=2, help="FMUs attacked at the same time")
     options = parser.parse_args()
-    failed = 0
+    kinds = [options.kind] if options.kind else KINDS
+    seeds = range(options.first, options.first + options.runs)
+    failed = False
     with unpacked(sorted(options.fmus.glob("*.fmu"))) as folders:
         if not folders:
-            parser.error(f"no FMUs in {options.fmus}: python -m fmus.packaging.build")
-        for name in options.only or folders:
+            parser.error(f"no FMUs in {options.fmus}: python -m fmus.packaging.build makes them")
+
+        def one(name: str) -> list[list[str]]:
             with Fuzzer(folders, name) as fuzzer:
                 if options.show is not None:
                     sequence = fuzzer.sequence(options.show)
-                    print(fuzzer.show(sequence))
-                    print(fuzzer.replay(sequence) or "all as the table says")
-                    continue
-                for kind in [options.kind] if options.kind else ["sequences", "states"]:
-                    failed += _attacked(fuzzer, kind, options)
+                    print(fuzzer.show(sequence), fuzzer.replay(sequence) or "no finding", sep="\n")
+                    return []
+                return [attack(fuzzer, kind, seeds, options.most, _progress) for kind in kinds]
+
+        with ThreadPoolExecutor(options.jobs) as pool:
+            for reports in pool.map(one, options.only or folders):
+                for report in reports:
+                    print("\n\n".join(report), flush=True)
+                    failed = failed or len(report) > 1
     return 1 if failed else 0
 
 
-def _attacked(fuzzer: Fuzzer, kind: str, options: argparse.Namespace) -> int:
-    """How many findings there are."""
-    findings: list[Finding] = []
-    start, done = time.monotonic(), 0
-    for found in fuzzer.attack(kind, range(options.first, options.first + options.runs)):
-        findings += found
-        done = min(done + BATCH, options.runs)
-        rate = done / (time.monotonic() - start)
-        print(f"\r{fuzzer.name}: {done} {kind}, {len(findings)} findings, {rate:.0f}/s",
-              end="", file=sys.stderr, flush=True)  # fmt: skip
-    print(file=sys.stderr)
-    print(f"{fuzzer.name}: {done} {kind}, {len(findings)} findings, "
-          f"{time.monotonic() - start:.0f} s", flush=True)  # fmt: skip
-    for finding in findings[: options.most]:
-        _report(fuzzer, kind, finding, shrink=True)
-    return len(findings)
+def _progress(text: str) -> None:
+    print(f"\r{text:70}", end="", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from ctypes import (
     string_at,
 )
 from dataclasses import dataclass, field
-from math import inf, nan
+from math import copysign, inf, nan, nextafter
 from random import Random
 from typing import Any, NamedTuple
 
@@ -261,12 +261,16 @@ def _set_infinite(draw: Draw) -> Arguments | None:
     return _item(port, draw.random.choice((inf, -inf)), False)
 
 
+def _beyond(limit: float, direction: float, random: Random) -> float:
+    return random.choice((nextafter(limit, direction), copysign(1e300, direction)))
+
+
 @_case("fmi2SetReal", "below the range")
 def _below(draw: Draw) -> Arguments | None:
     port = draw.any_of([v for v in draw.settable("Real") if v.minimum is not None])
     if port is None:
         return None
-    return _item(port, port.minimum - draw.random.choice((1e-12, 1.0, 1e300)), False)
+    return _item(port, _beyond(port.minimum, -inf, draw.random), False)
 
 
 @_case("fmi2SetReal", "above the range")
@@ -274,7 +278,7 @@ def _above(draw: Draw) -> Arguments | None:
     port = draw.any_of([v for v in draw.settable("Real") if v.maximum is not None])
     if port is None:
         return None
-    return _item(port, port.maximum + draw.random.choice((1e-12, 1.0, 1e300)), False)
+    return _item(port, _beyond(port.maximum, inf, draw.random), False)
 
 
 @_case("fmi2SetReal", "one bad among good")

@@ -143,6 +143,17 @@ class Message(NamedTuple):
     text: str
 
 
+class _Arrays:
+    """What a get call of the same variables needs, made once."""
+
+    def __init__(self, kind: str, variables: Sequence[Variable]) -> None:
+        self.kind = kind
+        self.names = [variable.name for variable in variables]
+        self.n = c_size_t(len(variables))
+        self.references = (c_uint * len(variables))(*(v.reference for v in variables))
+        self.values = (_C_TYPES[kind] * len(variables))()
+
+
 class Host:
     """One instance, its callbacks, and the messages it has sent."""
 
@@ -159,11 +170,17 @@ class Host:
             None,
         )
         self.component: int | None = None
+        self._arrays = {
+            kind: _Arrays(kind, [v for v in self.description.variables if v.kind == kind])
+            for kind in KINDS
+        }
+        self._fault = self.description.find("fault")
+        self._outputs = _Arrays("Real", self.description.of("output", "Real"))
 
     def _log(self, _environment: int, _name: bytes, status: int, _category: bytes, text: bytes):
         self.messages.append(Message(Status(status), (text or b"").decode("utf-8", "replace")))
 
-    def instantiate(  # noqa: PLR0913
+    def instantiate(
         self,
         name: bytes | None = b"raw",
         kind: int = FMI2_CO_SIMULATION,
@@ -234,19 +251,25 @@ class Host:
         assert status == Status.OK, f"{variable.name} cannot be read: {status.name}"
         return value
 
+    def _read(self, arrays: _Arrays) -> list[Any]:
+        status = self.call(f"fmi2Get{arrays.kind}", arrays.references, arrays.n, arrays.values)
+        assert status == Status.OK, f"values cannot be read: {status.name}"
+        return list(arrays.values)
+
     def values(self) -> dict[str, Any]:
         """The values of all ports, by name."""
         found: dict[str, Any] = {}
-        for kind in KINDS:
-            variables = [v for v in self.description.variables if v.kind == kind]
-            if variables:
-                status, values = self.get(kind, [v.reference for v in variables])
-                assert status == Status.OK, f"values cannot be read: {status.name}"
-                found |= zip((v.name for v in variables), values)
+        for arrays in self._arrays.values():
+            if arrays.names:
+                found |= zip(arrays.names, self._read(arrays))
         return found
 
+    def outputs(self) -> list[float]:
+        """The values of the Real outputs, which take least time."""
+        return self._read(self._outputs)
+
     def fault(self) -> bool:
-        return bool(self.value(self.description.find("fault")))
+        return bool(self.value(self._fault))
 
     def get_state(self) -> int:
         state = c_void_p()

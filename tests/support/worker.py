@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import resource
 import signal
 from collections.abc import Callable
@@ -87,6 +88,8 @@ class Worker(Generic[Task, Result]):
 
 def _serve(connection: Connection, start: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # FMUs have nobody else to tell of calls on what is no instance.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
     do = start(*arguments)
@@ -97,5 +100,5 @@ def _serve(connection: Connection, start: Callable[..., Any], arguments: tuple[A
             return
         try:
             connection.send((True, do(task)))
-        except Exception as error:  # noqa: BLE001
+        except Exception as error:
             connection.send((False, f"{type(error).__name__}: {error}"))
