@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import isfinite
 from random import Random
+from typing import Any
 
 from fuzz.reachable import faults, without_checksum
 from support import states
@@ -81,8 +82,11 @@ class Trials:
         mutant = states.mutant(base, random, self._lenders)
         try:
             self._try(mutant.content, base)
-        except AssertionError as error:
-            raise Taken(f"{mutant.said}: {error}") from error
+        except Exception as error:
+            raise Taken(f"{mutant.said}: {type(error).__name__}: {error}") from error
+        finally:
+            assert self._host.set_state(self._marked) == Status.OK
+            assert not self._host.fault()
 
     def _try(self, content: bytes, base: bytes) -> None:
         host = self._host
@@ -99,8 +103,6 @@ class Trials:
             else:
                 self.taken += 1
                 self._check_taken(content)
-        assert host.set_state(self._marked) == Status.OK
-        assert not host.fault()
 
     def _check_refused(self) -> None:
         host = self._host
@@ -114,12 +116,33 @@ class Trials:
         if said is not None:
             wrong = faults(said, host.description, self._samples)
             assert not wrong, f"taken with {wrong[0]}"
+            self._check_start(said)
         for name, value in host.values().items():
             assert not isinstance(value, float) or isfinite(value), f"taken with {name} = {value}"
         status = host.step(0.0, self._length(host.description))
         assert status in (Status.OK, Status.Discard), status.name
         for name, value in host.values().items():
             assert not isinstance(value, float) or isfinite(value), f"{name} = {value} after a step"
+
+    def _check_start(self, said: dict[str, Any]) -> None:
+        """Before the first step all follows from what can be set: it is set on a new instance."""
+        mode, description = said["mode"], self._host.description
+        if mode not in ("instantiated", "initialising") or "initialisation" in said["refused"]:
+            return
+        inputs = dict(zip((v.name for v in description.of("input")), said["inputs"], strict=True))
+        with instance(self._host.library) as host:
+            host.setup(said["start_time"])
+            for name, value in {**inputs, **said["parameters"]}.items():
+                variable = description.find(name)
+                value = value.encode() if isinstance(value, str) else value
+                host.set(variable.kind, [variable.reference], [value])
+            if mode == "initialising":
+                host.enter()
+            assert not host.fault(), "taken with values that are refused"
+            made = states.without_refusals(host.content())
+            assert made == states.without_refusals(self._host.content()), (
+                f"taken with another start than its values have ({mode})"
+            )
 
     def _length(self, description: Description) -> float:
         """A step of few internal steps, whatever h_max has become."""

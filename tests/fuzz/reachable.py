@@ -8,9 +8,14 @@ reach; what it finds fault with is.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import chain, pairwise
 from math import hypot, isfinite
 from typing import Any
 
+from auv_fmu import motion_planner, plant
+from auv_fmu.motion_planner import PlannerState
+from auv_fmu.plant import PlantState
+from fmus.motion_planner.ports import PARAMETERS
 from support import states
 from support.calls import CHOICES
 from support.raw import Description, Variable
@@ -21,6 +26,12 @@ TOLERANCE = 1e-9
 
 #: Of the Mersenne Twister that makes noise: words of its state, and one more number, its place.
 _TWISTER, _WORD = 624, 2**32
+
+#: Where the groups eta, nu, y, dy and tau_applied of the plant's outputs begin and end.
+_PLANT_OUTPUTS = (0, 6, 12, 15, 18, 21)
+
+#: random.gauss cannot go further from zero: it takes the logarithm of a number of 53 bits.
+_MOST_SIGMAS = 8.6
 
 
 def faults(said: Any, description: Description, samples: Sequence[dict[str, Any]]) -> list[str]:
@@ -87,7 +98,7 @@ def _faults_of_state(
         yield "a state of another shape"
     elif any(not isfinite(x) for x in _numbers(state)):
         yield "a state that is not finite"
-    elif name in _INVARIANTS:
+    elif name in _INVARIANTS and "initialisation" not in said["refused"]:
         yield from _INVARIANTS[name](said)
 
 
@@ -147,12 +158,23 @@ def _is_unit(vector: Sequence[float]) -> bool:
 
 
 def _plant(said: dict[str, Any]) -> Iterator[str]:
-    _, quaternion, nu = said["state"]
+    position, quaternion, nu = said["state"]
     if not _is_unit(quaternion):
         yield f"a quaternion that is no unit: {quaternion}"
-    if said["mode"] in ("stepping", "terminated") and said["outputs"][6:12] != nu:
-        yield "outputs that are not those of the state"
+        return
     yield from _generator(said["hidden"])
+    parameters, outputs = said["parameters"], said["outputs"]
+    state = PlantState(position, quaternion, nu)
+    euler, y, dy = plant.outputs(state, parameters["ell"])
+    eta, found_nu, found_y, found_dy, tau = (outputs[i:j] for i, j in pairwise(_PLANT_OUTPUTS))
+    if (eta, found_nu, found_dy) != ([*position, *euler], nu, [*dy]):
+        yield "outputs that are not those of the state"
+    most = _MOST_SIGMAS * parameters["noise.std"] + TOLERANCE * hypot(*y)
+    if any(abs(measured - true) > most for measured, true in zip(found_y, y)):
+        yield "noise that no generator makes"
+    limits = ((parameters[f"tau_min.{k}"], parameters[f"tau_max.{k}"]) for k in "uqr")
+    if not all(low <= value <= high for value, (low, high) in zip(tau, limits)):
+        yield "applied forces beyond the limits"
 
 
 def _generator(hidden: Any) -> Iterator[str]:
@@ -176,10 +198,12 @@ def _generator(hidden: Any) -> Iterator[str]:
 
 
 def _planner(said: dict[str, Any]) -> Iterator[str]:
-    (_, theta, psi, _), (rotation, _) = said["state"]
-    if not all(map(_is_unit, rotation)):
-        yield f"axes that are no units: {rotation}"
-    if said["mode"] in ("stepping", "terminated") and said["outputs"][-2:] != [theta, psi]:
+    position, theta, psi, nu = said["state"]
+    parameters = PARAMETERS.of(said["parameters"])
+    state = PlannerState(tuple(position), theta, psi, tuple(nu))
+    moving = motion_planner.motion(parameters.vehicle, state, parameters.tau_d)
+    reference = motion_planner.reference(state, moving, parameters.ell)
+    if said["outputs"] != [*chain(*reference), *position, theta, psi]:
         yield "outputs that are not those of the state"
 
 
