@@ -16,7 +16,7 @@ from support.status_table import rows
 LEAST, MOST = 4, 45
 
 #: Shares of sequences with several instances, and with a thread for each.
-INTERLEAVED, THREADED = 0.35, 0.1
+INTERLEAVED, THREADED = 0.3, 0.06
 
 #: Shares of calls that are sensible where they are made, and of values that are extreme.
 SENSIBLE, EXTREME = 0.7, 0.03
@@ -94,7 +94,7 @@ class _World:
 
     def draw(self, name: str, others: bool) -> Draw:
         known = self.known[name]
-        same = {n for n, description in self.fmus.items() if description == self.fmus[name]}
+        same = {n for n, description in self.fmus.items() if description is self.fmus[name]}
         own = sorted(slot for slot in self.models if slot.startswith(f"{name}."))
         foreign = sorted(s for s in self.models if s not in own and s.split(".")[0] in same)
         freed = sorted(

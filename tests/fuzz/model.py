@@ -76,11 +76,8 @@ class Model:
         return known
 
     def _port_of(self, call: Call, reference: int) -> str:
-        kind = call.function[len("fmi2Set") :]
-        found = [
-            v for v in self.description.variables if (v.reference, v.kind) == (reference, kind)
-        ]
-        return found[0].name if found and call.function.startswith("fmi2Set") else _REFERENCE
+        kind = call.function.removeprefix("fmi2Set")
+        return self.description.names.get((reference, kind), _REFERENCE)
 
     def _refused(self, call: Call, bad_only: bool) -> set[str]:
         if "items" not in call.arguments:

@@ -155,15 +155,16 @@ class Fuzzer:
         return found[0].what if found else ""
 
     def shrunk(self, sequence: Sequence_) -> Sequence_:
-        """A sequence that still fails, and no action of which can be left out."""
+        """A sequence that fails the same way, and no action of which can be left out."""
         actions, replays = [*sequence.actions], 0
+        wanted = _kind_of(self.replay(sequence))
         size = len(actions) // 2
         while size and replays < MOST_REPLAYS:
             first = 0
             while first < len(actions) and replays < MOST_REPLAYS:
                 fewer = actions[:first] + actions[first + size :]
                 replays += 1
-                if self.replay(sequence._replace(actions=fewer)):
+                if _kind_of(self.replay(sequence._replace(actions=fewer))) == wanted:
                     actions = fewer
                 else:
                     first += size
@@ -178,6 +179,11 @@ class Fuzzer:
         sequence = self.shrunk(self.sequence(finding.seed))
         again = self.replay(sequence) or "not seen again"
         return f"{said}\nshrunk: {again}\n{self.show(sequence)}"
+
+
+def _kind_of(finding: str) -> str:
+    """A finding without where it was made."""
+    return finding.rpartition(": ")[2]
 
 
 @contextmanager
@@ -201,11 +207,11 @@ def attack(
         fuzzer: of the FMU.
         kind: `sequences` or `states`.
         seeds: of them.
-        most: findings that are shrunk.
+        most: kinds of findings that are explained.
         progress: is told how far it is.
 
     Returns:
-        A summary, and a text for each finding.
+        A summary, and a text for each kind of finding.
 
     """
     findings: list[Finding] = []
@@ -217,7 +223,16 @@ def attack(
         f"{fuzzer.name}: {len(seeds)} {kind}, {len(findings)} findings, "
         f"{time.monotonic() - start:.0f} s"
     )
-    return [summary, *(fuzzer.explained(kind, finding) for finding in findings[:most])]
+    kinds: dict[str, list[Finding]] = {}
+    for finding in findings:
+        kinds.setdefault(_kind_of(finding.what), []).append(finding)
+    return [
+        summary,
+        *(
+            f"{len(alike)} times: {fuzzer.explained(kind, alike[0])}"
+            for alike in [*kinds.values()][:most]
+        ),
+    ]
 
 
 def main() -> int:
@@ -229,7 +244,7 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0, help="first seed")
     parser.add_argument("--kind", choices=KINDS, help="default: both")
     parser.add_argument("--show", type=int, metavar="SEED", help="print a sequence and play it")
-    parser.add_argument("--most", type=int, default=5, help="findings to shrink, of each kind")
+    parser.add_argument("--most", type=int, default=5, help="kinds of findings to explain")
     parser.add_argument("--jobs", type=int, default=2, help="FMUs attacked at the same time")
     options = parser.parse_args()
     kinds = [options.kind] if options.kind else KINDS

@@ -22,7 +22,9 @@ from ctypes import (
     create_string_buffer,
     string_at,
 )
+from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -73,7 +75,8 @@ class Variable(NamedTuple):
     maximum: float | None
 
 
-class Description(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Description:
     """What modelDescription.xml says. Read here: importing fmpy takes a second a process."""
 
     name: str
@@ -84,6 +87,11 @@ class Description(NamedTuple):
     def of(self, causality: str, kind: str | None = None) -> list[Variable]:
         """The variables of a causality."""
         return [v for v in self.variables if v.causality == causality and kind in (None, v.kind)]
+
+    @cached_property
+    def names(self) -> dict[tuple[int, str], str]:
+        """By value reference and type."""
+        return {(v.reference, v.kind): v.name for v in self.variables}
 
     def find(self, name: str) -> Variable:
         return next(v for v in self.variables if v.name == name)

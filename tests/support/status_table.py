@@ -82,7 +82,7 @@ def rows() -> dict[tuple[str, str], Row]:
     """All calls on an instance, by function and case."""
     found: dict[tuple[str, str], Row] = {}
     for section in _sections().values():
-        if section.header[:2] == ["call", "with"]:
+        if section.header[-1] == "mended by":
             columns = section.header[2:-1]
             assert columns == [*STATES], section.heading
             for function, case, *cells, mended_by in section.rows:
@@ -110,3 +110,9 @@ def creations() -> dict[str, bool]:
 def without_an_instance() -> dict[str, str]:
     """The status of any call, by what stands in the place of an instance."""
     return dict(_sections()["No instance"].rows)
+
+
+def without_the_loader() -> dict[tuple[str, str], str]:
+    """What becomes of calls on FMUs without the native loader, by function and case."""
+    rows = _sections()["Without the native loader"].rows
+    return {(function, case): answer for function, case, answer in rows}
