@@ -14,9 +14,10 @@ from fmus.auv_plant.ports import PARAMETERS, PORTS, Parameters
 from fmus.ports.groups import slices
 from fmus.ports.port import Refusal
 from fmus.slave.component import Component
+from fmus.slave.state import nearly_equal
 
-#: The measured control point among the outputs.
-_Y = slices([port for port in PORTS if port.causality == "output"])["y"]
+_PLACES = slices([port for port in PORTS if port.causality == "output"])
+_Y, _TAU_APPLIED = _PLACES["y"], _PLACES["tau_applied"]
 
 #: Share of its length by which a normalised quaternion is off.
 _ROUNDING = 1e-12
@@ -75,9 +76,15 @@ class AuvPlant(Component[PlantState, Inputs, Outputs, Parameters]):
         values[_Y] = measured = plant.measure((x, y, z), n, self.parameters.noise.std)
         return measured
 
-    def check_state(self, state: PlantState) -> None:
+    def check_state(self, parameters: Parameters, state: PlantState, outputs: list[float]) -> None:
         if not isclose(hypot(*state.quaternion), 1.0, rel_tol=_ROUNDING):
             raise Refusal("its quaternion is not of length one")
+        u, q, r = outputs[_TAU_APPLIED]
+        seen = self._pack(_seen(parameters, state, _limited(parameters, (u, q, r))))
+        # The noise in it could be any.
+        seen[_Y] = outputs[_Y]
+        if not nearly_equal(seen, outputs):
+            raise Refusal("its outputs are not those of its state")
 
     def hidden_state(self) -> Any:
         return self._random.getstate() if self._state is not None else None

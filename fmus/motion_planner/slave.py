@@ -8,7 +8,9 @@ from auv_fmu import motion_planner
 from auv_fmu.motion_planner import Motion, PlannerState
 from auv_fmu.types import Vector3, Vector5
 from fmus.motion_planner.ports import PARAMETERS, PORTS, Parameters
+from fmus.ports.port import Refusal
 from fmus.slave.component import Component, Nothing
+from fmus.slave.state import nearly_equal
 
 
 class Outputs(TypedDict):
@@ -37,18 +39,31 @@ class MotionPlanner(Component[PlannerState, Nothing, Outputs, Parameters]):
     def advance(
         self, state: PlannerState, inputs: Nothing, t: float, h: float, n: int
     ) -> tuple[PlannerState, Outputs]:
-        moving = self._moving if state is self._moved else self._motion(state)
+        moving = self._moving if state is self._moved else _motion(self.parameters, state)
         for _ in range(n - 1):
             state = motion_planner.step(state, moving, h)
-            moving = self._motion(state)
+            moving = _motion(self.parameters, state)
         return self._planned(motion_planner.step(state, moving, h))
 
-    def _motion(self, state: PlannerState) -> Motion:
-        return motion_planner.motion(self.parameters.vehicle, state, self.parameters.tau_d)
+    def check_state(
+        self, parameters: Parameters, state: PlannerState, outputs: list[float]
+    ) -> None:
+        if not nearly_equal(
+            self._pack(_seen(parameters, state, _motion(parameters, state))), outputs
+        ):
+            raise Refusal("its outputs are not those of its state")
 
     def _planned(self, state: PlannerState) -> tuple[PlannerState, Outputs]:
-        moving = self._motion(state)
+        moving = _motion(self.parameters, state)
         self._moved, self._moving = state, moving
-        y_d, dy_d, ddy_d = motion_planner.reference(state, moving, self.parameters.ell)
-        eta_d = (*state.position, state.theta, state.psi)
-        return state, {"y_d": y_d, "dy_d": dy_d, "ddy_d": ddy_d, "eta_d": eta_d}
+        return state, _seen(self.parameters, state, moving)
+
+
+def _motion(chosen: Parameters, state: PlannerState) -> Motion:
+    return motion_planner.motion(chosen.vehicle, state, chosen.tau_d)
+
+
+def _seen(chosen: Parameters, state: PlannerState, moving: Motion) -> Outputs:
+    y_d, dy_d, ddy_d = motion_planner.reference(state, moving, chosen.ell)
+    eta_d = (*state.position, state.theta, state.psi)
+    return {"y_d": y_d, "dy_d": dy_d, "ddy_d": ddy_d, "eta_d": eta_d}

@@ -107,8 +107,8 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         """
         return ()
 
-    def check_state(self, state: State) -> None:
-        """Raise Refusal if no run can have led to a state, each number of which is finite."""
+    def check_state(self, parameters: Parameters, state: State, outputs: list[float]) -> None:
+        """Raise Refusal if no run can have led to a state and outputs, all of them finite."""
 
     def hidden_state(self) -> Any:
         """What a component keeps outside its state: JSON-safe, immutable."""
@@ -279,7 +279,10 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         )
 
     def _set_fmu_state(self, state: Mapping[str, Any]) -> None:
-        self._attempt("fmi2SetFMUstate", "state refused", lambda: self._restore(state))
+        try:
+            self._restore(state)
+        except BaseException as error:
+            self._refuse("fmi2SetFMUstate", f"state refused: {explained(error)}")
 
     def _restore(self, saved: Mapping[str, Any]) -> None:
         store = self._store
@@ -290,7 +293,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
             meaning = self._meaning(wanted["parameters"])
             if not self._norm(wanted["state"]) <= LARGEST_STATE:
                 raise Refusal(f"beyond {LARGEST_STATE:g}")
-            self.check_state(wanted["state"])
+            self.check_state(meaning[0], wanted["state"], wanted["outputs"])
             # Nothing of this instance has changed so far, and nothing can fail after this.
             self.restore_hidden_state(wanted["hidden"])
             self._adopt(wanted["parameters"], meaning)
@@ -298,7 +301,8 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         store.inputs, store.outputs = wanted["inputs"], wanted["outputs"]
         store.fault, store.refused = wanted["fault"], wanted["refused"]
         self._mode, self._start_time = wanted["mode"], wanted["start_time"]
-        self._stale = False
+        # Before the first step all follows from parameters and inputs, and is computed once more.
+        self._stale = self._mode == INITIALISING
 
     _fmu_state_to_bytes = staticmethod(to_bytes)
     _fmu_state_from_bytes = staticmethod(from_bytes)

@@ -71,6 +71,8 @@ SPOILED = {
     "inputs no list": ("inputs", lambda saved: 7),
     "outputs missing": ("outputs", lambda saved: []),
     "output not finite": ("outputs", lambda saved: [inf, *saved["outputs"][1:]]),
+    "posture of another state": ("outputs", lambda saved: [1.0, *saved["outputs"][1:]]),
+    "moment beyond its limit": ("outputs", lambda saved: [*saved["outputs"][:-1], 1e6]),
     "mode bogus": ("mode", lambda saved: "bogus"),
     "mode of another type": ("mode", lambda saved: ["stepping"]),
     "state before the initialisation": ("mode", lambda saved: "instantiated"),
@@ -184,6 +186,41 @@ def test_text_of_a_state_is_no_trap_for_the_message(driver):
     [message] = driver.messages()
     assert "%%s" in message
     assert len(message) < 600
+
+
+def test_refusals_in_a_state_are_restored_with_it(driver):
+    driver.slave._set_fmu_state({})
+    saved = driver.slave._get_fmu_state()
+    driver.slave._set_fmu_state(saved)
+    assert not driver.step()
+    assert driver.slave._get_fmu_state() == saved
+
+
+def test_outputs_before_the_initialisation_are_refused(driver):
+    fresh = dict(driver.component(instance_name="fresh")._get_fmu_state())
+    driver.slave._set_fmu_state({**fresh, "outputs": [1.0] * len(fresh["outputs"])})
+    assert driver.messages()[0].startswith("state refused: ")
+
+
+def test_state_before_the_first_step_is_that_of_its_parameters_and_inputs(driver):
+    """Whatever else is said of it: it is computed again."""
+    slave = driver.component(instance_name="initialising")
+    slave.setup_experiment(0.0)
+    slave.enter_initialization_mode()
+    true = slave._get_fmu_state()
+    driver.excite(1)
+    driver.step(0.02)
+    driver.slave._set_fmu_state({**driver.slave._get_fmu_state(), "mode": "initialising",
+                                 "inputs": true["inputs"]})  # fmt: skip
+    assert driver.slave._get_fmu_state() == true
+
+
+def test_reference_of_another_state_is_refused():
+    driver = ClassInstance("MotionPlanner")
+    driver.step()
+    saved = driver.slave._get_fmu_state()
+    driver.slave._set_fmu_state({**saved, "outputs": [1.0, *saved["outputs"][1:]]})
+    assert "not those of its state" in driver.messages()[0]
 
 
 def test_state_from_before_the_initialisation_brings_an_instance_back_there(driver):
