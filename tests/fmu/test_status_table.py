@@ -92,11 +92,12 @@ def test_cell_of_a_plain_fmu(plain: Worker[Cell, str], cell: str):
 def test_what_is_said_of_a_plain_fmu(plain: Worker[Cell, str], key: tuple[str, str]):
     wrong = plain.ask((key, "stepping"), PATIENCE)
     expected = without_the_loader()[key]
-    if expected == "crash":
-        assert isinstance(wrong, Lost) and wrong.why.startswith("SIG"), wrong
+    if isinstance(wrong, Lost):
+        assert wrong.why.startswith("SIG"), wrong
+        assert "crash" in expected
     else:
-        assert not isinstance(wrong, Lost), wrong.why
-        assert wrong.endswith(expected.removeprefix("fmi2"))
+        # What is freed twice does not crash each time.
+        assert wrong.endswith(expected.removeprefix("fmi2").removesuffix(", then crash"))
 
 
 def test_every_row_is_tried():

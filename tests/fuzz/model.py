@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from support.calls import Call
 from support.raw import Description
-from support.status_table import ERROR, MODES, Cell, rows
+from support.status_table import ERROR, MODES, SOUND, Cell, rows
 
 _WHILE_REFUSED = ("fmi2DoStep", "anything, while a refusal is not mended")
 
@@ -65,9 +65,8 @@ class Model:
         if answer.name == "restored":
             return saved[slot_of(call)]
         known = replace(self, fault=self.fault or answer.raises_fault)
-        if leads_to == ERROR:
-            known.in_error = True
-        else:
+        known.in_error = leads_to == ERROR
+        if leads_to not in (ERROR, SOUND):
             known.mode = leads_to
         if answer.blocks:
             known.blocks |= self._refused(call, bad_only=answer.name == "partly")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
 from random import Random
+from typing import NamedTuple
 
 from support import states
 from support.calls import CASES, NO_START, OVERFLOWING, Call, Draw, Saved, Setting, make
 from support.raw import Host, Library, Status, Variable, instance
-from support.status_table import ERROR, Answer, Cell, Row, rows
+from support.status_table import ERROR, SOUND, Answer, Cell, Row, rows
 
 #: Step of the trials [s], and how many come before the state stepping is tried.
 H, STEPS = 0.02, 3
@@ -23,14 +23,21 @@ _SETTINGS: Mapping[tuple[str, str], Mapping[str, Setting]] = {
 _WHILE_REFUSED = "anything, while a refusal is not mended"
 
 
-def check(library: Library, key: tuple[str, str], state: str, foreign: bytes) -> bool:
+class Company(NamedTuple):
+    """What there is beside the instance of a trial."""
+
+    other: Host  #: another instance of the same FMU, stepping
+    foreign: bytes  #: a serialised state of another FMU
+
+
+def check(library: Library, key: tuple[str, str], state: str, company: Company) -> bool:
     """Hold an FMU against a cell.
 
     Args:
         library: of the FMU.
         key: function and case of the row.
         state: the column.
-        foreign: a serialised state of another FMU.
+        company: of the instance.
 
     Returns:
         Whether this FMU has such a call.
@@ -42,9 +49,8 @@ def check(library: Library, key: tuple[str, str], state: str, foreign: bytes) ->
     row = rows()[key]
     cell = row.cells[state]
     for goes_on in _ways_on(row, cell.answer):
-        with ExitStack() as stack:
-            host, other = (stack.enter_context(instance(library)) for _ in range(2))
-            trial = Trial(host, other, row, state, foreign)
+        with instance(library) as host:
+            trial = Trial(host, company, row, state)
             if trial.call is None:
                 return False
             trial.check_call()
@@ -63,20 +69,21 @@ def _ways_on(row: Row, answer: Answer) -> list[Callable[[Trial], None]]:
 class Trial:
     """An instance in the state of a cell, and the call that the cell is about."""
 
-    def __init__(self, host: Host, other: Host, row: Row, state: str, foreign: bytes) -> None:
+    def __init__(self, host: Host, company: Company, row: Row, state: str) -> None:
         self.host, self.row, self.state = host, row, state
         self.cell: Cell = row.cells[state]
         self.mode = "stepping" if state == ERROR else state
         self.time = 0.0
         self.setting = _SETTINGS.get(row.key, {}).get(host.description.name)
         self._reach(state)
-        assert other.setup() == other.enter() == other.exit() == Status.OK
         self.good = host.get_state()
         freed = host.get_state()
-        self.saved = Saved({"own": host.get_state(), "other": other.get_state()}, {"freed": freed})
+        self.saved = Saved(
+            {"own": host.get_state(), "other": company.other.get_state()}, {"freed": freed}
+        )
         assert host.free_state(freed) == Status.OK
         self.draw = Draw(
-            Random(1), host.description, ["own"], ["other"], ["freed"], foreign, self.time
+            Random(1), host.description, ["own"], ["other"], ["freed"], company.foreign, self.time
         )
         arguments = CASES[row.key](self.draw)
         self.call = None if arguments is None else Call(*row.key, arguments)
@@ -137,7 +144,8 @@ class Trial:
         logged = {f"fmi2{message.status.name}" for message in host.messages}
         if self.state != ERROR or answer.name != ERROR:
             assert not answer.message or answer.message in logged, f"messages: {logged or 'none'}"
-        self.mode = self.mode if self.cell.leads_to == ERROR else self.cell.leads_to
+        if self.cell.leads_to not in (ERROR, SOUND):
+            self.mode = self.cell.leads_to
         if answer.name == "restored":
             self._check_what_is_restored(call)
         elif answer.name == "new":

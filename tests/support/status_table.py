@@ -14,6 +14,9 @@ MODES = ("instantiated", "initialising", "stepping", "terminated")
 ERROR = "error"
 STATES = (*MODES, ERROR)
 
+#: What an arrow leads to that ends the state error, whatever was before it.
+SOUND = "sound"
+
 #: Rows that are about no instance: the function that makes one, and what stands in its place.
 CREATION, WITHOUT_AN_INSTANCE = "fmi2Instantiate", "no instance"
 

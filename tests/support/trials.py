@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from support.calls import MANY
-from support.cells import check
+from support.cells import Company, check
 from support.raw import FMI2_MODEL_EXCHANGE, Host, Library, Status, instance
 from support.status_table import (
     CREATION,
@@ -62,6 +62,10 @@ def trials(folder: Path, other: Path) -> Callable[[Cell], str]:
     library = Library(folder)
     with instance(Library(other)) as foreign:
         content = foreign.content()
+    beside = Host(library)
+    assert beside.instantiate()
+    assert beside.setup() == beside.enter() == beside.exit() == Status.OK
+    company = Company(beside, content)
 
     def trial(cell: Cell) -> str:
         (function, case), state = cell
@@ -70,7 +74,7 @@ def trials(folder: Path, other: Path) -> Callable[[Cell], str]:
                 _check_creation(library, case)
             elif function == WITHOUT_AN_INSTANCE:
                 _check_without_an_instance(library, case)
-            elif not check(library, (function, case), state, content):
+            elif not check(library, (function, case), state, company):
                 return SKIPPED
         except Exception as error:  # PythonFMU may leave one behind that is not of this trial.
             return f"{type(error).__name__}: {error}".splitlines()[0]
