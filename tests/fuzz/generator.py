@@ -7,7 +7,7 @@ from functools import cache
 from random import Random
 
 from fuzz.model import Model, keep
-from fuzz.player import FREE, MAKE, Action, Sequence_
+from fuzz.player import FREE, MAKE, Action, Calls
 from support.calls import CASES, NO_START, OVERFLOWING, Call, Draw, Item
 from support.raw import Description, Variable
 from support.status_table import rows
@@ -116,7 +116,7 @@ class _World:
 
 def generated(
     seed: int, fmu: str, descriptions: Mapping[str, Description], foreign: Mapping[str, bytes]
-) -> Sequence_:
+) -> Calls:
     """The sequence of a seed.
 
     Args:
@@ -143,7 +143,7 @@ def generated(
             world.add(name, _call_on_nothing(world, name), "NULL")
         else:
             world.add(name, _call(world, name, others=not threads))
-    return Sequence_(fmus, world.actions, threads)
+    return Calls(fmus, world.actions, threads)
 
 
 def _add_without_an_instance(world: _World, name: str) -> None:

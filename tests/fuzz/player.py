@@ -47,7 +47,7 @@ class Action(NamedTuple):
     on: str = ""
 
 
-class Sequence_(NamedTuple):
+class Calls(NamedTuple):
     """Actions, and which FMU each instance is of."""
 
     fmus: Mapping[str, str]
@@ -180,7 +180,7 @@ class Pair:
         return wanted is None or wanted in saved.states
 
 
-def play(sequence: Sequence_, libraries: Mapping[str, Library]) -> None:
+def play(sequence: Calls, libraries: Mapping[str, Library]) -> None:
     """Play a sequence.
 
     Args:
@@ -236,9 +236,7 @@ def _play_one(i: int, action: Action, pairs: Mapping[str, Pair], models: dict[st
         raise Difference(f"after action {i}, {name}: {difference}") from difference
 
 
-def _play_in_threads(
-    sequence: Sequence_, pairs: Mapping[str, Pair], models: dict[str, Model]
-) -> None:
+def _play_in_threads(sequence: Calls, pairs: Mapping[str, Pair], models: dict[str, Model]) -> None:
     barrier = threading.Barrier(len(pairs))
     differences: list[Difference] = []
 

@@ -63,7 +63,11 @@ def _faults(
         if not isinstance(values, list) or len(values) != len(ports):
             yield f"other {key}"
         else:
-            yield from (f"{p.name} = {v!r:.30}" for p, v in zip(ports, values) if not _fits(p, v))
+            yield from (
+                f"{p.name} = {v!r:.30}"
+                for p, v in zip(ports, values, strict=True)
+                if not _fits(p, v)
+            )
     parameters = {port.name: port for port in description.of("parameter")}
     values = said["parameters"]
     if not isinstance(values, dict) or values.keys() != parameters.keys():
@@ -177,10 +181,10 @@ def _plant(said: dict[str, Any]) -> Iterator[str]:
     if not _near([*eta, *found_nu, *found_dy], [*position, *euler, *nu, *dy]):
         yield "outputs that are not those of the state"
     most = _MOST_SIGMAS * parameters["noise.std"] + TOLERANCE * hypot(*y)
-    if any(abs(measured - true) > most for measured, true in zip(found_y, y)):
+    if any(abs(measured - true) > most for measured, true in zip(found_y, y, strict=True)):
         yield "noise that no generator makes"
     limits = ((parameters[f"tau_min.{k}"], parameters[f"tau_max.{k}"]) for k in "uqr")
-    if not all(low <= value <= high for value, (low, high) in zip(tau, limits)):
+    if not all(low <= value <= high for value, (low, high) in zip(tau, limits, strict=True)):
         yield "applied forces beyond the limits"
 
 

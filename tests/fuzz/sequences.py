@@ -1,4 +1,6 @@
-"""Fuzz FMUs with sequences of calls and with mutated states: `PYTHONPATH=tests python -m fuzz.sequences`.
+"""Fuzz FMUs with sequences of calls and with mutated states.
+
+    PYTHONPATH=tests python -m fuzz.sequences --fmus fmus/dist --runs 10000
 
 Sequences come out of seeds and are held against the model that is made from docs/status.md, and
 against a second instance that gets the good calls alone. FMUs are native code, so everything runs
@@ -24,8 +26,8 @@ from typing import Any, NamedTuple
 
 from fuzz.generator import generated
 from fuzz.mutants import Taken, Trials, reached
-from fuzz.player import Difference, Sequence_, play
-from support.raw import Host, Library
+from fuzz.player import Calls, Difference, play
+from support.raw import Description, Host, Library
 from support.worker import Lost, Worker
 
 KINDS = ("sequences", "states")
@@ -41,13 +43,13 @@ RUNS = 6
 
 
 class Task(NamedTuple):
-    """What a process is asked: to attack with `sequences` or `states` out of seeds, to `make` the
-    sequence of a seed, to `show` one, or to `play` it.
+    """What a process is asked: to attack with `sequences` or `states` out of seeds, to `describe`
+    the FMU, to `make` the sequence of a seed, to `show` one, or to `play` it.
     """
 
     kind: str
     seeds: Sequence[int] = ()
-    sequence: Sequence_ | None = None
+    sequence: Calls | None = None
 
 
 class Finding(NamedTuple):
@@ -62,12 +64,12 @@ def serve(folders: Mapping[str, Path], name: str) -> Callable[[Task], Any]:
     libraries = {name: Library(folders[name]), **{n: Library(f) for n, f in folders.items()}}
     contents = {n: reached(library, 0) for n, library in libraries.items()}
     descriptions = {n: library.description for n, library in libraries.items()}
-    # Each FMU's state is foreign to the one before it.
-    foreign = dict(zip(contents, [states[-1] for states in [*contents.values()][1:]]))
-    foreign[[*contents][-1]] = contents[name][-1]
+    names = [*contents]
+    # The state that is foreign to an FMU is that of the one before it.
+    foreign = {n: contents[names[i - 1]][-1] for i, n in enumerate(names)}
     mutants: list[Trials] = []
 
-    def sequence_of(seed: int) -> Sequence_:
+    def sequence_of(seed: int) -> Calls:
         return generated(seed, name, descriptions, foreign)
 
     def do(task: Task) -> Any:
@@ -78,6 +80,8 @@ def serve(folders: Mapping[str, Path], name: str) -> Callable[[Task], Any]:
             return [f for seed in task.seeds for f in _tried(mutants[0], seed)]
         if task.kind == "sequences":
             return [f for seed in task.seeds for f in _played(sequence_of(seed), libraries, seed)]
+        if task.kind == "describe":
+            return descriptions[name]
         if task.sequence is None:
             return sequence_of(task.seeds[0])
         if task.kind == "show":
@@ -94,7 +98,7 @@ def _mutants(library: Library, foreign: Sequence[bytes]) -> Trials:
     return Trials(host, bases, foreign)
 
 
-def _played(sequence: Sequence_, libraries: Mapping[str, Library], seed: int) -> list[Finding]:
+def _played(sequence: Calls, libraries: Mapping[str, Library], seed: int) -> list[Finding]:
     try:
         play(sequence, libraries)
     except Difference as difference:
@@ -139,22 +143,26 @@ class Fuzzer:
     def _ask(self, task: Task) -> Any:
         return self._worker.ask(task, PATIENCE * max(1, len(task.seeds) // 5))
 
-    def sequence(self, seed: int) -> Sequence_:
-        made: Sequence_ = self._ask(Task("make", [seed]))
+    def description(self) -> Description:
+        made: Description = self._ask(Task("describe"))
         return made
 
-    def show(self, sequence: Sequence_) -> str:
+    def sequence(self, seed: int) -> Calls:
+        made: Calls = self._ask(Task("make", [seed]))
+        return made
+
+    def show(self, sequence: Calls) -> str:
         """A sequence as a text to be read."""
         return "\n".join(f"    {line}" for line in self._ask(Task("show", (), sequence)))
 
-    def replay(self, sequence: Sequence_) -> str:
+    def replay(self, sequence: Calls) -> str:
         """What comes of a sequence; empty: nothing."""
         found = self._ask(Task("play", (), sequence))
         if isinstance(found, Lost):
             return found.why
         return found[0].what if found else ""
 
-    def shrunk(self, sequence: Sequence_) -> Sequence_:
+    def shrunk(self, sequence: Calls) -> Calls:
         """A sequence that fails the same way, and no action of which can be left out."""
         actions, replays = [*sequence.actions], 0
         wanted = _kind_of(self.replay(sequence))

@@ -581,7 +581,7 @@ def _make_values(host: Host, call: Call, saved: Saved) -> Status:
         None if null in ("values", "both") else array,
     )
     if action == "Get" and null is None and status == Status.OK:
-        for item, value in zip(items, array):
+        for item, value in zip(items, array, strict=False):
             assert item.good or value == _MISSING[kind], f"{value!r} for what there is not"
     return status
 

@@ -269,7 +269,7 @@ class Host:
         found: dict[str, Any] = {}
         for arrays in self._arrays.values():
             if arrays.names:
-                found |= zip(arrays.names, self._read(arrays))
+                found |= zip(arrays.names, self._read(arrays), strict=True)
         return found
 
     def outputs(self) -> list[float]:

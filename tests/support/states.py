@@ -1,9 +1,9 @@
 """Serialised states that were tampered with: by their bytes, and by what they say.
 
-A state that is JSON is changed by a grammar: one of its values becomes something else, a key comes,
-goes or is renamed, a part is taken from another state. Its checksum is left as it is or made to fit
-again; with one that fits, what the state says is all that speaks against it. States of other formats
-are changed by their bytes alone.
+A state that is JSON is changed by a grammar: one of its values becomes something else, a key
+comes, goes or is renamed, a part is taken from another state. Its checksum is left as it is or made
+to fit again; with one that fits, what the state says is all that speaks against it. States of other
+formats are changed by their bytes alone.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ SOUND = "sound"
 #: Rows that are about no instance: the function that makes one, and what stands in its place.
 CREATION, WITHOUT_AN_INSTANCE = "fmi2Instantiate", "no instance"
 
-_NOT_POSSIBLE = "–"
+_NOT_POSSIBLE = "\u2013"
 
 
 class Answer(NamedTuple):
@@ -89,7 +89,7 @@ def rows() -> dict[tuple[str, str], Row]:
             columns = section.header[2:-1]
             assert columns == [*STATES], section.heading
             for function, case, *cells, mended_by in section.rows:
-                row = Row(function, case, _cells(dict(zip(columns, cells))), mended_by)
+                row = Row(function, case, _cells(dict(zip(columns, cells, strict=True))), mended_by)
                 assert row.key not in found, f"{row} stands twice"
                 found[row.key] = row
     return found
