@@ -46,7 +46,12 @@ def faults(said: Any, description: Description, samples: Sequence[dict[str, Any]
     """
     if not isinstance(said, dict) or said.keys() != samples[0].keys():
         return ["other parts than those of a state"]
-    return [*_faults(said, description, samples)]
+    found = [*_faults(said, description, samples)]
+    kept_true = _INVARIANTS.get(description.name)
+    # After an initialisation that was refused, values are others than those the state came from.
+    if found or kept_true is None or said["state"] is None or "initialisation" in said["refused"]:
+        return found
+    return [*kept_true(said)]
 
 
 def _faults(
@@ -75,7 +80,7 @@ def _faults(
     else:
         yield from (f"{n} = {v!r:.30}" for n, v in values.items() if not _fits(parameters[n], v))
     yield from _faults_of_refusals(said)
-    yield from _faults_of_state(said, samples, description.name)
+    yield from _faults_of_state(said, samples)
 
 
 def _faults_of_refusals(said: dict[str, Any]) -> Iterator[str]:
@@ -88,9 +93,7 @@ def _faults_of_refusals(said: dict[str, Any]) -> Iterator[str]:
         yield "refusals without a fault"
 
 
-def _faults_of_state(
-    said: dict[str, Any], samples: Sequence[dict[str, Any]], name: str
-) -> Iterator[str]:
+def _faults_of_state(said: dict[str, Any], samples: Sequence[dict[str, Any]]) -> Iterator[str]:
     state = said["state"]
     if state is None:
         if said["hidden"] is not None:
@@ -103,8 +106,6 @@ def _faults_of_state(
         yield "a state of another shape"
     elif any(not isfinite(x) for x in _numbers(state)):
         yield "a state that is not finite"
-    elif name in _INVARIANTS and "initialisation" not in said["refused"]:
-        yield from _INVARIANTS[name](said)
 
 
 def _is_number(value: Any) -> bool:
