@@ -10,6 +10,10 @@ class InputError(ValueError):
     """The user asked for something that cannot be done; the text says what to change."""
 
 
+class StartError(InputError):
+    """A simulation has failed before its first row, though all that was asked for can be done."""
+
+
 def reason(error: BaseException) -> str:
     """All that an exception says, in one line."""
     return "; ".join(line.strip() for line in str(error).splitlines() if line.strip()) or repr(

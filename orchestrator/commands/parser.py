@@ -9,7 +9,7 @@ from importlib.metadata import version
 
 from orchestrator.commands import build, exchange, look, new, paper, run, upkeep
 from orchestrator.commands.options import BAD_INPUT, FAILED, INTERRUPTED, say
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, StartError
 
 
 def dispatch(arguments: Sequence[str] | None) -> int:
@@ -20,7 +20,7 @@ def dispatch(arguments: Sequence[str] | None) -> int:
         return int(options.action(options))
     except InputError as error:
         say(str(error))
-        return BAD_INPUT
+        return FAILED if isinstance(error, StartError) else BAD_INPUT
     except KeyboardInterrupt:
         say("interrupted")
         return INTERRUPTED

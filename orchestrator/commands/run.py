@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from orchestrator.commands.options import (
 from orchestrator.experiments.preparation import loaded, prepare, with_companion
 from orchestrator.experiments.run import Files, run_into
 from orchestrator.master.files import FORMATS
+from orchestrator.master.isolated import STEP_TIMEOUT, isolation_of
 
 
 def add_to(commands: Any) -> None:
@@ -50,11 +52,24 @@ def add_to(commands: Any) -> None:
     run.add_argument(
         "--no-figures", dest="figures", action="store_false", help="draw none; default: draw"
     )
+    run.add_argument(
+        "--isolate",
+        action="store_true",
+        help="run each FMU in a process of its own, where it can crash or hang",
+    )
+    run.add_argument(
+        "--step-timeout",
+        type=float,
+        metavar="S",
+        help="how long an isolated FMU may take for one call [s]; "
+        f"default: {STEP_TIMEOUT:g}; needs --isolate",
+    )
     run.set_defaults(action=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
-    wanted = request(options)
+    isolation = isolation_of(options.isolate, options.step_timeout)
+    wanted = replace(request(options), isolation=isolation)
     runs = with_companion(prepare(*loaded(options.scenario), wanted), wanted)
     folder = options.out or Path("results", runs[0].scenario.name)
     files = Files(options.interval, options.columns, options.format, options.figures)

@@ -13,6 +13,7 @@ from orchestrator.experiments.bundle import current_fmus
 from orchestrator.experiments.scenario import Scenario, read_scenario
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.isolated import Isolation
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.reading import read_ssp
 from orchestrator.system.structure import System
@@ -29,6 +30,7 @@ class Request:
         stop_time, step: experiment [s]; None: the scenario's or the system's own.
         order: of evaluation.
         parameters: values that win over the scenario's.
+        isolation: of the FMUs in processes of their own; None: they run in this one.
 
     """
 
@@ -36,15 +38,17 @@ class Request:
     step: float | None = None
     order: str = ORDERS[0]
     parameters: Mapping[PortName, object] = field(default_factory=dict)
+    isolation: Isolation | None = None
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A system that is ready to be run, and the scenario that it comes from."""
+    """A system that is ready to be run, the scenario that it comes from, and where its FMUs run."""
 
     scenario: Scenario
     system: System
     experiment: Experiment
+    isolation: Isolation | None = None
 
 
 def load(name: str | Path) -> System:
@@ -98,7 +102,8 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     step = _first_given(request.step, scenario.step, system.step)
     if step is None:
         step = DEFAULT_STEP
-    return Prepared(scenario, system, Experiment(stop_time, step, request.order))
+    experiment = Experiment(stop_time, step, request.order)
+    return Prepared(scenario, system, experiment, request.isolation)
 
 
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:

@@ -21,6 +21,8 @@ from orchestrator.experiments.run import metrics_json, write_metrics
 from orchestrator.experiments.scenario import Scenario
 from orchestrator.master.experiment import ORDERS
 from orchestrator.master.files import FORMATS
+from orchestrator.master.isolated import isolation_of
+from orchestrator.master.observer import Observer
 from orchestrator.master.progress import Progress
 from orchestrator.master.simulation import simulate as run
 from orchestrator.master.table import Table
@@ -164,6 +166,8 @@ def simulate(
     step: float | None = None,
     order: str = ORDERS[0],
     progress: bool = False,
+    isolate: bool = False,
+    step_timeout: float | None = None,
 ) -> Result:
     """Run a scenario, an SSP or a system.
 
@@ -178,6 +182,9 @@ def simulate(
         step: communication step [s]; None: the scenario's own, else 0.02.
         order: `gauss-seidel`, as the paper's scheme has it, or `jacobi`, as most tools step.
         progress: show a bar on runs that take longer than some seconds.
+        isolate: run each FMU in a process of its own, whose end, whatever it does, is no more than
+            a failure of the run.
+        step_timeout: how long an isolated FMU may take for one call [s]; None: 60.
 
     Returns:
         The rows that were computed: all of them, or those before a failure, which
@@ -197,11 +204,11 @@ def simulate(
     changes: dict[PortName, object] = {
         port_name(str(name)): value for name, value in (parameters or {}).items()
     }
-    prepared = prepare(scenario, system, Request(stop_time, step, order, changes))
+    isolation = isolation_of(isolate, step_timeout)
+    prepared = prepare(scenario, system, Request(stop_time, step, order, changes, isolation))
     result = Result(prepared)
-    ending = run(
-        prepared.system, prepared.experiment, [result, *([Progress(scenario.name)] * progress)]
-    )
+    observers: list[Observer] = [result, *([Progress(scenario.name)] * progress)]
+    ending = run(prepared.system, prepared.experiment, observers, prepared.isolation)
     for number in ending.signals:
         # Held back while the FMUs computed; now it does what it does elsewhere.
         signal.raise_signal(number)

@@ -26,9 +26,9 @@ from orchestrator.master.files import FORMATS
 from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.observer import Ending, Observer
 from orchestrator.master.progress import Progress
-from orchestrator.master.row import KINDS
 from orchestrator.master.selection import Selection, check_interval, matches, matching
 from orchestrator.master.simulation import simulate
+from orchestrator.master.transfer import KINDS
 from orchestrator.system.structure import System
 
 
@@ -146,7 +146,7 @@ def _run(
         seen,
         Progress(scenario.name),
     ]
-    ending = simulate(system, prepared.experiment, observers)
+    ending = simulate(system, prepared.experiment, observers, prepared.isolation)
     values = metrics_json(metrics, prepared)
     write_metrics(folder, values)
     return Finished(folder, scenario.name, values, ending), seen

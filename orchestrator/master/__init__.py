@@ -5,8 +5,15 @@ module                  what it holds
 ======================  ==============================================================
 :mod:`.experiment`      start, stop and step of a run: t_k = k h
 :mod:`.simulation`      a run from the first exchange to the last step
-:mod:`.instance`        one running FMU
-:mod:`.row`             the row of all values, and which FMI call moves what
+:mod:`.instance`        what a run asks of a component
+:mod:`.loaded`          an FMU loaded into this process
+:mod:`.isolated`        an FMU in a process of its own, from this side
+:mod:`.channel`         messages between the two
+:mod:`.serving`         what that process does
+:mod:`.keeper`          the process that starts such processes, and leaves none behind
+:mod:`.log`             what FMUs have to say
+:mod:`.row`             the row of all values
+:mod:`.transfer`        the FMI calls that move them
 :mod:`.schedule`        which components are stepped when, and on whose outputs
 :mod:`.observer`        what observers are told, and the blocks in which they are told it
 :mod:`.progress`        a bar
@@ -23,7 +30,7 @@ The loop, in :func:`.simulation.simulate`::
     for every step from t to t + h:
         for every stage of the schedule:
             gather the inputs of its components
-            step each of them, and read its outputs
+            step each of them, then read their outputs
         tell the observers the row
         stop if an FMU has failed, or somebody wants it
 

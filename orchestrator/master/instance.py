@@ -1,196 +1,75 @@
-"""One running FMU: loading, parameters, steps, and what it says."""
+"""What a run asks of a component, wherever its FMU is."""
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from copy import copy
-from functools import partial
-from pathlib import Path
-from threading import Lock
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
 
-import fmpy
-from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import (
-    FMU2Slave,
-    fmi2Boolean,
-    fmi2CallbackAllocateMemoryTYPE,
-    fmi2CallbackFreeMemoryTYPE,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-    fmi2Component,
-    fmi2Discard,
-    fmi2Real,
-    fmi2Status,
-    fmi2Warning,
-)
-from fmpy.logging import addLoggerProxy
-from fmpy.model_description import ModelDescription, ModelVariable
+import numpy as np
 
-from orchestrator.errors import InputError, reason
-from orchestrator.system.component import Component
-from orchestrator.system.unpacking import unpacked
 from orchestrator.system.values import Value
 
-#: Messages that are kept: an FMU may have something to say in every step.
-_MOST_MESSAGES = 100
 
-
-class Log:
-    """What the FMUs of a run have said with status warning or worse.
+class ComponentFailed(Exception):
+    """A component did not do what it was asked for; the text names it and says why.
 
     Attributes:
-        refusals: the first of it with status discard or worse.
-        last: the latest, a refusal before a warning.
+        fatal: whether it is lost: FMI's fmi2Fatal, or its process has ended or hangs.
 
     """
 
-    def __init__(self) -> None:
-        """Start empty."""
-        self._said: list[str] = []
-        self._n = 0
-        self.refusals: list[str] = []
-        self.last = ""
-        self.callbacks = fmi2CallbackFunctions()
-        self.callbacks.logger = fmi2CallbackLoggerTYPE(self._take)
-        self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-        self.callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
-        addLoggerProxy(ctypes.byref(self.callbacks))
+    def __init__(self, text: str, fatal: bool = False) -> None:
+        """Say what happened."""
+        super().__init__(text)
+        self.fatal = fatal
 
-    def _take(self, _: Any, instance: bytes, status: int, _category: bytes, message: bytes) -> None:
-        text = f"{instance.decode(errors='replace')}: {message.decode(errors='replace')}"
-        if status >= fmi2Warning:
-            self._n += 1
-            self._said += [text] * (len(self._said) < _MOST_MESSAGES)
-        if status >= fmi2Discard:
-            self.refusals += [text] * (len(self.refusals) < _MOST_MESSAGES)
-        if status >= fmi2Discard or not self.refusals:
-            self.last = text
+
+class Part(NamedTuple):
+    """Ports of one component that have the same causality and kind.
+
+    Attributes:
+        causality: `input` or `output`.
+        kind: one of :data:`orchestrator.master.transfer.KINDS`.
+        references: value references.
+        place: of their values among those of the component.
+
+    """
+
+    causality: str
+    kind: str
+    references: list[int]
+    place: slice
+
+
+class Instance(Protocol):
+    """An instantiated FMU whose inputs and outputs live in a row of floats.
+
+    In every step the calls of `set_inputs`, then `do_step` with time and step size, then those of
+    `get_outputs` are made; those of `get_outputs` once all components of a stage have been stepped.
+    """
+
+    name: str
+    set_inputs: list[Callable[[], Any]]
+    get_outputs: list[Callable[[], Any]]
 
     @property
-    def messages(self) -> tuple[str, ...]:
-        """The first of it, and how much there was."""
-        more = self._n - len(self._said)
-        return (*self._said, *([f"and {more} messages more"] * (more > 0)))
+    def do_step(self) -> Callable[[float, float, int], Any]:
+        """FMI's doStep, to be called with time, step size and one."""
 
+    def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
+        """Say where its values are: a view of the row, with the inputs first, and its parts."""
 
-class Instance:
-    """A loaded and instantiated FMU whose inputs and outputs live in a row of floats.
+    def enter_initialization(self, values: Mapping[str, Value], stop_time: float) -> None:
+        """Set start values and parameters, set up the experiment, and enter that mode."""
 
-    Attributes:
-        name: of the component.
-        fmu: fmpy's view of it.
-        set_inputs, get_outputs: one call for each kind of value that the component has; tied to
-            the row by :class:`orchestrator.master.row.Row`.
-        do_step: FMI's doStep, to be called with time and step size.
-
-    """
-
-    def __init__(self, component: Component, fmu: FMU2Slave) -> None:
-        """Wrap an FMU that has been instantiated."""
-        self.name = component.name
-        self.fmu = fmu
-        self._variables = component.variables
-        self.set_inputs: list[Callable[[], Any]] = []
-        self.get_outputs: list[Callable[[], Any]] = []
-        self.do_step = self.function("DoStep", (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean))
-
-    def function(self, name: str, types: Sequence[Any] | None = None) -> Callable[..., Any]:
-        """One of the FMU's functions, for calls of every step.
-
-        fmpy's own methods look the function up and convert its arguments in every call, which
-        costs as much as the call.
-
-        Args:
-            name: of the function, without fmi2.
-            types: of its arguments; None: they come as values of ctypes.
-
-        """
-        called = self.fmu.dll[f"fmi2{name}"]
-        called.argtypes, called.restype, called.errcheck = types, fmi2Status, _refuse_failures
-        return partial(called, fmi2Component(self.fmu.component))
+    def exit_initialization(self) -> None:
+        """Get ready for the first step."""
 
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
-        for call in (*self.set_inputs, *self.get_outputs):
-            call()
-
-    def set(self, port: str, value: Value) -> None:
-        """Set a start value or a parameter, given in the type of its variable."""
-        variable = self._variables[port]
-        setter = getattr(self.fmu, f"set{_fmi_type(variable)}")
-        setter([variable.valueReference], [value])
 
     def parameters(self) -> dict[str, Any]:
         """Values of all parameters, as the FMU reports them."""
-        return {
-            name: self._get(variable)
-            for name, variable in self._variables.items()
-            if variable.causality == "parameter"
-        }
 
-    def _get(self, variable: ModelVariable) -> Any:
-        value = getattr(self.fmu, f"get{_fmi_type(variable)}")([variable.valueReference])[0]
-        if variable.type == "Boolean":
-            return bool(value)
-        return value.decode() if isinstance(value, bytes) else value
-
-
-def _fmi_type(variable: ModelVariable) -> str:
-    return "Integer" if variable.type == "Enumeration" else str(variable.type)
-
-
-def _refuse_failures(status: int, called: Any, _: Any) -> int:
-    if status > fmi2Warning:
-        raise FMICallException(function=called.__name__, status=status)
-    return status
-
-
-@contextmanager
-def running(component: Component, log: Log) -> Iterator[Instance]:
-    """An instance of a component, freed at the end; its FMU stays loaded.
-
-    Raises:
-        InputError: the FMU cannot be loaded.
-
-    """
-    # The functions of the library serve all instances; what differs is theirs alone.
-    with _LOCK:
-        fmu = copy(_library(component.fmu, component.description, unpacked(component.fmu)))
-    fmu.instanceName = component.name
-    try:
-        fmu.instantiate(callbacks=log.callbacks, loggingOn=True)
-    except Exception as error:
-        raise InputError(f"{component.fmu}: {reason(error)}") from error
-    try:
-        yield Instance(component, fmu)
-    finally:
-        # FMU2Slave.freeInstance would unload the library as well.
-        fmu.fmi2FreeInstance(fmu.component)
-
-
-#: Libraries by the folders into which their FMUs are unpacked, for runs in several threads.
-_libraries: dict[Path, FMU2Slave] = {}
-_LOCK = Lock()
-
-
-def _library(fmu: Path, description: ModelDescription, folder: Path) -> FMU2Slave:
-    """The library of an unpacked FMU, loaded once a process."""
-    if folder not in _libraries:
-        if "%" in folder.as_uri().replace("%20", ""):
-            # PythonFMU 0.7 does not decode the URI and crashes its host.
-            raise InputError(
-                f"temporary folder {str(folder)!r}: FMUs need a path of plain ASCII characters; "
-                "set TMPDIR to one"
-            )
-        try:
-            _libraries[folder] = FMU2Slave(
-                guid=description.guid,
-                modelIdentifier=description.coSimulation.modelIdentifier,
-                unzipDirectory=str(folder),
-            )
-        except Exception as error:
-            raise InputError(f"{fmu}: cannot be loaded: {reason(error)}") from error
-    return _libraries[folder]
+    def terminate(self) -> None:
+        """Let the FMU end what it has begun."""

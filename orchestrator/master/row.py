@@ -1,28 +1,18 @@
-"""The row of all values, and which FMI call moves which part of it."""
+"""The row of all values."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from ctypes import c_size_t
-from functools import partial
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from math import isfinite
 
 import numpy as np
-from fmpy.fmi2 import fmi2Boolean, fmi2Integer, fmi2Real, fmi2ValueReference
 from fmpy.model_description import ModelVariable
 
-from orchestrator.master.instance import Instance
+from orchestrator.master.instance import Instance, Part
+from orchestrator.master.transfer import KINDS
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-
-#: Kinds of values that can be connected and recorded, with FMI's functions and types for them.
-KINDS = {
-    "Real": ("Real", fmi2Real),
-    "Integer": ("Integer", fmi2Integer),
-    "Enumeration": ("Integer", fmi2Integer),
-    "Boolean": ("Boolean", fmi2Boolean),
-}
 
 
 class Row:
@@ -40,29 +30,48 @@ class Row:
     def __init__(self, system: System, instances: Mapping[str, Instance]) -> None:
         """Lay out the row, tie the instances to it, and enter the inputs' values at the start."""
         groups = [
-            (instance, causality, kind, ports)
-            for name, instance in instances.items()
+            (name, causality, kind, ports)
+            for name in instances
             for causality in ("input", "output")
             for kind in KINDS
             if (ports := _ports(system.components[name], causality, kind))
         ]
         self.values = np.zeros(sum(len(ports) for *_, ports in groups))
         self.columns: dict[PortName, int] = {}
-        for instance, causality, kind, ports in groups:
-            first = len(self.columns)
-            part = self.values[first : first + len(ports)]
-            block = _Block(kind, [port.valueReference for port in ports], part)
-            if causality == "input":
-                instance.set_inputs.append(block.setter(instance))
-            else:
-                instance.get_outputs.append(block.getter(instance))
-            for i, port in enumerate(ports, start=first):
-                self.columns[PortName(instance.name, port.name)] = i
-                start = system.components[instance.name].start(port.name)
+        self._outputs: list[PortName] = []
+        firsts: dict[str, int] = {}
+        parts: dict[str, list[Part]] = {name: [] for name in instances}
+        for component, causality, kind, ports in groups:
+            column = len(self.columns)
+            first = column - firsts.setdefault(component, column)
+            references = [port.valueReference for port in ports]
+            place = slice(first, first + len(ports))
+            parts[component].append(Part(causality, kind, references, place))
+            for i, port in enumerate(ports, start=column):
+                name = PortName(component, port.name)
+                self.columns[name] = i
+                self._outputs += [name] * (causality == "output")
+                start = system.components[component].start(port.name)
                 self.values[i] = 0.0 if start is None else float(start)
+        for component, instance in instances.items():
+            instance.tie(self.values[firsts.get(component, 0) :], parts[component])
         for target, value in system.parameters.items():
             if target in self.columns:
                 self.values[self.columns[target]] = float(value)
+
+    def not_finite(self, components: Iterable[str]) -> str | None:
+        """The first output that is no number or infinite, in words; None: all are finite.
+
+        Args:
+            components: in the order in which they are stepped: others may have passed it on.
+
+        """
+        for component in components:
+            for port in self._outputs:
+                value = self.values[self.columns[port]]
+                if port.component == component and not isfinite(value):
+                    return f"{port} is {value:g}"
+        return None
 
     def places(self, connections: Sequence[Connection]) -> tuple[np.ndarray, np.ndarray]:
         """Where the targets and the sources of some connections are."""
@@ -74,55 +83,3 @@ class Row:
 
 def _ports(component: Component, causality: str, kind: str) -> list[ModelVariable]:
     return [variable for variable in component.having(causality) if variable.type == kind]
-
-
-class _Block:
-    """Values of one kind, side by side in the row of all values, moved by one FMI call."""
-
-    def __init__(self, kind: str, references: list[int], row: np.ndarray) -> None:
-        """Prepare the arrays that every call uses.
-
-        Args:
-            kind: one of :data:`KINDS`.
-            references: value references.
-            row: the part of the row of all values where the values are, a view.
-
-        """
-        self._kind, c_type = KINDS[kind]
-        self._row = row
-        self._n = c_size_t(len(references))
-        self._references = (fmi2ValueReference * len(references))(*references)
-        if kind == "Real":
-            self._values = (c_type * len(references)).from_buffer(row)
-        else:
-            self._values = (c_type * len(references))()
-            self._integers = np.frombuffer(self._values, dtype=np.intc)
-
-    def _call(self, instance: Instance, action: str) -> Callable[[], Any]:
-        return partial(
-            instance.function(f"{action}{self._kind}"), self._references, self._n, self._values
-        )
-
-    def setter(self, instance: Instance) -> Callable[[], Any]:
-        """A call that hands the values to the FMU."""
-        call = self._call(instance, "Set")
-        if self._kind == "Real":
-            return call
-
-        def set_converted() -> None:
-            self._integers[:] = self._row
-            call()
-
-        return set_converted
-
-    def getter(self, instance: Instance) -> Callable[[], Any]:
-        """A call that takes the values from the FMU."""
-        call = self._call(instance, "Get")
-        if self._kind == "Real":
-            return call
-
-        def get_converted() -> None:
-            call()
-            self._row[:] = self._integers
-
-        return get_converted

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
 
 import numpy as np
-from fmpy.fmi1 import FMICallException
 
-from orchestrator.errors import InputError, reason
+from orchestrator.errors import InputError, StartError, reason
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.instance import Instance, Log, running
+from orchestrator.master.instance import ComponentFailed, Instance
 from orchestrator.master.interrupts import Interrupts, held_interrupts
+from orchestrator.master.isolated import Isolation, isolated
+from orchestrator.master.loaded import all_loaded
+from orchestrator.master.log import Log
 from orchestrator.master.observer import Blocks, Ending, Header, Observer
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import Stage, schedule, stages
@@ -19,37 +22,47 @@ from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 
 
-def simulate(system: System, experiment: Experiment, observers: Sequence[Observer] = ()) -> Ending:
+def simulate(
+    system: System,
+    experiment: Experiment,
+    observers: Sequence[Observer] = (),
+    isolation: Isolation | None = None,
+) -> Ending:
     """Run a system from t = 0.
 
     Args:
         system: what to run.
         experiment: until when, in which steps and which order.
         observers: take the rows.
+        isolation: run each FMU in a process of its own; None: all in this one.
 
     Returns:
         How the run has ended: after a failure the observers have the rows before it.
 
     Raises:
         InputError: system or parameters are not usable; nothing was stepped.
+        KeyboardInterrupt: somebody wants it to stop, and an FMU does not come to its first step.
 
     """
     system.check()
     plan = stages(system, experiment.order)
     log = Log()
     with held_interrupts() as interrupts, ExitStack() as stack:
-        with _explained(log):
-            instances = {
-                name: stack.enter_context(running(component, log))
-                for name, component in system.components.items()
-            }
+        with _explained():
+            components = system.components
+            instances = stack.enter_context(
+                isolated(components, log, isolation, interrupts)
+                if isolation
+                else all_loaded(components, log)
+            )
             row = Row(system, instances)
             _initialise(system, instances, row, experiment, log)
             header = Header(tuple(map(str, row.columns)), experiment, _parameters(instances))
         steps = schedule(system, plan, instances, row)
         with _told(header, observers) as tell:
             blocks = Blocks(len(row.values), observers)
-            failure = _advance(experiment, steps, row.values, blocks, interrupts, log)
+            order = [name for names in plan for name in names]
+            failure = _advance(experiment, steps, row, order, blocks, interrupts)
             if failure is None:
                 _terminate(instances)
             ending = Ending(failure, log.messages, tuple(interrupts.signals))
@@ -83,31 +96,34 @@ def _initialise(
 
     Raises:
         InputError: the values do not come to rest, or an FMU refused a value.
+        StartError: a value is not finite.
 
     """
-    for target, value in system.parameters.items():
-        instances[target.component].set(target.port, value)
-    for instance in instances.values():
-        instance.fmu.setupExperiment(startTime=0.0, stopTime=experiment.stop_time)
-        instance.fmu.enterInitializationMode()
+    for name, instance in instances.items():
+        instance.enter_initialization(system.parameters_of(name), experiment.stop_time)
     values = row.values
     targets, sources = row.places(system.connections)
     for _ in range(len(instances) + 1):
         before = values.copy()
         values[targets] = values[sources]
-        for instance in instances.values():
-            instance.exchange()
+        _exchange(instances, row)
         if np.array_equal(before, values):
             break
     else:
         raise InputError("initial values do not come to rest: an algebraic loop")
     for instance in instances.values():
-        instance.fmu.exitInitializationMode()
+        instance.exit_initialization()
     values[targets] = values[sources]
-    for instance in instances.values():
-        instance.exchange()
+    _exchange(instances, row)
     if log.refusals:
         raise InputError("; ".join(log.refusals))
+
+
+def _exchange(instances: Mapping[str, Instance], row: Row) -> None:
+    for instance in instances.values():
+        instance.exchange()
+    if not_finite := row.not_finite(instances):
+        raise StartError(f"stopped at t = 0 s: {not_finite}")
 
 
 def _parameters(instances: Mapping[str, Instance]) -> dict[PortName, object]:
@@ -121,48 +137,59 @@ def _parameters(instances: Mapping[str, Instance]) -> dict[PortName, object]:
 def _terminate(instances: Mapping[str, Instance]) -> None:
     """Let FMUs end what they have begun; the rows are there whether they can or not."""
     for instance in instances.values():
-        with suppress(FMICallException):
-            instance.fmu.terminate()
+        with suppress(ComponentFailed):
+            instance.terminate()
 
 
 def _advance(
     experiment: Experiment,
-    plan: list[Stage],
-    values: np.ndarray,
+    plan: Sequence[Stage],
+    row: Row,
+    order: Sequence[str],
     blocks: Blocks,
     interrupts: Interrupts,
-    log: Log,
 ) -> str | None:
     """Step to the end, or to the first failure, and say what it was."""
-    t, failure = 0.0, None
+    values, failure = row.values, None
+    # Times zero, what is finite is zero and what is not is nan: the cheapest way to see it.
+    is_not_finite = partial(np.vdot, values, np.zeros_like(values))
+    t = end = 0.0
     blocks.append(t, values)
     try:
         for t, h, end in experiment.steps():
             for targets, sources, members in plan:
                 values[targets] = values[sources]
-                for set_inputs, do_step, get_outputs in members:
+                for set_inputs, do_step, _ in members:
                     for call in set_inputs:
                         call()
                     do_step(t, h, 1)
-                    for call in get_outputs:
+                for member in members:
+                    for call in member.get_outputs:
                         call()
+            if is_not_finite():
+                break
             blocks.append(end, values)
             if interrupts:
-                failure = f"interrupted at t = {end:g} s"
+                failure = f"interrupted at t = {end:.12g} s"
                 break
-    except FMICallException as error:
-        failure = f"stopped at t = {t:g} s: {log.last or error}"
+    except ComponentFailed as error:
+        failure = f"stopped at t = {t:.12g} s: {error}"
+    except KeyboardInterrupt:
+        failure = f"interrupted at t = {t:.12g} s"
+    # Also where another component has refused it in the same step.
+    if not_finite := row.not_finite(order):
+        failure = f"stopped at t = {end:.12g} s: {not_finite}"
     blocks.hand_over()
     return failure
 
 
 @contextmanager
-def _explained(log: Log) -> Iterator[None]:
-    """An FMI call that fails before the first step, in the words of the FMU."""
+def _explained() -> Iterator[None]:
+    """A component that fails before the first step."""
     try:
         yield
-    except FMICallException as error:
-        raise InputError(log.last or str(error)) from error
+    except ComponentFailed as error:
+        raise (StartError if error.fatal else InputError)(str(error)) from error
 
 
 @contextmanager

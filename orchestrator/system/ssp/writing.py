@@ -153,6 +153,8 @@ def _add_units(root: ElementTree.Element, system: System) -> None:
         for component in system.components.values()
         for unit in component.description.unitDefinitions
     }
+    if not units:
+        return
     parent = ElementTree.SubElement(root, _ssd("Units"))
     for name in sorted(units):
         element = ElementTree.SubElement(parent, _ssc("Unit"), name=name)

@@ -1,0 +1,387 @@
+"""FMUs in processes of their own: what they do there ends a run at most, and nothing else."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from functools import partial
+from math import isfinite
+from numbers import Real
+from select import poll
+from subprocess import PIPE, Popen, TimeoutExpired
+from time import monotonic
+from typing import Any
+
+import numpy as np
+from fmpy.fmi2 import fmi2Warning
+
+from orchestrator.errors import InputError, StartError, reason
+from orchestrator.master.channel import Channel, sizes
+from orchestrator.master.instance import ComponentFailed, Instance, Part
+from orchestrator.master.interrupts import Interrupts
+from orchestrator.master.keeper import END
+from orchestrator.master.log import Log
+from orchestrator.system.component import Component
+from orchestrator.system.unpacking import unpacked
+from orchestrator.system.values import Value
+
+#: How long a call may take by default [s]: an FMU may fetch a licence or read maps first.
+STEP_TIMEOUT = 60.0
+
+#: How long a process may take to begin [s].
+_START = 60.0
+
+#: How often the wait for an FMU looks about [s], how long it still waits when the user wants to
+#: stop [s], and how long an FMU has to be freed when the run has failed [s].
+_GLANCE, _PATIENCE, _FAREWELL = 0.1, 1.0, 5.0
+
+#: What the keeper begins with: the modules that this process would find, and no main module.
+_BEGIN = """
+import json, sys
+order = json.loads(sys.stdin.buffer.raw.readline())
+sys.path[:] = order["path"]
+from orchestrator.master.keeper import keep
+keep(order)
+"""
+
+
+@dataclass(frozen=True)
+class Isolation:
+    """How FMUs are run in processes of their own.
+
+    Attributes:
+        step_timeout: how long one call of an FMU may take [s].
+
+    """
+
+    step_timeout: float = STEP_TIMEOUT
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be waited for."""
+        seconds = self.step_timeout
+        number = isinstance(seconds, Real) and not isinstance(seconds, bool)
+        if not (number and isfinite(seconds) and seconds > 0.0):
+            raise InputError(f"step timeout {seconds!r}: must be a positive number of seconds")
+
+
+def isolation_of(isolate: bool, step_timeout: float | None) -> Isolation | None:
+    """What a user asks for.
+
+    Raises:
+        InputError: a timeout without isolation: nobody could end a call in this process.
+
+    """
+    if isolate:
+        return Isolation() if step_timeout is None else Isolation(step_timeout)
+    if step_timeout is not None:
+        raise InputError(
+            "a step timeout needs isolation: only an FMU in a process of its own can be ended"
+        )
+    return None
+
+
+class IsolatedInstance:
+    """An instance in another process: see :class:`.instance.Instance`.
+
+    A step is one message there, with the inputs, and one back, with the outputs.
+    """
+
+    def __init__(
+        self,
+        component: Component,
+        connection: socket.socket,
+        status: Callable[[float], int | None],
+        log: Log,
+        timeout: float,
+        interrupts: Interrupts,
+    ) -> None:
+        """Use a process that instantiates a component now.
+
+        Args:
+            component: that it is an instance of.
+            connection: to the process.
+            status: gives the exit status of the process, for which it waits some seconds.
+            log: takes what the FMU says.
+            timeout: how long a call may take [s].
+            interrupts: that end the wait for a call.
+
+        """
+        self.name = component.name
+        self.set_inputs: list[Callable[[], Any]] = []
+        self.get_outputs: list[Callable[[], Any]] = [self._take_outputs]
+        self._status, self._log = status, log
+        self._timeout, self._interrupts = timeout, interrupts
+        self._doing, self._hangs = "start", False
+        connection.settimeout(min(timeout, _GLANCE))
+        self._inputs, self._outputs = np.zeros(0), np.zeros(0)
+        inputs, outputs = sizes(component)
+        self._channel = Channel(connection, 2 + inputs, outputs, self._waited)
+
+    def wait(self) -> None:
+        """Wait for the process to begin, and to instantiate the FMU.
+
+        Raises:
+            InputError: it cannot be.
+
+        """
+        # Before it begins nothing foreign is run, and a busy machine may take its time.
+        self._receive()
+        self._doing = "instantiate"
+        self._receive()
+
+    def tie(self, values: np.ndarray, _: Sequence[Part]) -> None:
+        """Say where its values are."""
+        inputs, outputs = len(self._channel.outgoing) - 2, len(self._channel.incoming)
+        self._inputs, self._outputs = values[:inputs], values[inputs : inputs + outputs]
+
+    def enter_initialization(self, values: Mapping[str, Value], stop_time: float) -> None:
+        """Set start values and parameters, set up the experiment, and enter that mode."""
+        self._ask("enter_initialization", values, stop_time)
+
+    def exit_initialization(self) -> None:
+        """Get ready for the first step."""
+        self._ask("exit_initialization")
+
+    def exchange(self) -> None:
+        """Set all inputs, then read all outputs."""
+        self._channel.outgoing[2:] = self._inputs
+        self._ask("exchange")
+        self._outputs[:] = self._channel.incoming
+
+    def parameters(self) -> dict[str, Any]:
+        """Values of all parameters, as the FMU reports them."""
+        values = self._ask("parameters")
+        if not isinstance(values, dict):
+            raise self._nonsense()
+        return values
+
+    def do_step(self, t: float, h: float, _: int) -> None:
+        """Have a step begun, whose end the first of `get_outputs` waits for."""
+        outgoing = self._channel.outgoing
+        outgoing[0] = t
+        outgoing[1] = h
+        outgoing[2:] = self._inputs
+        self._doing = "doStep"
+        self._send()
+
+    def terminate(self) -> None:
+        """Let the FMU end what it has begun, free it, and end its process."""
+        try:
+            self._ask("terminate")
+            self.leave()
+            self._doing, waited = "freeInstance", 0.0
+            while (status := self._status(_GLANCE)) is None:
+                waited += _GLANCE
+                self._waited(waited)
+            if status:
+                raise self._lost()
+        except ComponentFailed as error:
+            self._log.take(fmi2Warning, str(error))
+        except KeyboardInterrupt:
+            self._log.take(fmi2Warning, f"{self.name}: interrupted in {self._doing}")
+
+    def leave(self) -> None:
+        """Want nothing more: the process frees the FMU and ends, if it can."""
+        self._channel.close()
+
+    def farewell(self) -> None:
+        """Give the process some time to end; there is no use in waiting for one that hangs."""
+        if not self._hangs:
+            self._status(min(self._timeout, _FAREWELL))
+
+    def _take_outputs(self) -> None:
+        self._receive()
+        self._outputs[:] = self._channel.incoming
+
+    def _ask(self, call: str, *arguments: Any) -> Any:
+        self._doing = call
+        self._send({"call": call, "arguments": arguments})
+        return self._receive()
+
+    def _send(self, note: Any = None) -> None:
+        try:
+            self._channel.send(note)
+        except OSError as error:
+            raise self._lost() from error
+
+    def _receive(self) -> Any:
+        """The value of the answer to what was asked for."""
+        try:
+            note = self._channel.receive()
+            return None if note is None else self._read(**note)
+        except (EOFError, OSError) as error:
+            raise self._lost() from error
+        except InputError:
+            raise
+        except (ValueError, TypeError, RecursionError) as error:
+            raise self._nonsense() from error
+
+    def _read(
+        self,
+        value: Any = None,
+        messages: Sequence[tuple[int, str]] = (),
+        failed: str | None = None,
+        fatal: bool = False,
+        refused: str | None = None,
+    ) -> Any:
+        for status, text in messages:
+            self._log.take(int(status), str(text))
+        if refused is not None:
+            raise InputError(str(refused))
+        if failed is not None:
+            raise ComponentFailed(str(failed), bool(fatal))
+        return value
+
+    def _waited(self, seconds: float) -> None:
+        if self._interrupts and seconds >= _PATIENCE:
+            self._hangs = True
+            raise KeyboardInterrupt
+        limit = _START if self._doing == "start" else self._timeout
+        if seconds >= limit:
+            self._hangs = True
+            raise ComponentFailed(
+                f"{self.name}: {self._doing} has not ended within {limit:g} s", fatal=True
+            )
+
+    def _nonsense(self) -> ComponentFailed:
+        return ComponentFailed(f"{self.name}: its process answers nonsense", fatal=True)
+
+    def _lost(self) -> ComponentFailed:
+        status = self._status(_FAREWELL)
+        return ComponentFailed(
+            f"{self.name}: its process {_end(status)} in {self._doing}", fatal=True
+        )
+
+
+def _end(status: int | None) -> str:
+    if status is None:
+        return "answers no more"
+    if status >= 0:
+        return f"exited with status {status}"
+    names = {number.value: number.name for number in signal.Signals}
+    name = names.get(-status, f"signal {-status}")
+    memory = ", perhaps for want of memory" if -status == signal.SIGKILL else ""
+    return f"was ended by {name} ({signal.strsignal(-status)}{memory})"
+
+
+class _Keeper:
+    """The process that has the FMUs' processes: see :mod:`.keeper`."""
+
+    def __init__(
+        self, components: Mapping[str, Component], connections: Sequence[socket.socket]
+    ) -> None:
+        folders = [unpacked(component.fmu) for component in components.values()]
+        descriptors = [connection.fileno() for connection in connections]
+        order = {
+            "path": [entry for entry in sys.path if isinstance(entry, str)],
+            "temporary": sorted({str(folder.parent) for folder in folders}),
+            "components": [
+                (component.name, str(component.fmu), str(folder), descriptor)
+                for component, folder, descriptor in zip(
+                    components.values(), folders, descriptors, strict=True
+                )
+            ],
+        }
+        self._process = Popen(
+            [sys.executable, "-P", "-c", _BEGIN],
+            stdin=PIPE,
+            stdout=PIPE,
+            bufsize=0,
+            pass_fds=descriptors,
+            start_new_session=True,
+        )
+        self._statuses: dict[int, int] = {}
+        self._text = b""
+        self._write(json.dumps(order).encode() + b"\n")
+
+    def status(self, number: int, patience: float) -> int | None:
+        """Exit status of the process of a component, for which it waits some seconds.
+
+        Returns:
+            None: it has not ended.
+
+        """
+        due = monotonic() + patience
+        reports = self._process.stdout
+        assert reports is not None
+        ready = poll()
+        ready.register(reports)
+        while number not in self._statuses and (left := due - monotonic()) > 0.0:
+            if ready.poll(1000.0 * left):
+                text = os.read(reports.fileno(), 4096)
+                if not text:
+                    # Its children die with the keeper.
+                    return -signal.SIGKILL
+                *lines, self._text = (self._text + text).split(b"\n")
+                for line in lines:
+                    ended, exit_status = map(int, line.split())
+                    self._statuses[ended] = exit_status
+        return self._statuses.get(number)
+
+    def end(self) -> None:
+        """End all processes that are left."""
+        self._write(END)
+        try:
+            self._process.wait(_FAREWELL)
+        except TimeoutExpired:
+            self._process.kill()
+        with self._process:
+            pass
+
+    def _write(self, text: bytes) -> None:
+        assert self._process.stdin is not None
+        with suppress(OSError):
+            self._process.stdin.write(text)
+
+
+@contextmanager
+def isolated(
+    components: Mapping[str, Component], log: Log, isolation: Isolation, interrupts: Interrupts
+) -> Iterator[dict[str, Instance]]:
+    """Instances of components, each in a process of its own; all are gone at the end.
+
+    Args:
+        components: by their names.
+        log: takes what the FMUs say.
+        isolation: how long they may take.
+        interrupts: that end the wait for an FMU.
+
+    Raises:
+        InputError: an FMU cannot be loaded.
+        StartError: no process can be started.
+        ComponentFailed: an FMU has failed while it was instantiated.
+
+    """
+    with ExitStack() as stack:
+        try:
+            pairs = [socket.socketpair() for _ in components]
+            for pair in pairs:
+                for end in pair:
+                    stack.enter_context(end)
+            keeper = _Keeper(components, [there for _, there in pairs])
+        except OSError as error:
+            raise StartError(f"cannot start processes for FMUs: {reason(error)}") from error
+        stack.callback(keeper.end)
+        instances = []
+        for number, component in enumerate(components.values()):
+            here, there = pairs[number]
+            there.close()
+            status = partial(keeper.status, number)
+            instances.append(
+                IsolatedInstance(component, here, status, log, isolation.step_timeout, interrupts)
+            )
+        try:
+            for instance in instances:
+                instance.wait()
+            yield {instance.name: instance for instance in instances}
+        finally:
+            for instance in instances:
+                instance.leave()
+            for instance in instances:
+                instance.farewell()

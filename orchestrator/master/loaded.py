@@ -1,0 +1,301 @@
+"""An FMU loaded into this process."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from copy import copy
+from functools import partial
+from itertools import count
+from pathlib import Path
+from shutil import copytree
+from tempfile import mkdtemp
+from threading import Lock
+from typing import Any
+
+import fmpy
+import numpy as np
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2Boolean,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+    fmi2Component,
+    fmi2Discard,
+    fmi2Fatal,
+    fmi2Real,
+    fmi2Status,
+    fmi2Warning,
+)
+from fmpy.logging import addLoggerProxy
+from fmpy.model_description import ModelDescription, ModelVariable
+
+from orchestrator.errors import InputError, reason
+from orchestrator.master.instance import ComponentFailed, Instance, Part
+from orchestrator.master.log import Listener
+from orchestrator.master.transfer import Block
+from orchestrator.system.component import Component
+from orchestrator.system.unpacking import unpacked
+from orchestrator.system.values import Value
+
+
+class Library:
+    """A loaded FMU, which serves all its instances in this process.
+
+    Attributes:
+        fmu: fmpy's view of it.
+        corrupted: whether one of them has ended with fmi2Fatal: FMI then forbids every further
+            call, also for the others, even to free them.
+
+    """
+
+    def __init__(self, archive: Path, description: ModelDescription, folder: Path) -> None:
+        """Load what has been unpacked into a folder.
+
+        Raises:
+            InputError: it cannot be loaded.
+
+        """
+        if "%" in folder.as_uri().replace("%20", ""):
+            # PythonFMU 0.7 does not decode the URI and crashes its host.
+            raise InputError(
+                f"temporary folder {str(folder)!r}: FMUs need a path of plain ASCII characters; "
+                "set TMPDIR to one"
+            )
+        try:
+            self.fmu = FMU2Slave(
+                guid=description.guid,
+                modelIdentifier=description.coSimulation.modelIdentifier,
+                unzipDirectory=str(folder),
+            )
+        except Exception as error:
+            raise InputError(f"{archive}: cannot be loaded: {reason(error)}") from error
+        self.corrupted = False
+
+
+#: Libraries by the folders into which their FMUs are unpacked, for runs in several threads.
+_libraries: dict[Path, Library] = {}
+_LOCK = Lock()
+
+
+def _library(component: Component, folder: Path) -> Library:
+    """The library of an unpacked FMU, loaded once a process, or a copy of a corrupted one."""
+    with _LOCK:
+        found = _libraries.get(folder)
+        if found is None:
+            found = Library(component.fmu, component.description, folder)
+        elif found.corrupted:
+            # It stays loaded, with all that it has in memory; under another name it is a new one.
+            found = Library(component.fmu, component.description, _copied(folder))
+        _libraries[folder] = found
+        return found
+
+
+def _copied(folder: Path) -> Path:
+    try:
+        return Path(copytree(folder, mkdtemp(dir=folder.parent), dirs_exist_ok=True))
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be copied: {reason(error)}") from error
+
+
+class LoadedInstance:
+    """An instance whose FMU is called directly: see :class:`.instance.Instance`."""
+
+    def __init__(self, component: Component, library: Library, listener: Listener) -> None:
+        """Instantiate an FMU.
+
+        Raises:
+            InputError: it does not let itself be instantiated.
+
+        """
+        self.name = component.name
+        self.set_inputs: list[Callable[[], Any]] = []
+        self.get_outputs: list[Callable[[], Any]] = []
+        self._variables = component.variables
+        self._library = library
+        self._listener = listener
+        self._complaint = ""
+        self._worst = 0
+        self._environment = next(_environments)
+        _instances[self._environment] = self
+        # The functions of the library serve all instances; what differs is theirs alone.
+        self._fmu = copy(library.fmu)
+        self._fmu.instanceName = component.name
+        try:
+            self._fmu.instantiate(callbacks=_callbacks(self._environment), loggingOn=True)
+        except Exception as error:
+            del _instances[self._environment]
+            why = self._complaint or reason(error)
+            raise InputError(f"{component.fmu}: {why}") from error
+        self.do_step = self.function("DoStep", (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean))
+
+    def function(self, name: str, types: Sequence[Any] | None = None) -> Callable[..., Any]:
+        """One of the FMU's functions, for calls of every step.
+
+        fmpy's own methods look the function up and convert its arguments in every call, which
+        costs as much as the call.
+
+        Args:
+            name: of the function, without fmi2.
+            types: of its arguments; None: they come as values of ctypes.
+
+        """
+
+        def checked(status: int, called: Any, _: Any) -> int:
+            if status > fmi2Warning:
+                raise self._failed(FMICallException(function=called.__name__, status=status))
+            return status
+
+        called = self._fmu.dll[f"fmi2{name}"]
+        called.argtypes, called.restype, called.errcheck = types, fmi2Status, checked
+        return partial(called, fmi2Component(self._fmu.component))
+
+    def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
+        """Say where its values are."""
+        for part in parts:
+            block = Block(part.kind, part.references, values[part.place])
+            if part.causality == "input":
+                self.set_inputs.append(block.setter(self.function))
+            else:
+                self.get_outputs.append(block.getter(self.function))
+
+    def enter_initialization(self, values: Mapping[str, Value], stop_time: float) -> None:
+        """Set start values and parameters, set up the experiment, and enter that mode."""
+        for port, value in values.items():
+            variable = self._variables[port]
+            self._call(f"set{_fmi_type(variable)}", [variable.valueReference], [value])
+        self._call("setupExperiment", startTime=0.0, stopTime=stop_time)
+        self._call("enterInitializationMode")
+
+    def exit_initialization(self) -> None:
+        """Get ready for the first step."""
+        self._call("exitInitializationMode")
+
+    def exchange(self) -> None:
+        """Set all inputs, then read all outputs."""
+        for call in (*self.set_inputs, *self.get_outputs):
+            call()
+
+    def parameters(self) -> dict[str, Any]:
+        """Values of all parameters, as the FMU reports them."""
+        return {
+            name: self._get(variable)
+            for name, variable in self._variables.items()
+            if variable.causality == "parameter"
+        }
+
+    def terminate(self) -> None:
+        """Let the FMU end what it has begun."""
+        if not self._library.corrupted:
+            self._call("terminate")
+
+    def free(self) -> None:
+        """Free the instance; its library stays loaded."""
+        if self._library.corrupted:
+            # What it was given by us must stay where it is, too.
+            return
+        # FMU2Slave.freeInstance would unload the library as well.
+        self._fmu.fmi2FreeInstance(self._fmu.component)
+        del _instances[self._environment]
+
+    def hear(self, status: int, message: str) -> None:
+        """Take a message of the FMU; the latest explains a failure, a refusal before a warning."""
+        text = f"{self.name}: {'; '.join(message.splitlines())}"
+        if status >= min(self._worst, fmi2Discard):
+            self._complaint, self._worst = text, status
+        self._listener.take(status, text)
+
+    def _get(self, variable: ModelVariable) -> Any:
+        value = self._call(f"get{_fmi_type(variable)}", [variable.valueReference])[0]
+        if variable.type == "Boolean":
+            return bool(value)
+        return value.decode(errors="replace") if isinstance(value, bytes) else value
+
+    def _call(self, method: str, *arguments: Any, **named: Any) -> Any:
+        """One of fmpy's methods, which are slow and convenient."""
+        try:
+            return getattr(self._fmu, method)(*arguments, **named)
+        except FMICallException as error:
+            raise self._failed(error) from error
+
+    def _failed(self, error: FMICallException) -> ComponentFailed:
+        fatal = error.status == fmi2Fatal
+        if fatal:
+            self._library.corrupted = True
+        return ComponentFailed(self._complaint or f"{self.name}: {error}", fatal)
+
+
+def _fmi_type(variable: ModelVariable) -> str:
+    return "Integer" if variable.type == "Enumeration" else str(variable.type)
+
+
+@contextmanager
+def loaded(
+    component: Component, listener: Listener, folder: Path | None = None
+) -> Iterator[LoadedInstance]:
+    """An instance of a component in this process, freed at the end.
+
+    Args:
+        component: what is instantiated.
+        listener: takes what it says.
+        folder: into which its FMU is unpacked; None: this process unpacks it.
+
+    Raises:
+        InputError: the FMU cannot be loaded.
+
+    """
+    folder = unpacked(component.fmu) if folder is None else folder
+    instance = LoadedInstance(component, _library(component, folder), listener)
+    try:
+        yield instance
+    finally:
+        instance.free()
+
+
+@contextmanager
+def all_loaded(
+    components: Mapping[str, Component], listener: Listener
+) -> Iterator[dict[str, Instance]]:
+    """Instances of components by their names, all in this process, freed at the end."""
+    with ExitStack() as stack:
+        yield {
+            name: stack.enter_context(loaded(component, listener))
+            for name, component in components.items()
+        }
+
+
+#: Instances by the component environments that their FMUs hand back with every message.
+_instances: dict[int, LoadedInstance] = {}
+_environments = count(1)
+
+
+@fmi2CallbackLoggerTYPE  # type: ignore[untyped-decorator]
+def _log(
+    environment: int | None, _: bytes, status: int, _category: bytes, message: bytes | None
+) -> None:
+    instance = _instances.get(environment or 0)
+    if instance is not None:
+        instance.hear(status, (message or b"").decode(errors="replace"))
+
+
+def _shared_callbacks() -> fmi2CallbackFunctions:
+    """Those of all instances: fmpy's proxy, which formats the messages, knows one logger only."""
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = _log
+    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    addLoggerProxy(ctypes.byref(callbacks))
+    return callbacks
+
+
+_SHARED = _shared_callbacks()
+
+
+def _callbacks(environment: int) -> fmi2CallbackFunctions:
+    callbacks = fmi2CallbackFunctions.from_buffer_copy(_SHARED)
+    callbacks.componentEnvironment = environment
+    return callbacks

@@ -1,0 +1,64 @@
+"""What the FMUs of a run have to say."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from fmpy.fmi2 import fmi2Discard, fmi2Warning
+
+#: Messages that are kept: an FMU may have something to say in every step.
+_MOST_MESSAGES = 100
+
+
+class Listener(Protocol):
+    """Something that takes messages."""
+
+    def take(self, status: int, text: str) -> None:
+        """Take a message with the status that it was given by FMI, and its component's name."""
+
+
+class Log:
+    """What the FMUs of a run have said with status warning or worse.
+
+    Attributes:
+        refusals: the first of it with status discard or worse.
+
+    """
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._said: list[str] = []
+        self._n = 0
+        self.refusals: list[str] = []
+
+    def take(self, status: int, text: str) -> None:
+        """Take a message."""
+        if status >= fmi2Warning:
+            self._n += 1
+            self._said += [text] * (len(self._said) < _MOST_MESSAGES)
+        if status >= fmi2Discard:
+            self.refusals += [text] * (len(self.refusals) < _MOST_MESSAGES)
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """The first of it, and how much there was."""
+        more = self._n - len(self._said)
+        return (*self._said, *([f"and {more} messages more"] * (more > 0)))
+
+
+class Letters:
+    """Messages on their way to the log of another process."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._waiting: list[tuple[int, str]] = []
+
+    def take(self, status: int, text: str) -> None:
+        """Take a message; of a flood the log would not keep more than this."""
+        if status >= fmi2Warning and len(self._waiting) < _MOST_MESSAGES:
+            self._waiting.append((status, text))
+
+    def handed_over(self) -> list[tuple[int, str]]:
+        """Those that have come since the last call."""
+        waiting, self._waiting = self._waiting, []
+        return waiting

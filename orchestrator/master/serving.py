@@ -1,0 +1,98 @@
+"""What the process of an isolated FMU does: answer one request after the other."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import fmpy
+
+from orchestrator.errors import InputError, reason
+from orchestrator.master.channel import Channel, sizes
+from orchestrator.master.instance import ComponentFailed
+from orchestrator.master.loaded import LoadedInstance, loaded
+from orchestrator.master.log import Letters
+from orchestrator.master.row import Row
+from orchestrator.system.component import Component
+from orchestrator.system.structure import System
+
+
+def serve(name: str, fmu: Path, folder: Path, connection: socket.socket) -> None:
+    """Say that it begins, instantiate an FMU, and answer requests until there are no more.
+
+    Args:
+        name: of the component.
+        fmu: the file, for messages.
+        folder: into which it is unpacked.
+        connection: to whom wants it simulated.
+
+    """
+    component = Component(name, fmu, fmpy.read_model_description(folder))
+    inputs, outputs = sizes(component)
+    # Before the inputs: time and step size.
+    channel, letters = Channel(connection, outputs, 2 + inputs), Letters()
+    with suppress(EOFError, OSError):
+        channel.send()
+        try:
+            with loaded(component, letters, folder) as instance:
+                _Served(component, instance, channel, letters).answer_all()
+        except InputError as error:
+            channel.send({"refused": str(error)})
+
+
+class _Served:
+    """An instance and whom it answers.
+
+    A request without a note is a step. An answer without a note says that all is well; else the
+    note has messages of the FMU, the value that a call has given, or why it has failed.
+    """
+
+    def __init__(
+        self, component: Component, instance: LoadedInstance, channel: Channel, letters: Letters
+    ) -> None:
+        self._instance, self._channel, self._letters = instance, channel, letters
+        system = System(component.name, {component.name: component}, ())
+        values = Row(system, {component.name: instance}).values
+        n = len(channel.incoming) - 2
+        self._inputs, self._outputs = values[:n], values[n:]
+
+    def answer_all(self) -> None:
+        """Answer until the other end closes, or the FMU must not be called again."""
+        going_on = self._answered(lambda: None)
+        while going_on:
+            request = self._channel.receive()
+            self._inputs[:] = self._channel.incoming[2:]
+            going_on = self._answered(
+                self._step
+                if request is None
+                else partial(getattr(self._instance, request["call"]), *request["arguments"])
+            )
+
+    def _step(self) -> None:
+        t, h = self._channel.incoming[:2]
+        instance = self._instance
+        for call in instance.set_inputs:
+            call()
+        instance.do_step(t, h, 1)
+        for call in instance.get_outputs:
+            call()
+
+    def _answered(self, call: Callable[[], Any]) -> bool:
+        note: dict[str, Any] = {}
+        try:
+            value = call()
+            if value is not None:
+                note["value"] = value
+        except ComponentFailed as error:
+            note |= {"failed": str(error), "fatal": error.fatal}
+        except Exception as error:
+            note |= {"failed": f"{self._instance.name}: {reason(error)}", "fatal": True}
+        if messages := self._letters.handed_over():
+            note["messages"] = messages
+        self._channel.outgoing[:] = self._outputs
+        self._channel.send(note or None)
+        return not note.get("fatal")

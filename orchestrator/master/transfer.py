@@ -1,0 +1,72 @@
+"""The FMI calls that move values between an FMU and its part of the row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from ctypes import c_size_t
+from functools import partial
+from typing import Any
+
+import numpy as np
+from fmpy.fmi2 import fmi2Boolean, fmi2Integer, fmi2Real, fmi2ValueReference
+
+#: Kinds of values that can be connected and recorded, with FMI's functions and types for them.
+KINDS = {
+    "Real": ("Real", fmi2Real),
+    "Integer": ("Integer", fmi2Integer),
+    "Enumeration": ("Integer", fmi2Integer),
+    "Boolean": ("Boolean", fmi2Boolean),
+}
+
+
+class Block:
+    """Values of one kind, side by side in the row of all values, moved by one FMI call."""
+
+    def __init__(self, kind: str, references: Sequence[int], row: np.ndarray) -> None:
+        """Prepare the arrays that every call uses.
+
+        Args:
+            kind: one of :data:`KINDS`.
+            references: value references.
+            row: the part of the row of all values where the values are, a view.
+
+        """
+        self._kind, c_type = KINDS[kind]
+        self._row = row
+        n = len(references)
+        self._n = c_size_t(n)
+        self._references = (fmi2ValueReference * n)(*references)
+        if self._kind == "Real":
+            self._values = (c_type * n).from_buffer(row)
+        else:
+            self._values = (c_type * n)()
+            self._integers = np.frombuffer(self._values, dtype=np.intc)
+
+    def setter(self, function: Callable[[str], Callable[..., Any]]) -> Callable[[], Any]:
+        """A call that hands the values to the FMU, one of whose functions have these names."""
+        call = self._call(function, "Set")
+        if self._kind == "Real":
+            return call
+
+        def set_converted() -> None:
+            self._integers[:] = self._row
+            call()
+
+        return set_converted
+
+    def getter(self, function: Callable[[str], Callable[..., Any]]) -> Callable[[], Any]:
+        """A call that takes the values from the FMU."""
+        call = self._call(function, "Get")
+        if self._kind == "Real":
+            return call
+
+        def get_converted() -> None:
+            call()
+            self._row[:] = self._integers
+
+        return get_converted
+
+    def _call(
+        self, function: Callable[[str], Callable[..., Any]], action: str
+    ) -> Callable[[], Any]:
+        return partial(function(f"{action}{self._kind}"), self._references, self._n, self._values)

@@ -1,0 +1,99 @@
+"""FMUs that are not ours and misbehave: one in C, and one of PythonFMU's own making."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+from pythonfmu import FmuBuilder
+
+from orchestrator.system.component import read_component
+from orchestrator.system.names import PortName
+from orchestrator.system.structure import Connection, System
+
+_SOURCE = Path(__file__).with_name("foreign.c")
+
+_DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="Foreign" guid="foreign">
+  <CoSimulation modelIdentifier="foreign" canHandleVariableCommunicationStepSize="true"/>
+  <ModelVariables>
+    <ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="y" valueReference="1" causality="output" initial="calculated"><Real/>
+    </ScalarVariable>
+    <ScalarVariable name="at" valueReference="2" causality="parameter" variability="fixed">
+      <Real start="0"/></ScalarVariable>
+    <ScalarVariable name="act" valueReference="3" causality="parameter" variability="fixed">
+      <Integer start="0"/></ScalarVariable>
+    <ScalarVariable name="phase" valueReference="4" causality="parameter" variability="fixed">
+      <Integer start="0"/></ScalarVariable>
+  </ModelVariables>
+  <ModelStructure><Outputs><Unknown index="2" dependencies=""/></Outputs></ModelStructure>
+</fmiModelDescription>
+"""
+
+
+def _names(enumeration: str) -> dict[str, int]:
+    """The values of an enumeration in the C source by their names."""
+    found = re.search(rf"enum {{\s*({enumeration}\b[^}}]*)}}", _SOURCE.read_text(encoding="utf-8"))
+    assert found is not None
+    return {name.strip(): i for i, name in enumerate(found[1].rstrip(", \n").split(","))}
+
+
+#: When it misbehaves, and how.
+PHASES, ACTS = _names("ENTER"), _names("BEHAVE")
+
+
+_RAISES = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+class Raises(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.y = 0.0
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+
+    def do_step(self, current_time, step_size):
+        if current_time > 0.1:
+            raise RuntimeError("no water left")
+        self.y = current_time + step_size
+        return True
+"""
+
+
+def build_raising_fmu(folder: Path) -> Path:
+    """A slave of PythonFMU, as its own builder makes it, whose step raises after 0.1 s."""
+    script = folder / "raises.py"
+    script.write_text(_RAISES, encoding="utf-8")
+    return Path(FmuBuilder.build_FMU(script, dest=folder))
+
+
+def foreign_system(fmu: Path, act: str = "BEHAVE", phase: str = "STEP", at: float = 0.1) -> System:
+    """Two instances of the FMU in C, of which the first feeds the second and misbehaves."""
+    components = {name: read_component(name, fmu) for name in ("bad", "good")}
+    connection = Connection(PortName("bad", "y"), PortName("good", "u"))
+    return System("foreign", components, (connection,)).with_parameters(
+        {
+            PortName("bad", "act"): ACTS[act],
+            PortName("bad", "phase"): PHASES[phase],
+            PortName("bad", "at"): at,
+        }
+    )
+
+
+def build_c_fmu(folder: Path) -> Path:
+    """The FMU in C; the test is skipped where there is no compiler."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler")
+    library = folder / "foreign.so"
+    subprocess.run([compiler, "-shared", "-fPIC", "-O1", "-w", "-o", library, _SOURCE], check=True)
+    fmu = folder / "foreign.fmu"
+    with ZipFile(fmu, "w") as archive:
+        archive.writestr("modelDescription.xml", _DESCRIPTION)
+        archive.write(library, "binaries/linux64/foreign.so")
+        archive.writestr("resources/nothing.txt", "")
+    return fmu

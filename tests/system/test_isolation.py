@@ -1,0 +1,389 @@
+"""FMUs that are not ours and misbehave, in processes of their own and in the master's."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from uuid import uuid4
+
+import numpy as np
+import pytest
+
+from orchestrator.commands.main import main
+from orchestrator.errors import InputError, StartError
+from orchestrator.experiments.wiring import closed_loop
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.files import read_rows
+from orchestrator.master.isolated import Isolation
+from orchestrator.master.observer import Header
+from orchestrator.master.simulation import simulate
+from orchestrator.master.table import Table
+from orchestrator.system.component import read_component
+from orchestrator.system.ssp.writing import write_ssp
+from orchestrator.system.structure import System
+from support.foreign import build_c_fmu, build_raising_fmu, foreign_system
+
+STEP = 0.02
+
+
+@pytest.fixture(scope="module")
+def c_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build_c_fmu(tmp_path_factory.mktemp("foreign"))
+
+
+@pytest.fixture(scope="module")
+def raising(tmp_path_factory: pytest.TempPathFactory) -> System:
+    fmu = build_raising_fmu(tmp_path_factory.mktemp("raising"))
+    components = {name: read_component(name, fmu) for name in ("first", "second")}
+    return System("raising", components, ())
+
+
+@pytest.fixture
+def mark(monkeypatch: pytest.MonkeyPatch) -> str:
+    """Something by which processes that a test has started are found again."""
+    mark = f"FOREIGN_TEST={uuid4()}"
+    monkeypatch.setenv(*mark.split("="))
+    return mark
+
+
+def marked(mark: str) -> Iterator[Path]:
+    """Processes with a mark, by their folders in /proc."""
+    for process in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if mark.encode() in (process / "environ").read_bytes():
+                yield process
+
+
+def left_over(mark: str) -> list[Path]:
+    """Processes that are still there some seconds later."""
+    for _ in range(100):
+        if not (found := list(marked(mark))):
+            break
+        time.sleep(0.1)
+    return found
+
+
+def run_isolated(system: System, timeout: float = 20.0, stop_time: float = 0.5) -> Table:
+    table = Table()
+    simulate(system, Experiment(stop_time, STEP), [table], Isolation(timeout))
+    return table
+
+
+def rows_until(table: Table, t: float) -> bool:
+    """Whether there is a row for every step until a time, and none behind it."""
+    return np.array_equal(table.time, np.arange(round(t / STEP) + 1) * STEP)
+
+
+@pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
+def test_rows_are_those_of_a_run_in_one_process(dist: Path, order: str):
+    system = closed_loop(dist)
+    here, there = Table(), Table()
+    for table, isolation in ((here, None), (there, Isolation())):
+        simulate(system, Experiment(3.0, 0.03, order), [table], isolation)
+    assert here.header == there.header
+    assert here.rows.tobytes() == there.rows.tobytes()
+    assert there.failure is None
+
+
+def test_a_foreign_fmu_that_behaves_runs_to_the_end(c_fmu: Path):
+    """y = t + u, and the second takes the first one's output of the step before."""
+    table = run_isolated(foreign_system(c_fmu))
+    assert rows_until(table, 0.5)
+    assert np.allclose(table["bad.y"], table.time)
+    assert np.allclose(table["good.y"][1:], table.time[1:] + table.time[:-1])
+
+
+@pytest.mark.parametrize(
+    ("act", "words"),
+    [
+        ("SILENT_ERROR", "bad: fmi2DoStep failed with status 3 (error)"),
+        ("FATAL", "bad: beyond repair"),
+        ("EXITS", "bad: its process exited with status 3 in doStep"),
+        ("CRASHES", "bad: its process was ended by SIGSEGV (Segmentation fault) in doStep"),
+        ("ABORTS", "bad: its process was ended by SIGABRT (Aborted) in doStep"),
+        ("KILLED", "bad: its process was ended by SIGKILL (Killed, perhaps for want of memory)"),
+        ("SIGNALS", "bad: its process was ended by signal 40 (Real-time signal 6) in doStep"),
+        ("LEAVES_A_PROCESS", "bad: its process was ended by SIGABRT (Aborted) in doStep"),
+        ("CLOSES_ALL", "bad: its process exited with status 0 in doStep"),
+        ("ANSWERS_ITSELF", "bad: its process answers nonsense"),
+    ],
+)
+def test_what_an_isolated_fmu_does_ends_the_run_in_one_line(c_fmu, mark, act, words):
+    table = run_isolated(foreign_system(c_fmu, act, at=0.1))
+    assert table.failure is not None
+    assert table.failure.startswith(f"stopped at t = 0.1 s: {words}")
+    assert "\n" not in table.failure
+    assert rows_until(table, 0.1)
+    assert left_over(mark) == []
+
+
+@pytest.mark.parametrize("act", ["HANGS", "SPINS"])
+def test_an_isolated_fmu_that_hangs_is_ended(c_fmu, mark, act):
+    table = run_isolated(foreign_system(c_fmu, act, at=0.1), timeout=1.0)
+    assert table.failure == "stopped at t = 0.1 s: bad: doStep has not ended within 1 s"
+    assert rows_until(table, 0.1)
+    assert left_over(mark) == []
+
+
+@pytest.mark.parametrize(
+    ("variable", "words"),
+    [
+        ("hangs", "instantiate has not ended within 1 s"),
+        ("crashes", "its process was ended by SIGABRT"),
+    ],
+)
+def test_an_isolated_fmu_that_fails_while_it_is_instantiated(
+    c_fmu, mark, monkeypatch, variable, words
+):
+    monkeypatch.setenv("FOREIGN_INSTANTIATE", variable)
+    with pytest.raises(StartError, match=words):
+        run_isolated(foreign_system(c_fmu), timeout=1.0)
+    assert left_over(mark) == []
+
+
+@pytest.mark.parametrize("isolation", [None, Isolation(20.0)])
+def test_an_fmu_that_cannot_be_instantiated_is_bad_input(c_fmu, monkeypatch, isolation):
+    monkeypatch.setenv("FOREIGN_INSTANTIATE", "refuses")
+    with pytest.raises(InputError, match=r"foreign\.fmu: Failed to instantiate") as error:
+        simulate(foreign_system(c_fmu), Experiment(0.5, STEP), (), isolation)
+    assert not isinstance(error.value, StartError)
+
+
+@pytest.mark.parametrize("phase", ["ENTER", "EXIT"])
+@pytest.mark.parametrize(
+    ("act", "words"),
+    [("CRASHES", "SIGSEGV .* in {call}"), ("HANGS", "{call} has not ended"), ("FATAL", "beyond")],
+)
+def test_an_isolated_fmu_that_fails_before_its_first_step(c_fmu, mark, phase, act, words):
+    call = f"{phase.lower()}_initialization"
+    with pytest.raises(StartError, match="bad: .*" + words.format(call=call)):
+        run_isolated(foreign_system(c_fmu, act, phase), timeout=1.0)
+    assert left_over(mark) == []
+
+
+@pytest.mark.parametrize("phase", ["TERMINATE", "FREE"])
+@pytest.mark.parametrize("act", ["CRASHES", "HANGS"])
+def test_an_isolated_fmu_that_fails_at_the_end_loses_nothing(c_fmu, mark, phase, act):
+    table = run_isolated(foreign_system(c_fmu, act, phase), timeout=1.0)
+    assert table.failure is None
+    assert rows_until(table, 0.5)
+    [message] = table.ending.messages
+    assert message.startswith("bad: ")
+    assert {"TERMINATE": "terminate", "FREE": "freeInstance"}[phase] in message
+    assert left_over(mark) == []
+
+
+@pytest.mark.parametrize("isolation", [None, Isolation(20.0)])
+@pytest.mark.parametrize(("act", "value"), [("NOT_A_NUMBER", "nan"), ("INFINITE", "-inf")])
+def test_a_value_that_is_not_finite_is_named_with_its_time(c_fmu, act, value, isolation):
+    table = Table()
+    simulate(foreign_system(c_fmu, act), Experiment(0.5, STEP), [table], isolation)
+    assert table.failure == f"stopped at t = 0.12 s: bad.y is {value}"
+    assert rows_until(table, 0.1)
+    assert np.isfinite(table.rows).all()
+    with pytest.raises(StartError, match=f"stopped at t = 0 s: bad.y is {value}"):
+        simulate(foreign_system(c_fmu, act, "ENTER"), Experiment(0.5, STEP), (), isolation)
+
+
+def test_a_flood_of_output_and_messages_is_kept_within_bounds(c_fmu, capfd):
+    table = run_isolated(foreign_system(c_fmu, "WRITES", at=0.46))
+    assert table.failure is None
+    shown = capfd.readouterr().err
+    assert "auv-fmu: bad: writes more than is shown" in shown
+    assert len(shown) < 100_000
+    table = run_isolated(foreign_system(c_fmu, "LOGS", at=0.46))
+    assert table.failure is None
+    assert len(table.ending.messages) == 101
+    assert table.ending.messages[0] == "bad: 0: " + 500 * "0"
+
+
+def test_a_python_slave_that_raises(raising: System, mark: str):
+    table = run_isolated(raising)
+    assert table.failure is not None
+    assert "first: Fatal py exception encountered: [doStep]" in table.failure
+    assert "no water left" in table.failure
+    assert "\n" not in table.failure
+    assert rows_until(table, 0.12)
+    assert left_over(mark) == []
+
+
+def test_nobody_hangs_where_the_keeper_is_killed(c_fmu: Path, mark: str):
+    class Kills(Table):
+        def begin(self, header: Header) -> None:
+            super().begin(header)
+            for process in marked(mark):
+                if f"PPid:\t{os.getpid()}\n" in (process / "status").read_text():
+                    os.kill(int(process.name), signal.SIGKILL)
+
+    table = Kills()
+    simulate(foreign_system(c_fmu), Experiment(0.5, STEP), [table], Isolation(20.0))
+    assert table.failure is not None
+    assert "its process was ended by SIGKILL" in table.failure
+    assert left_over(mark) == []
+
+
+def test_runs_in_several_threads(c_fmu: Path):
+    tables: list[Table] = []
+    threads = [
+        threading.Thread(target=lambda: tables.append(run_isolated(foreign_system(c_fmu))))
+        for _ in range(3)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert [table.failure for table in tables] == [None] * 3
+    assert len({table.rows.tobytes() for table in tables}) == 1
+
+
+def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path):
+    """A run that ends while another one goes on takes no messages with it, nor the process."""
+    begun, go_on = threading.Event(), threading.Event()
+
+    class Waits(Table):
+        def begin(self, header: Header) -> None:
+            super().begin(header)
+            begun.set()
+            go_on.wait()
+
+    table = Waits()
+    system, experiment = foreign_system(c_fmu, "SILENT_ERROR"), Experiment(0.5, STEP)
+    talkative = foreign_system(c_fmu, "LOGS", at=0.0)
+    thread = threading.Thread(target=simulate, args=(system, experiment, [table]))
+    thread.start()
+    begun.wait()
+    assert len(simulate(talkative, Experiment(STEP, STEP)).messages) == 101
+    gc.collect()
+    go_on.set()
+    thread.join()
+    assert table.ending.messages == ()
+    assert table.failure is not None
+    assert "bad: fmi2DoStep failed with status 3" in table.failure
+
+
+@pytest.fixture(scope="module")
+def archives(c_fmu: Path, raising: System, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The systems as SSPs, each in a folder named by what happens in it."""
+    folder = tmp_path_factory.mktemp("archives")
+    systems = {act: foreign_system(c_fmu, act) for act in ("FATAL", "HANGS", "CRASHES")}
+    for name, system in {**systems, "raises": raising}.items():
+        (folder / name).mkdir()
+        write_ssp(system, folder / name)
+    return folder
+
+
+def command(*arguments: object, folder: Path) -> subprocess.Popen[str]:
+    """`auv-fmu` in a process whose temporary files go into a folder."""
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", "orchestrator", *map(str, arguments)],
+        env={**os.environ, "TMPDIR": str(folder)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "last_time", "words"),
+    [
+        ("FATAL", [], 0.1, "bad: beyond repair"),
+        ("raises", [], 0.12, "first: Fatal py exception encountered: [doStep] "),
+        ("CRASHES", ["--isolate"], 0.1, "bad: its process was ended by SIGSEGV"),
+        ("HANGS", ["--isolate", "--step-timeout", 1], 0.1, "bad: doStep has not ended within"),
+    ],
+)
+def test_command_line_says_what_happened_and_keeps_the_rows(
+    archives, tmp_path, name, options, last_time, words
+):
+    """Also where nothing more is called after fmi2Fatal: the FMU in C aborts then."""
+    [archive] = (archives / name).iterdir()
+    out, temporary = tmp_path / "out", tmp_path / "temporary"
+    temporary.mkdir()
+    process = command(
+        "run", archive, "--stop-time", 0.5, "--no-figures", "--out", out, *options,
+        folder=temporary,
+    )  # fmt: skip
+    _, errors = process.communicate()
+    assert process.returncode == 1
+    assert errors.splitlines()[-1].startswith(
+        f"auv-fmu: {archive.stem} stopped at t = {last_time} s: {words}"
+    )
+    rows = np.vstack(list(read_rows(out / "result.csv")))
+    assert rows[-1, 0] == pytest.approx(last_time)
+    assert list(temporary.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--step-timeout", "3"], "needs isolation"),
+        (["--isolate", "--step-timeout", "nan"], "must be a positive number"),
+        (["--isolate", "--step-timeout", "0"], "must be a positive number"),
+    ],
+)
+def test_a_timeout_that_means_nothing_is_bad_usage(options, words, capsys):
+    assert main(["run", "fig4", *options]) == 2
+    assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_nothing_is_left_of_a_run_that_hangs_and_is_ended(archives, tmp_path, mark, number):
+    """Also not by KILL, which the process itself cannot answer."""
+    [archive] = (archives / "HANGS").iterdir()
+    out, temporary = tmp_path / "out", tmp_path / "temporary"
+    temporary.mkdir()
+    process = command(
+        "run", archive, "--stop-time", 0.5, "--no-figures", "--out", out, "--isolate",
+        folder=temporary,
+    )  # fmt: skip
+    assert process.stderr is not None
+    assert process.stderr.readline() == "hangs\n"
+    os.kill(process.pid, number)
+    _, errors = process.communicate()
+    if number == signal.SIGINT:
+        assert process.returncode == 1
+        assert errors.splitlines()[-1] == "auv-fmu: foreign interrupted at t = 0.1 s"
+        assert np.vstack(list(read_rows(out / "result.csv")))[-1, 0] == pytest.approx(0.1)
+    assert left_over(mark) == []
+    assert list(temporary.iterdir()) == []
+
+
+def test_an_fmu_that_ended_fatally_is_loaded_anew(archives: Path, tmp_path: Path):
+    """The C library remembers, as any may, that it must not be called."""
+    [archive] = (archives / "FATAL").iterdir()
+    code = (
+        "from orchestrator import simulate\n"
+        f"for parameters in ({{}}, {{'bad.at': 0.2}}, {{'bad.act': 0}}):\n"
+        f"    print(simulate({str(archive)!r}, parameters, stop_time=0.5).failure)\n"
+    )
+    process = subprocess.run(
+        [sys.executable, "-P", "-c", code], capture_output=True, text=True, check=False
+    )
+    assert process.stdout.splitlines() == [
+        "stopped at t = 0.1 s: bad: beyond repair",
+        "stopped at t = 0.2 s: bad: beyond repair",
+        "None",
+    ], process.stderr
+
+
+def test_a_script_without_a_main_guard_is_run_once(c_fmu: Path, tmp_path: Path):
+    archive = write_ssp(foreign_system(c_fmu), tmp_path)[0]
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from orchestrator import simulate\n"
+        f"result = simulate({str(archive)!r}, stop_time=0.5, isolate=True, step_timeout=20)\n"
+        "print(len(result), result.failure)\n",
+        encoding="utf-8",
+    )
+    process = subprocess.run(
+        [sys.executable, script], capture_output=True, text=True, check=False, cwd=tmp_path
+    )
+    assert (process.stdout, process.stderr) == ("26 None\n", "")
