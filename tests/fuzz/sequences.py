@@ -61,7 +61,7 @@ class Finding(NamedTuple):
 
 def serve(folders: Mapping[str, Path], name: str) -> Callable[[Task], Any]:
     """Prepare a process for tasks on an FMU; the others lend it company and states."""
-    libraries = {name: Library(folders[name]), **{n: Library(f) for n, f in folders.items()}}
+    libraries = {n: Library(folders[n]) for n in dict.fromkeys([name, *folders])}
     contents = {n: reached(library, 0) for n, library in libraries.items()}
     descriptions = {n: library.description for n, library in libraries.items()}
     names = [*contents]
@@ -103,6 +103,8 @@ def _played(sequence: Calls, libraries: Mapping[str, Library], seed: int) -> lis
         play(sequence, libraries)
     except Difference as difference:
         return [Finding(seed, str(difference))]
+    except Exception as error:
+        return [Finding(seed, f"{type(error).__name__}: {error}")]
     return []
 
 
