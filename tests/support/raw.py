@@ -9,8 +9,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from ctypes import (
     CDLL,
-    CFUNCTYPE,
-    Structure,
     byref,
     c_char_p,
     c_double,
@@ -29,6 +27,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
+from support.raw_fmi import CO_SIMULATION, Callbacks, Logger
+
 
 class Status(IntEnum):
     """fmi2Status."""
@@ -41,25 +41,12 @@ class Status(IntEnum):
 
 
 KINDS = ("Real", "Integer", "Boolean", "String")
-FMI2_MODEL_EXCHANGE, FMI2_CO_SIMULATION = 0, 1
 TERMINATED_KIND, LAST_SUCCESSFUL_TIME_KIND = 3, 2
 
-_C_TYPES = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
-
-_Logger = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
+#: What every process has: calloc and free.
 _LIBC = CDLL(None)
 
-
-class Callbacks(Structure):
-    """fmi2CallbackFunctions."""
-
-    _fields_ = (
-        ("logger", _Logger),
-        ("allocate", c_void_p),
-        ("release", c_void_p),
-        ("step_finished", c_void_p),
-        ("environment", c_void_p),
-    )
+_C_TYPES = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
 
 
 class Variable(NamedTuple):
@@ -169,14 +156,9 @@ class Host:
         self.library = library
         self.description = library.description
         self.messages: list[Message] = []
-        self._logger = _Logger(self._log)
-        self.callbacks = Callbacks(
-            self._logger,
-            cast(_LIBC.calloc, c_void_p),
-            cast(_LIBC.free, c_void_p),
-            None,
-            None,
-        )
+        self._logger = Logger(self._log)
+        memory = (cast(_LIBC.calloc, c_void_p), cast(_LIBC.free, c_void_p))
+        self.callbacks = Callbacks(self._logger, *memory, None, None)
         self.component: int | None = None
         self._arrays = {
             kind: _Arrays(kind, [v for v in self.description.variables if v.kind == kind])
@@ -191,7 +173,7 @@ class Host:
     def instantiate(
         self,
         name: bytes | None = b"raw",
-        kind: int = FMI2_CO_SIMULATION,
+        kind: int = CO_SIMULATION,
         guid: bytes | None = b"as declared",
         location: bytes | None = b"as unpacked",
         callbacks: str = "all",
@@ -203,7 +185,7 @@ class Host:
         if location == b"as unpacked":
             location = self.library.location.encode()
         if callbacks == "no logger":
-            self.callbacks.logger = _Logger()
+            self.callbacks.logger = Logger()
         self.component = self.library.functions.fmi2Instantiate(
             c_char_p(name),
             kind,

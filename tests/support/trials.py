@@ -12,7 +12,8 @@ from typing import Any
 
 from support.calls import MANY
 from support.cells import Company, check
-from support.raw import FMI2_MODEL_EXCHANGE, Host, Library, Status, instance
+from support.raw import Host, Library, Status, instance
+from support.raw_fmi import MODEL_EXCHANGE
 from support.status_table import (
     CREATION,
     WITHOUT_AN_INSTANCE,
@@ -34,7 +35,7 @@ _CREATIONS: dict[str, dict[str, Any]] = {
     "a name of 100,000 characters": {"name": b"n" * MANY},
     "a name that is NULL": {"name": None},
     "a name that is not UTF-8": {"name": _NOT_UTF_8},
-    "the type fmi2ModelExchange": {"kind": FMI2_MODEL_EXCHANGE},
+    "the type fmi2ModelExchange": {"kind": MODEL_EXCHANGE},
     "a GUID that is NULL": {"guid": None},
     "a GUID that is empty": {"guid": b""},
     "a GUID of another FMU": {"guid": b"{8c4e810f-3df3-4a00-8276-176fa3c9f9e0}"},
