@@ -7,10 +7,11 @@ from functools import cache
 from random import Random
 
 from fuzz.model import Model, keep
-from fuzz.player import FREE, MAKE, Action, Calls
+from fuzz.player import FREE, GOOD, MAKE, Action, Calls
 from support.calls import CASES, NO_START, OVERFLOWING, Call, Draw, Item
 from support.raw import Description, Variable
-from support.status_table import rows
+from support.status_table import creations, rows
+from support.trials import CREATIONS
 
 #: Actions of one sequence.
 LEAST, MOST = 4, 45
@@ -74,7 +75,7 @@ class _World:
         if on:
             return
         if call.function == MAKE:
-            self.known[name] = Model(self.fmus[name])
+            self.known[name] = Model(self.fmus[name]) if creations()[call.case] else None
         elif call.function == FREE:
             self.known[name] = None
             self.freed_once.add(name)
@@ -150,7 +151,8 @@ def _add_without_an_instance(world: _World, name: str) -> None:
     if name in world.freed_once and world.random.random() < 0.5:
         world.add(name, _call_on_nothing(world, name), "an instance that was freed")
     else:
-        world.add(name, Call(MAKE, "", {}))
+        good = world.random.random() < SENSIBLE
+        world.add(name, Call(MAKE, GOOD if good else world.random.choice([*CREATIONS]), {}))
 
 
 def _call_on_nothing(world: _World, name: str) -> Call:

@@ -16,13 +16,17 @@ from fuzz.model import Model, keep, slot_of
 from support import states
 from support.calls import Call, Saved, make
 from support.raw import KINDS, Host, Library, Status
-from support.status_table import without_an_instance
+from support.status_table import creations, without_an_instance
+from support.trials import CREATIONS
 
 #: After so many calls the serialised states are compared, too, and in the end.
 STATES_EVERY = 10
 
 #: Calls that make and free instances: the model of a sequence knows them beside the table.
 MAKE, FREE = "fmi2Instantiate", "fmi2FreeInstance"
+
+#: What an instance is made with where nothing is wrong.
+GOOD = "everything as it should be"
 
 #: Calls that the rest of a run depends on, and those that save and free states.
 _MOVING = {
@@ -91,10 +95,13 @@ class Pair:
     def lives(self) -> bool:
         return self.tried.host.component is not None
 
-    def make(self) -> None:
-        for side in (self.tried, self.beside):
-            if not side.host.instantiate():
-                raise Difference(f"no instance: {[m.text for m in side.host.messages]}")
+    def make(self, case: str) -> None:
+        made = self.tried.host.instantiate(**CREATIONS[case])
+        if made != creations()[case]:
+            said = [message.text for message in self.tried.host.messages]
+            raise Difference(f"{'an' if made else 'no'} instance with {case}: {said}")
+        if made and not self.beside.host.instantiate():
+            raise Difference("no instance beside it")
         self.known = Model(self.library.description)
 
     def free(self) -> None:
@@ -217,7 +224,7 @@ def _play_one(i: int, action: Action, pairs: Mapping[str, Pair], models: dict[st
     try:
         if call.function == MAKE:
             if not pair.lives:
-                pair.make()
+                pair.make(call.case)
         elif on:
             if on == "NULL" or (pair.stale is not None and not pair.lives):
                 pair.play_on(call, on)

@@ -13,7 +13,7 @@ import pytest
 
 from fuzz.model import Model
 from fuzz.mutants import reached
-from fuzz.player import MAKE, Action, Calls
+from fuzz.player import GOOD, MAKE, Action, Calls
 from fuzz.reachable import faults, without_checksum
 from fuzz.sequences import Finding, Fuzzer, unpacked
 from support import states
@@ -70,7 +70,7 @@ def state_of_a(change: str | None = None, **arguments: object) -> Call:
 STEP = Call("fmi2DoStep", "a step", {"time": 0.0, "h": 0.02})
 KEEP = Call("fmi2GetFMUstate", "", {"slot": "a.s0"})
 BEGIN = [
-    Call(MAKE, "", {}),
+    Call(MAKE, GOOD, {}),
     Call("fmi2EnterInitializationMode", "", {}),
     Call("fmi2ExitInitializationMode", "", {}),
 ]

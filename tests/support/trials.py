@@ -29,7 +29,7 @@ SKIPPED = "skipped"
 _NOT_UTF_8 = b"ta\xffnh"
 
 #: Arguments of fmi2Instantiate that differ from those of a good call.
-_CREATIONS: dict[str, dict[str, Any]] = {
+CREATIONS: dict[str, dict[str, Any]] = {
     "everything as it should be": {},
     "a name that is empty": {"name": b""},
     "a name of 100,000 characters": {"name": b"n" * MANY},
@@ -102,7 +102,7 @@ def _location(library: Library, case: str) -> Iterator[dict[str, Any]]:
             (made / "raising.py").write_text("raise RuntimeError('on purpose')\n")
             (made / "slavemodule.txt").write_text("raising")
         else:
-            yield _CREATIONS[case]
+            yield CREATIONS[case]
             return
         plain = case == "a resource location that is a plain path"
         yield {"location": str(made).encode() if plain else made.as_uri().encode()}
