@@ -126,7 +126,7 @@ class Draw:
         if variable.kind == "Boolean":
             return self.random.randrange(2)
         if variable.kind == "Integer":
-            return self.random.randrange(-5, 100)
+            return self.random.choice((-(2**31), -1, 0, 1, 42, 2**31 - 1))
         value = (start or 0.0) * self.random.uniform(0.5, 1.5) or self.random.uniform(-0.5, 0.5)
         value = value if low is None else max(low, value)
         return value if high is None else min(high, value)
@@ -348,6 +348,8 @@ def _setup(case: str, arguments: Callable[[Draw], Arguments]) -> None:
 
 _setup("start", lambda draw: {"start": draw.random.choice((0.0, 1.5, -3.0))})
 _setup("start, stop, tolerance", lambda draw: {"stop": 10.0, "tolerance": 1e-6})
+_setup("stop infinite", lambda draw: {"stop": inf})
+_setup("tolerance NaN, which nothing uses", lambda draw: {"tolerance": nan})
 _setup("start NaN or infinite", lambda draw: {"start": draw.random.choice((nan, inf, -inf))})
 _setup("stop NaN", lambda draw: {"stop": nan})
 _setup("stop before start", lambda draw: {"start": 2.0, "stop": 1.0})
@@ -391,6 +393,13 @@ NO_START = {
 @_case("fmi2ExitInitializationMode", "values that give no start")
 def _no_start(draw: Draw) -> Arguments | None:
     return {} if draw.description.name in NO_START else None
+
+
+@_case("fmi2GetReal", "outputs of values that give no start")
+def _outputs_of_no_start(draw: Draw) -> Arguments | None:
+    if draw.description.name not in NO_START:
+        return None
+    return _items(*(Item(v.reference) for v in draw.description.of("output", "Real")))
 
 
 def _step(case: str, arguments: Callable[[Draw], Arguments]) -> None:

@@ -18,6 +18,7 @@ H, STEPS = 0.02, 3
 _SETTINGS: Mapping[tuple[str, str], Mapping[str, Setting]] = {
     ("fmi2DoStep", "values that the equations overflow with"): OVERFLOWING,
     ("fmi2ExitInitializationMode", "values that give no start"): NO_START,
+    ("fmi2GetReal", "outputs of values that give no start"): NO_START,
 }
 
 _WHILE_REFUSED = "anything, while a refusal is not mended"
@@ -252,6 +253,9 @@ class Trial:
     def _set_good_values(self) -> bool:
         """Whether the table says that they are taken."""
         assert self.call is not None
+        if self.setting is not None:
+            self._set(self.setting.good)
+            return True
         taken = True
         for item in self.call.arguments["items"]:
             [variable] = [
