@@ -18,9 +18,9 @@ from orchestrator.commands.options import (
     add_set,
     add_system,
     request,
-    say,
     status,
 )
+from orchestrator.commands.streams import say, show
 from orchestrator.experiments.preparation import loaded, prepare, with_companion
 from orchestrator.experiments.run import Files, run_into
 from orchestrator.master.files import FORMATS
@@ -76,7 +76,7 @@ def _run(options: argparse.Namespace) -> int:
     finished = run_into(folder, runs, files, options.command, say)
     for run in finished:
         _print_summary(run.metrics)
-    print(f"written to {finished[0].folder}{os.sep}")
+    show(f"written to {finished[0].folder}{os.sep}")
     if finished[0].folder != folder:
         say(f"{folder} keeps the whole result that was there before")
     return max(status(run.name, run.ending) for run in finished)
@@ -91,10 +91,10 @@ def _print_summary(values: Mapping[str, Any]) -> None:
         "total_variation": "total variation u, q, r [N, N.m]",
         "final_error": f"largest error x, y, z in the last {last:g} s [m]",
     }
-    print(values["scenario"])
+    show(values["scenario"])
     for key, label in rows.items():
         if key in values:
-            print(f"  {label:44}" + "".join(f"{_number(value):>11}" for value in values[key]))
+            show(f"  {label:44}" + "".join(f"{_number(value):>11}" for value in values[key]))
 
 
 def _number(value: float) -> str:

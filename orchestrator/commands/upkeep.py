@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.commands.options import OK, add_out
+from orchestrator.commands.streams import show
 from orchestrator.errors import InputError, reason
 from orchestrator.exchange.reference import write_reference
 from orchestrator.experiments.bundle import current_fmus, run_fmus
@@ -31,7 +32,7 @@ def _reference(options: argparse.Namespace) -> int:
     except OSError as error:
         raise InputError(f"cannot write into {options.out}: {reason(error)}") from error
     for path in written:
-        print(path)
+        show(path)
     return OK
 
 
@@ -40,5 +41,5 @@ def _docs(options: argparse.Namespace) -> int:
     page = options.out / "scenarios.md"
     page.write_text(scenario_page(), encoding="utf-8")
     for path in (*written, page):
-        print(path)
+        show(path)
     return OK

@@ -19,7 +19,13 @@ from tempfile import mkdtemp
 from platformdirs import user_cache_path
 
 from orchestrator.errors import InputError, last_line, reason
-from orchestrator.experiments.bill_of_materials import BILL, CHECKSUMS, bill, checksums
+from orchestrator.experiments.bill_of_materials import (
+    BILL,
+    CHECKSUMS,
+    bill,
+    checksums,
+    digest_of,
+)
 from orchestrator.experiments.folder import whole
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.system.ssp.writing import ssp_bytes
@@ -27,11 +33,8 @@ from orchestrator.system.ssp.writing import ssp_bytes
 #: Where `auv-fmu build` writes unless another folder is named.
 DEFAULT_FOLDER = Path("fmus", "dist")
 
-#: The archive of the closed loop, and what the FMUs beside it were built from.
+#: The archive of the closed loop, and what was built beside it, from what.
 ARCHIVE, MANIFEST = "auv.ssp", "build.json"
-
-#: Names the FMUs in a folder of the cache.
-_CONTENTS = "contents.txt"
 
 #: Packages that the FMUs are made of.
 _SOURCES = ("auv_fmu", "fmus", "pythonfmu")
@@ -123,8 +126,7 @@ def current_fmus() -> Path:
             "that can be written"
         ) from error
     try:
-        names = [path.name for path in run_fmus("packaging.build", partial)]
-        (partial / _CONTENTS).write_text("\n".join(names), encoding="utf-8")
+        run_fmus("packaging.build", partial)
         # What somebody has cleaned away in part is made anew.
         rmtree(folder, ignore_errors=True)
         partial.rename(folder)
@@ -138,10 +140,12 @@ def current_fmus() -> Path:
 
 
 def _is_whole(folder: Path) -> bool:
-    contents = folder / _CONTENTS
-    return contents.is_file() and all(
-        (folder / name).is_file() for name in contents.read_text(encoding="utf-8").splitlines()
-    )
+    """Whether a folder holds the FMUs that were built into it, as they were then."""
+    try:
+        built = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["sha256"]
+        return all(digest_of(folder / name) == digest for name, digest in built.items())
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return False
 
 
 def _fingerprint() -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import platform
 import sys
@@ -12,6 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from orchestrator.experiments.bill_of_materials import digest_of
 from orchestrator.experiments.folder import RECORD, whole
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.master.experiment import Experiment
@@ -95,8 +95,3 @@ def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
         Experiment(experiment["stop_time"], experiment["step"], experiment["order"]),
         {port_name(name): value for name, value in record["parameters"].items()},
     )
-
-
-def digest_of(path: Path) -> str:
-    """SHA-256 of a file."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -15,6 +15,7 @@ import numpy as np
 
 from orchestrator.errors import InputError, reason
 from orchestrator.master.observer import Ending, Header
+from orchestrator.reading import lines_of
 
 #: Rows that are written to Parquet, or read, at once.
 _ROWS = 8192
@@ -96,7 +97,7 @@ def read_columns(path: Path) -> tuple[str, ...]:
         if path.suffix == ".parquet":
             with _parquet(path) as file:
                 return _behind_time(file.schema_arrow.names)
-        with path.open(encoding="utf-8-sig") as lines:
+        with lines_of(path) as lines:
             return _behind_time(next(csv.reader(lines), ()))
 
 
@@ -114,7 +115,7 @@ def read_rows(path: Path) -> Iterator[np.ndarray]:
                     columns = [column.to_numpy(zero_copy_only=False) for column in batch.columns]
                     yield np.column_stack(columns).astype(float, copy=False)
         else:
-            with path.open(encoding="utf-8-sig") as lines:
+            with lines_of(path) as lines:
                 width = 1 + len(_behind_time(next(csv.reader(lines), ())))
                 filled = (line for line in lines if line.strip())
                 while block := list(islice(filled, _ROWS)):

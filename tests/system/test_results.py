@@ -55,7 +55,7 @@ def test_our_own_table_is_verified_with_the_step_of_its_scenario(capsys):
     Path("fine.toml").write_text("stop_time = 0.5\nstep = 0.01\n")
     assert main(["run", "fine.toml", "--no-figures"]) == 0
     assert main(["verify", "results/fine/result.csv", "--scenario", "fine.toml"]) == 0
-    assert "agree over 0.5 s" in capsys.readouterr().out
+    assert "to 0.5 s" in capsys.readouterr().out
 
 
 def test_outputs_alone():
