@@ -2,55 +2,43 @@
 
 from __future__ import annotations
 
+import logging
 import os
-import signal
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from importlib import import_module
 
 from orchestrator.commands import streams
+from orchestrator.commands.streams import say
+from orchestrator.errors import reason
+from orchestrator.master.interrupts import orderly_end
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
+    # No matrix here is worth a thread, and where one cannot be had numpy's library ends in Ctrl-C.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Where it can keep no fonts it says so at length, and draws all the same.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     streams.fill()
+    status = 0
     try:
-        with _interrupts_end_the_process():
-            # Half a second of imports.
-            dispatch: Callable[[Sequence[str] | None], int]
-            dispatch = import_module("orchestrator.commands.parser").dispatch
-        status = dispatch(arguments)
+        with orderly_end():
+            # Half a second of imports, in which Ctrl-C must find an answer, too.
+            status = int(import_module("orchestrator.commands.parser").dispatch(arguments))
     except SystemExit as end:
         # The parser has shown its help, or complained.
         if not streams.finished():
             raise SystemExit(end.code or 1) from None
         raise
+    except KeyboardInterrupt:
+        say("interrupted")
+        status = 130
+    except (OSError, MemoryError, ImportError) as error:
+        # Whatever else this machine does not give.
+        say(reason(error))
+        status = 2
     return status if streams.finished() else status or 1
-
-
-@contextmanager
-def _interrupts_end_the_process() -> Iterator[None]:
-    """Let Ctrl-C end a process that has not begun with anything, however deep it is in imports."""
-    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        # Ignored, or somebody else's.
-        yield
-        return
-    try:
-        signal.signal(signal.SIGINT, _leave)
-    except ValueError:
-        # In a thread that gets no signals.
-        yield
-        return
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-def _leave(*_: object) -> None:
-    streams.say("interrupted")
-    os._exit(130)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from orchestrator.commands.streams import say, show
 from orchestrator.experiments.preparation import loaded, prepare, with_companion
 from orchestrator.experiments.run import Files, run_into
 from orchestrator.master.files import FORMATS
+from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.isolated import STEP_TIMEOUT, isolation_of
 
 
@@ -73,13 +75,25 @@ def _run(options: argparse.Namespace) -> int:
     runs = with_companion(prepare(*loaded(options.scenario), wanted), wanted)
     folder = options.out or Path("results", runs[0].scenario.name)
     files = Files(options.interval, options.columns, options.format, options.figures)
-    finished = run_into(folder, runs, files, options.command, say)
-    for run in finished:
-        _print_summary(run.metrics)
-    show(f"written to {finished[0].folder}{os.sep}")
-    if finished[0].folder != folder:
-        say(f"{folder} keeps the whole result that was there before")
-    return max(status(run.name, run.ending) for run in finished)
+    # Until all is said: who stops a run several times wants to know, too, where its rows are.
+    with held_interrupts(_answer):
+        finished = run_into(folder, runs, files, options.command, say)
+        for run in finished:
+            _print_summary(run.metrics)
+        show(f"written to {finished[0].folder}{os.sep}")
+        if finished[0].folder != folder:
+            say(f"{folder} keeps the whole result that was there before")
+        return max(status(run.name, run.ending) for run in finished)
+
+
+def _answer(interrupts: Interrupts) -> None:
+    """Tell the user at once what happens now, from within the handler of the signal."""
+    text = "stopping: writing what was computed and drawing it; once more leaves the figures out"
+    if interrupts.urgent:
+        text = "stopping at once, without figures; a third time ends an FMU that does not return"
+    # print could have been interrupted itself, and must not be entered a second time.
+    with suppress(OSError):
+        os.write(2, f"auv-fmu: {text}\n".encode())
 
 
 def _print_summary(values: Mapping[str, Any]) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
-from orchestrator.experiments.folder import RECORD
+from orchestrator.experiments.folder import RECORD, settle
 from orchestrator.experiments.record import read_header
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.files import FORMATS, read_columns, read_rows
@@ -62,6 +62,7 @@ def table_in(path: Path) -> Path:
 
     """
     with explained(path, "not the name of a result"):
+        settle(path if path.is_dir() else path.parent)
         for file in (path, *(path / f"result.{ending}" for ending in FORMATS)):
             if file.is_file():
                 return file

@@ -193,7 +193,7 @@ def _read(file: Path) -> Outcome | None:
             Experiment(**text["experiment"]),
             {port_name(name): value for name, value in text["parameters"].items()},
         )
-    except (OSError, ValueError, KeyError, BadZipFile, zlib.error):
+    except (OSError, EOFError, ValueError, KeyError, BadZipFile, zlib.error):
         # Not there, or not whole.
         return None
     ending = Ending(messages=tuple(text["messages"]))

@@ -11,13 +11,14 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path, PurePosixPath
 from shutil import rmtree
-from tempfile import TemporaryDirectory, mkdtemp
+from tempfile import gettempdir, mkdtemp
 from threading import Lock
 from typing import NamedTuple
 from zipfile import ZipFile, ZipInfo
 
 from orchestrator.errors import InputError, reason
 from orchestrator.reading import check_file
+from orchestrator.system.leftovers import process_folder
 
 #: An archive that holds more than this is not unpacked.
 _MOST_FILES, _MOST_BYTES = 100_000, 2**30
@@ -61,6 +62,8 @@ def unpacked(archive: Path) -> Path:
     try:
         with _LOCK:
             return _unpacked(version)
+    except InputError:
+        raise
     # What is wrong with an archive, each of Python's decompressors says in exceptions of its own.
     except Exception as error:
         raise InputError(f"{archive}: cannot be opened: {reason(error)}") from error
@@ -68,14 +71,20 @@ def unpacked(archive: Path) -> Path:
 
 @cache
 def _unpacked(archive: Version) -> Path:
-    folder = Path(mkdtemp(dir=_process_folder().name))
-    try:
-        with ZipFile(archive.path) as content:
-            _check(content.infolist())
-            content.extractall(folder)
-    except BaseException:
-        rmtree(folder, ignore_errors=True)
-        raise
+    with ZipFile(archive.path) as content:
+        _check(content.infolist())
+        try:
+            folder = Path(mkdtemp(dir=process_folder()))
+            try:
+                content.extractall(folder)
+            except BaseException:
+                rmtree(folder, ignore_errors=True)
+                raise
+        except OSError as error:
+            raise InputError(
+                f"{archive.path}: cannot be unpacked into {gettempdir()}: {reason(error)}; set "
+                "TMPDIR to another folder"
+            ) from error
     return folder
 
 
@@ -113,8 +122,3 @@ def check_place(folder: Path) -> None:
             f"temporary folder {str(folder)!r}: PythonFMU takes no {odd[0]!r} in it; set TMPDIR to "
             "another, or build the FMU with --loader native"
         )
-
-
-@cache
-def _process_folder() -> TemporaryDirectory[str]:
-    return TemporaryDirectory(prefix="auvfmu")
