@@ -68,7 +68,6 @@ class Trials:
         self._marked = host.get_state()
         self._content = states.without_refusals(host.content())
         self._values = host.values()
-        self.taken = 0
 
     def __call__(self, seed: int) -> None:
         """Try the mutant of a seed.
@@ -78,17 +77,24 @@ class Trials:
 
         """
         random = Random(seed)
-        base = random.choice(self._bases)
-        mutant = states.mutant(base, random, self._lenders)
+        self.hold(states.mutant(random.choice(self._bases), random, self._lenders))
+
+    def hold(self, mutant: states.Mutant) -> None:
+        """Hold the instance against a mutant; afterwards it is as it was before.
+
+        Raises:
+            Taken: the mutant was taken, or did harm.
+
+        """
         try:
-            self._try(mutant.content, base)
+            self._try(mutant.content)
         except Exception as error:
             raise Taken(f"{mutant.said}: {type(error).__name__}: {error}") from error
         finally:
             assert self._host.set_state(self._marked) == Status.OK
             assert not self._host.fault()
 
-    def _try(self, content: bytes, base: bytes) -> None:
+    def _try(self, content: bytes) -> None:
         host = self._host
         status, state = host.deserialised(content)
         if state is None:
@@ -101,8 +107,7 @@ class Trials:
             if values == {**self._values, "fault": False}:
                 self._check_refused()
             else:
-                self.taken += 1
-                self._check_taken(content)
+                self._check_taken()
 
     def _check_refused(self) -> None:
         host = self._host
@@ -110,7 +115,7 @@ class Trials:
         assert host.fault(), "refused without a fault"
         assert host.step(_MARK + H, H) == Status.Discard, "a step after a refused state"
 
-    def _check_taken(self, content: bytes) -> None:
+    def _check_taken(self) -> None:
         host = self._host
         said = without_checksum(host.content())
         if said is not None:

@@ -8,18 +8,19 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import pytest
 
 from fuzz.model import Model
-from fuzz.mutants import reached
+from fuzz.mutants import Trials, reached
 from fuzz.player import GOOD, MAKE, Action, Calls
 from fuzz.reachable import faults, without_checksum
 from fuzz.sequences import Finding, Fuzzer, unpacked
 from support import states
 from support.calls import CASES, Call, Draw, Item
 from support.instances import NAMES
-from support.raw import Description, Library, Variable
+from support.raw import Description, Library, Variable, instance
 from support.worker import Lost, Worker
 
 #: Seeds of CI: those of the night come after them.
@@ -89,6 +90,39 @@ def test_refused_state_blocks_after_the_state_error(planner: Fuzzer):
     null = Call("fmi2SetReal", "values NULL, n > 0", {"items": [Item(0, 1.0)], "null": "values"})
     calls = of_planner(*BEGIN, KEEP, null, STEP, state_of_a("changed"), STEP, state_of_a(), STEP)
     assert planner.replay(calls) == ""
+
+
+#: Changes of a stepping state that were taken once, by what they change.
+TAKEN_ONCE: dict[str, tuple[list[str], Callable[[dict[str, Any]], None]]] = {
+    "start time too large": (NAMES, lambda said: said.update(start_time=10**400)),
+    "still initialising": (NAMES, lambda said: said.update(mode="initialising")),
+    "outputs before the start": (
+        NAMES, lambda said: said.update(mode="instantiated", state=None, hidden=None)
+    ),
+    "eta": (["AuvPlant"], lambda said: change_output(said, 0, 1.0)),
+    "nu": (["AuvPlant"], lambda said: change_output(said, 9, 1.0)),
+    "y": (["AuvPlant"], lambda said: change_output(said, 14, -2e199)),
+    "tau_applied": (["AuvPlant"], lambda said: change_output(said, 18, 1e6)),
+    "ddy_d": (["MotionPlanner"], lambda said: change_output(said, 7, 1.0)),
+    "damping": (["MotionPlanner"], lambda said: said["parameters"].update(d11=4e11)),
+}  # fmt: skip
+
+
+def change_output(said: dict[str, Any], i: int, more: float) -> None:
+    said["outputs"][i] += more
+
+
+@pytest.mark.parametrize(
+    ("name", "what"), [(name, what) for what, (names, _) in TAKEN_ONCE.items() for name in names]
+)
+def test_state_that_was_taken_once_does_no_harm(folders, name, what):
+    library = Library(folders[name])
+    contents = reached(library, 1)
+    said = next(state for state in map(states.read, contents) if state["mode"] == "stepping")
+    _, change = TAKEN_ONCE[what]
+    change(said)
+    with instance(library) as host:
+        Trials(host, contents, []).hold(states.Mutant(states.sealed(said), what))
 
 
 # Whether it would notice
