@@ -79,7 +79,7 @@ def _noise(content: bytes, random: Random) -> bytes:
 
 
 def _cut(content: bytes, random: Random) -> bytes:
-    return content[: random.randrange(len(content))]
+    return content[: random.randrange(1, len(content))]
 
 
 def _flipped(content: bytes, random: Random) -> bytes:
