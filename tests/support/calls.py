@@ -6,7 +6,7 @@ are named by slots, so that it does not matter where they lie in memory.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from ctypes import (
     addressof,
     byref,
@@ -745,13 +745,3 @@ _MADE: dict[str, Callable[[Host, Call, Saved], Status]] = {
     "fmi2DoStep": _make_step,
     **{f"fmi2{action}{kind}": _make_values for action in ("Get", "Set") for kind in KINDS},
 }
-
-
-def calls_of(
-    rows: Mapping[tuple[str, str], Any], draw: Draw
-) -> Iterator[tuple[tuple[str, str], Call]]:
-    """A call for every row that this FMU has one for."""
-    for function, case in rows:
-        arguments = CASES[function, case](draw)
-        if arguments is not None:
-            yield (function, case), Call(function, case, arguments)
