@@ -7,13 +7,20 @@ import signal
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import Phase, settings
 
 from orchestrator.experiments import bundle
 
 # A slow machine is no error, and what CI checks does not change from run to run.
 settings.register_profile("patient", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("patient")
+# For mutmut: the same examples every time, and no smaller ones once a mutant is dead.
+settings.register_profile(
+    "mutants",
+    settings.get_profile("patient"),
+    derandomize=True,
+    phases=[Phase.explicit, Phase.generate],
+)
 
 # Where a shell has started the tests in the background, it has them ignore Ctrl-C.
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -16,4 +16,7 @@ def test_actuator_stays_within_its_limits_and_is_linear_between_them(tau, limits
 
 
 def test_limits_of_each_actuator_are_its_own():
-    assert limit_all((9.0, -9.0, 0.5), (-1.0, -2.0, -3.0), (1.0, 2.0, 3.0)) == (1.0, -2.0, 0.5)
+    tau_min, tau_max = (-1.0, -2.0, -3.0), (1.0, 2.0, 3.0)
+    assert limit_all((9.0, 9.0, 9.0), tau_min, tau_max) == tau_max
+    assert limit_all((-9.0, -9.0, -9.0), tau_min, tau_max) == tau_min
+    assert limit_all((0.5, -0.5, 2.5), tau_min, tau_max) == (0.5, -0.5, 2.5)

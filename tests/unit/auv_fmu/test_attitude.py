@@ -59,10 +59,11 @@ def test_euler_angles_of_the_vertical_still_give_the_rotation(theta, phi, psi):
     np.testing.assert_allclose(again, rotation, atol=1e-7)
 
 
-def test_rounding_beyond_one_does_not_leave_the_domain_of_asin():
-    column = (0.0, 0.0, -1.0 - 2e-16)
-    _, theta, _ = euler_from_rotation((column, (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)))
-    assert theta == pi / 2
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_rounding_beyond_one_does_not_leave_the_domain_of_asin(up):
+    column = (0.0, 0.0, -up * (1.0 + 4e-16))
+    _, theta, _ = euler_from_rotation((column, (0.0, 1.0, 0.0), (up, 0.0, 0.0)))
+    assert theta == up * pi / 2
 
 
 @given(phi=angles, theta=pitch_angles, psi=angles, omega=vectors(speeds, 3))

@@ -1,9 +1,12 @@
 """The loop of Fig. 2; tests/system holds the loop of FMUs against it."""
 
+from math import sin, sqrt
+
 import numpy as np
 import pytest
 
 from auv_fmu.closed_loop import Setting, closed_loop
+from auv_fmu.disturbance import Disturbance
 from auv_fmu.output_feedback import Gains
 from auv_fmu.plant import Localisation
 from auv_fmu.saturation import algebraic, hyperbolic_tangent
@@ -14,8 +17,13 @@ QUIET = Localisation(std=0.0)
 def test_loop_starts_where_section_4_1_says():
     """At rest, level and without noise; sin(0) = sign(0) = 0 leave nothing of (56)."""
     [start] = closed_loop(0, Setting(localisation=QUIET))
+    y, origin = (2.35, 6.0, 0.0), (0.0, 0.0, 0.0)
     assert start.t == 0.0
-    assert start.measurement.y == (2.35, 6.0, 0.0)
+    assert start.plant_state == ((2.0, 6.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0,) * 6)
+    assert start.plant_outputs == (origin, y, origin)
+    assert start.planner_state == ((0.0, 0.0, -2.0), 0.0, 0.0, (0.0,) * 5)
+    assert start.controller_state == (y, origin, (0.0,) * 4)
+    assert start.measurement.y == y
     assert start.reference.y_d == (0.35, 0.0, -2.0)
     assert start.signals.e == (2.0, 6.0, 2.0)
     assert start.signals.z == (0.0, 0.0, 0.0)
@@ -30,6 +38,35 @@ def test_first_step_moves_no_position_but_all_velocities():
     tau_u, tau_q, tau_r = start.tau
     expected = (0.02 * tau_u / 25.0, 0.0, 0.0, 0.0, 0.02 * tau_q / 22.5, 0.02 * tau_r / 15.0)
     assert first.plant_state.nu == pytest.approx(expected, rel=1e-12)
+
+
+def test_disturbance_acts_at_the_time_of_its_instant():
+    """(56) without friction, at t_k = k h."""
+    setting = Setting(disturbance=Disturbance(0.0, 2.0, 3.0), localisation=QUIET, h=0.05)
+    for k, instant in enumerate(closed_loop(20, setting)):
+        assert instant.t == pytest.approx(0.05 * k)
+        assert instant.tau_w == pytest.approx((2.0 * sin(3.0 * 0.05 * k),) * 6)
+
+
+def test_measurement_has_white_noise_of_the_localisation_systems_deviation():
+    """Mean and deviation within five of their own standard deviations, on each axis."""
+    std, n = 0.01, 2000
+    run = closed_loop(n - 1, Setting(localisation=Localisation(std, seed=3)))
+    noise = np.array([np.subtract(k.measurement.y, k.plant_outputs.y) for k in run]) / std
+    assert np.abs(noise.mean(axis=0)).max() < 5.0 / sqrt(n)
+    assert np.abs(noise.std(axis=0) - 1.0).max() < 5.0 / sqrt(2 * n)
+    neighbours = np.corrcoef(np.hstack([noise[:-1], noise[1:]]), rowvar=False)
+    assert np.abs(neighbours - np.eye(6)).max() < 5.0 / sqrt(n)
+
+
+def test_noise_is_that_of_its_seed():
+    def first(seed):
+        [start] = closed_loop(0, Setting(localisation=Localisation(seed=seed)))
+        return start.measurement.y
+
+    seeds = [1, 2, -1, 0, 2**31 - 1, -(2**31)]
+    assert [first(seed) for seed in seeds] == [first(seed) for seed in seeds]
+    assert len({first(seed) for seed in seeds}) == len(seeds)
 
 
 @pytest.mark.parametrize("s", [hyperbolic_tangent, algebraic])

@@ -1,13 +1,15 @@
 """The reference and its derivatives."""
 
+from math import nextafter, pi, radians, sin
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_fmu import motion_planner
-from auv_fmu.motion_planner import PlannerState
-from auv_fmu.vehicle import Vehicle
+from auv_fmu.motion_planner import PlannerState, SteepReference
+from auv_fmu.vehicle import Vehicle, accelerations
 from support.strategies import angles, forces, lengths, speeds, vectors
 
 VEHICLE = Vehicle()
@@ -39,6 +41,32 @@ def test_closed_form_derivatives_agree_with_differences_of_the_trajectory(
     np.testing.assert_allclose(now.dy_d, difference, rtol=1e-6, atol=1e-5)
     difference = np.subtract(after.dy_d, before.dy_d) / (2 * h)
     np.testing.assert_allclose(now.ddy_d, difference, rtol=1e-5, atol=1e-4)
+
+
+@given(theta=st.floats(-1.2, 1.2), psi=angles, nu=vectors(speeds, 5), tau_d=vectors(forces, 3))
+def test_reference_vehicle_obeys_equation_2_undisturbed(theta, psi, nu, tau_d):
+    moving = motion_planner.motion(VEHICLE, PlannerState((0.0,) * 3, theta, psi, nu), tau_d)
+    expected = accelerations(VEHICLE, nu, sin(theta), tau_d, (0.0,) * 5)
+    np.testing.assert_allclose(moving.dnu, expected, rtol=1e-14, atol=1e-14)
+
+
+def test_reference_starts_at_rest_in_its_posture():
+    state = motion_planner.initial_state((1.0, 2.0, 3.0, 0.4, 0.5))
+    assert state == ((1.0, 2.0, 3.0), 0.4, 0.5, (0.0,) * 5)
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_reference_stays_five_degrees_away_from_the_pole_of_equation_1(up):
+    """On either side of 90 degrees; the steepest pitch itself is allowed."""
+    steepest = up * radians(85.0)
+
+    def motion(theta):
+        state = PlannerState((0.0,) * 3, theta, 0.0, (0.0,) * 5)
+        return motion_planner.motion(VEHICLE, state, (0.0,) * 3)
+
+    assert motion(steepest).rotation[0][2] == pytest.approx(-sin(steepest))
+    with pytest.raises(SteepReference, match=rf"{up * 85:.1f} degrees.* within 85$"):
+        motion(nextafter(steepest, up * pi))
 
 
 def test_steady_turn_is_an_equilibrium_of_equation_2():

@@ -100,6 +100,8 @@ def test_gate_restarts_the_observer_after_a_jump_only():
     gains = Gains(innovation_gate=1.0)
     state = ControllerState((0.0,) * 3, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0, 7.0))
     assert output_feedback.gated(gains, state, (0.6, 0.6, 0.5)) is state
+    # The gate is the largest jump that is credible.
+    assert output_feedback.gated(gains, state, (0.0, 1.0, 0.0)) is state
     restarted = output_feedback.gated(gains, state, (0.6, 0.6, 0.6))
     assert restarted == ((0.6, 0.6, 0.6), (0.0, 0.0, 0.0), state.theta_hat)
     assert output_feedback.gated(gains._replace(innovation_gate=0.0), state, (9.0,) * 3) is state

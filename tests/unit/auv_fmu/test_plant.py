@@ -1,6 +1,7 @@
 """The plant: (1) and (2) with six degrees of freedom."""
 
 from math import cos, sin
+from random import Random
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from auv_fmu.plant import RollAxis
 from auv_fmu.vehicle import Vehicle, accelerations
 from support.strategies import angles, forces, pitch_angles, speeds, vectors
 
-VEHICLE, ROLL = Vehicle(), RollAxis()
+#: Section 4.1 has m44 = m55, behind which terms of roll could hide.
+VEHICLE, ROLL = Vehicle(), RollAxis(m44=12.5, d44=18.0)
 MASSES = np.array([VEHICLE.m11, VEHICLE.m22, VEHICLE.m33, ROLL.m44, VEHICLE.m55, VEHICLE.m66])
 DAMPING = np.array([VEHICLE.d11, VEHICLE.d22, VEHICLE.d33, ROLL.d44, VEHICLE.d55, VEHICLE.d66])
 AT_REST = (0.0,) * 6
@@ -53,6 +55,13 @@ def test_plant_without_roll_is_equation_2(nu, theta, psi, tau, tau_w):
     )
     five = accelerations(VEHICLE, nu, sin(theta), tau, tau_w)
     assert (*six[:3], *six[4:]) == five
+
+
+@given(tau_w=vectors(forces, 6))
+def test_disturbance_pushes_a_vehicle_at_rest_backwards_in_every_direction(tau_w):
+    level = rotation_from_euler(0.0, 0.0, 0.0)
+    actual = plant.accelerations_6dof(VEHICLE, ROLL, AT_REST, level, UNDRIVEN, tau_w)
+    np.testing.assert_allclose(actual, -np.array(tau_w) / MASSES, rtol=1e-14)
 
 
 @given(nu=vectors(speeds, 6), euler=vectors(angles, 3))
@@ -111,8 +120,13 @@ def test_vehicle_that_passes_the_vertical_keeps_a_unit_quaternion_and_does_not_j
 
 
 def test_noise_is_scaled_by_its_standard_deviation():
-    assert plant.measure((1.0, 2.0, 3.0), (1.0, -1.0, 0.0), 0.5) == (1.5, 1.5, 3.0)
-    assert plant.measure((1.0, 2.0, 3.0), (1.0, -1.0, 0.0), 0.0) == (1.0, 2.0, 3.0)
+    assert plant.measure((1.0, 2.0, 3.0), (2.0, -3.0, 4.0), 0.5) == (2.0, 0.5, 5.0)
+    assert plant.measure((1.0, 2.0, 3.0), (2.0, -3.0, 4.0), 0.0) == (1.0, 2.0, 3.0)
+
+
+@pytest.mark.parametrize(("seed", "same"), [(0, 0), (7, 7), (-1, 2**32 - 1), (-(2**31), 2**31)])
+def test_seed_is_a_32_bit_integer_read_without_its_sign(seed, same):
+    assert plant.white_noise(seed).gauss(0.0, 1.0) == Random(same).gauss(0.0, 1.0)
 
 
 @given(euler=vectors(angles, 3), position=vectors(speeds, 3))

@@ -1,11 +1,14 @@
 """(30) to (32), (52) to (54), and the bounds of P2.1 and P2.6 they stand on."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
 from auv_fmu.proof.control_point_model import D_2, M_2
-from auv_fmu.proof.gain_conditions import bounds, conditions
+from auv_fmu.proof.gain_conditions import Bounds, bounds, conditions
 from auv_fmu.vehicle import Vehicle
 from support.strategies import angles, lengths, pitch_angles
 
@@ -27,6 +30,38 @@ def test_the_papers_gains_miss_condition_30_and_may_meet_the_others():
     assert (second.left, second.right) == (30.0, 15.0)
     assert second.verdict == "holds if 0.5 (zeta_1 + zeta_2) < 15"
     assert (third.left, third.right) == (50.0, pytest.approx(30.0 / 25.0))
+
+
+def evaluated(formula, symbols):
+    """A formula as the paper writes it, without signs for its products."""
+    product = re.sub(r"(?<=[\w)]) (?=[\w(])", "*", formula.replace("'", ""))
+    return eval(product, {}, symbols)
+
+
+@given(values=st.lists(st.floats(0.1, 9.0), min_size=17, max_size=17))
+def test_statements_are_the_conditions(values):
+    """Each inequality, read as a formula, has the sides that were computed for it."""
+    K_1, K_2 = values[0:3], values[3:6]
+    known, (Lambda, k_d, s_MM), zetas = Bounds(*values[6:10]), values[10:13], values[13:17]
+    symbols = {
+        "lambda_d2": known.lambda_d2,
+        "lambda_m2": known.lambda_m2,
+        "lambda_min": min,
+        "Lambda": np.array(Lambda),
+        "K_2": np.array(K_2),
+        "k_1max": max(K_1),
+        "k_2max": max(K_2),
+        "k_d": k_d,
+        "s_MM": s_MM,
+        **{f"zeta_{i}": zeta for i, zeta in enumerate(zetas, start=1)},
+    }
+    found = conditions(known, K_1, K_2, Lambda, k_d, s_MM)
+    assert [condition.number for condition in found] == ["(30), (52)", "(31), (53)", "(32), (54)"]
+    for condition in found:
+        left, right = condition.statement.replace(" lambda ", " Lambda ").split(" > ")
+        assert evaluated(left, symbols) == pytest.approx(condition.left)
+        unknown = evaluated(f"({condition.zetas}+0.0)", symbols)
+        assert evaluated(right, symbols) == pytest.approx(condition.right + unknown)
 
 
 def test_condition_30_can_be_met_by_a_larger_lambda():

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmus.slave.state import Snapshot
+from fmus.slave.state import Snapshot, nearly_equal
 from support.instances import NAMES, WITH_INPUTS, ClassInstance
 
 
@@ -279,3 +279,10 @@ def test_saved_state_does_not_change_with_the_run(driver):
     driver.excite(2)
     driver.step()
     assert json.dumps(saved) == text
+
+
+@pytest.mark.parametrize("size", [0.0, 1.0, -1e9])
+def test_outputs_of_another_machine_may_differ_in_their_last_digits_alone(size):
+    unit = max(abs(size), 1.0)
+    assert nearly_equal([0.5, size], [0.5, size + 1e-10 * unit])
+    assert not nearly_equal([size, 0.5], [size + 1e-6 * unit, 0.5])

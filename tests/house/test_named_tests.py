@@ -1,0 +1,37 @@
+"""Tests that pages name are there."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+NAMED = re.compile(r"`(tests/[\w/]+\.py)(?:::(\w+))?`")
+
+
+def promises() -> list[str]:
+    """The rows of the tables of promises."""
+    text = (ROOT / "docs" / "promises.md").read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line.startswith("| ")]
+    return [row for row in rows if row != "| promise | held by |"]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_named_tests_are_there(page):
+    for file, test in NAMED.findall(page.read_text(encoding="utf-8")):
+        tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
+        functions = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+        assert not test or test in functions, f"{file}::{test}"
+
+
+def test_there_are_promises():
+    assert len(promises()) > 20
+
+
+@pytest.mark.parametrize("promise", promises())
+def test_every_promise_names_the_test_that_holds_it(promise):
+    assert any(test for _, test in NAMED.findall(promise))

@@ -1,0 +1,89 @@
+"""Every default of every set of parameters: the values of section 4.1, or our own (reading 7)."""
+
+from importlib import import_module
+from pkgutil import walk_packages
+
+import pytest
+
+import auv_fmu
+from auv_fmu import control_point, euler
+from auv_fmu.saturation import hyperbolic_tangent
+
+TEN, ZERO_3, ZERO_4, ZERO_6 = (10.0,) * 3, (0.0,) * 3, (0.0,) * 4, (0.0,) * 6
+CONTROLLER = {
+    "K1": TEN,
+    "lambda_": 1.0,
+    "gamma": 1.0,
+    "sigma": 0.001,
+    "theta_0": ZERO_4,
+    "eps_t": 1.0,
+    "ell": 0.35,
+}
+SECTION_4_1 = {
+    "Vehicle": {
+        "m11": 25.0,
+        "m22": 17.5,
+        "m33": 30.0,
+        "m55": 22.5,
+        "m66": 15.0,
+        "d11": 30.0,
+        "d22": 30.0,
+        "d33": 30.0,
+        "d55": 20.0,
+        "d66": 20.0,
+        "righting_pitch": 5.0,
+    },
+    "RollAxis": {"m44": 22.5, "d44": 20.0},
+    "Limits": {"tau_min": (-80.0,) * 3, "tau_max": (80.0,) * 3},
+    "Disturbance": {"A_f": 0.5, "A_d": 1.0, "omega_d": 0.1},
+    "Gains": {**CONTROLLER, "K2": TEN, "k_d": 50.0, "s": hyperbolic_tangent},
+    "PdGains": CONTROLLER,
+    "Setting": {
+        "eta_0": (2.0, 6.0, 0.0, 0.0, 0.0, 0.0),
+        "tau_d": (5.0, 1.0, 2.0),
+        "eta_d0": (0.0, 0.0, -2.0, 0.0, 0.0),
+        "h": 0.02,
+    },
+}
+OURS = {
+    "RollAxis": {"righting_roll": 5.0},
+    "Localisation": {"std": 0.001, "seed": 1},
+    "Gains": {"printed_jacobian": False, "innovation_gate": 1.0},
+    "PdGains": {"printed_jacobian": False},
+    "Setting": {"nu_0": ZERO_6},
+}
+
+#: Every named tuple of the package that has defaults.
+SETS = {
+    name: found
+    for module in walk_packages(auv_fmu.__path__, "auv_fmu.")
+    for name, found in vars(import_module(module.name)).items()
+    if isinstance(found, type) and getattr(found, "_field_defaults", None)
+}
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_defaults_are_the_papers_or_named_as_ours(name):
+    plain = {
+        field: value
+        for field, value in SETS[name]._field_defaults.items()
+        if type(value).__name__ not in SETS
+    }
+    assert plain == {**SECTION_4_1.get(name, {}), **OURS.get(name, {})}
+
+
+def test_sets_within_the_setting_of_the_loop_are_those_with_all_defaults():
+    nested = [value for value in SETS["Setting"]() if type(value).__name__ in SETS]
+    assert [type(value).__name__ for value in nested] == [
+        "Vehicle",
+        "RollAxis",
+        "Limits",
+        "Localisation",
+        "Disturbance",
+        "Gains",
+    ]
+    assert all(value == type(value)() for value in nested)
+
+
+def test_constants_are_those_of_section_4_1():
+    assert (control_point.ELL, euler.STEP) == (0.35, 0.02)

@@ -1,0 +1,87 @@
+"""modelDescription.xml of a few ports, beside what FMI 2.0 asks for them."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+from fmus.ports.description import complete
+from fmus.ports.port import FAULT, Port, inputs, outputs, parameter
+
+A, B = inputs("a", {"x": "m"}, "Place")[0], inputs("b", {1: "N"}, "Force")[0]
+PORTS = (
+    A,
+    B,
+    *outputs("y", {"x": "m"}, "Output", (B,)),
+    parameter("k", 0.25, "1", "Gain", 0.0, 1e3, tunable=True),
+    parameter("big", 1.25e300, "1", "Large"),
+    Port("n", "parameter", "fixed", "Integer", "Number", start=-3),
+    Port("on", "parameter", "fixed", "Boolean", "Switch", start=True),
+    Port("kind", "parameter", "fixed", "String", "Kind", start="Soft", choices={"Soft": 1}),
+    FAULT,
+)
+
+BEFORE = """
+<fmiModelDescription guid="1">
+  <CoSimulation modelIdentifier="it" canGetAndSetFMUstate="false"/>
+  <ModelVariables><ScalarVariable name="of another"/></ModelVariables>
+  <ModelStructure><Outputs/></ModelStructure>
+</fmiModelDescription>
+"""
+
+AFTER = """
+<fmiModelDescription guid="1">
+  <CoSimulation modelIdentifier="it" needsExecutionTool="false"
+    canHandleVariableCommunicationStepSize="true" canGetAndSetFMUstate="true"
+    canSerializeFMUstate="true"/>
+  <UnitDefinitions>
+    <Unit name="1"><BaseUnit/></Unit>
+    <Unit name="N"><BaseUnit kg="1" m="1" s="-2"/></Unit>
+    <Unit name="m"><BaseUnit m="1"/></Unit>
+  </UnitDefinitions>
+  <TypeDefinitions>
+    <SimpleType name="Dimensionless"><Real quantity="Dimensionless" unit="1"/></SimpleType>
+    <SimpleType name="Force"><Real quantity="Force" unit="N"/></SimpleType>
+    <SimpleType name="Length"><Real quantity="Length" unit="m"/></SimpleType>
+  </TypeDefinitions>
+  <ModelVariables>
+    <ScalarVariable name="a.x" valueReference="0" description="Place: x" causality="input"
+      variability="continuous"><Real declaredType="Length" unit="m" start="0"/></ScalarVariable>
+    <ScalarVariable name="b[1]" valueReference="1" description="Force: 1" causality="input"
+      variability="continuous"><Real declaredType="Force" unit="N" start="0"/></ScalarVariable>
+    <ScalarVariable name="y.x" valueReference="2" description="Output: x" causality="output"
+      variability="continuous" initial="calculated"><Real declaredType="Length" unit="m"/>
+    </ScalarVariable>
+    <ScalarVariable name="k" valueReference="3" description="Gain" causality="parameter"
+      variability="tunable" initial="exact"><Real declaredType="Dimensionless" unit="1"
+      start="0.25" min="0" max="1000"/></ScalarVariable>
+    <ScalarVariable name="big" valueReference="4" description="Large" causality="parameter"
+      variability="fixed" initial="exact"><Real declaredType="Dimensionless" unit="1"
+      start="1.25e+300"/></ScalarVariable>
+    <ScalarVariable name="n" valueReference="5" description="Number" causality="parameter"
+      variability="fixed" initial="exact"><Integer start="-3"/></ScalarVariable>
+    <ScalarVariable name="on" valueReference="6" description="Switch" causality="parameter"
+      variability="fixed" initial="exact"><Boolean start="true"/></ScalarVariable>
+    <ScalarVariable name="kind" valueReference="7" description="Kind" causality="parameter"
+      variability="fixed" initial="exact"><String start="Soft"/></ScalarVariable>
+    <ScalarVariable name="fault" valueReference="8" description="FAULT" causality="output"
+      variability="discrete" initial="calculated"><Boolean/></ScalarVariable>
+  </ModelVariables>
+  <ModelStructure>
+    <Outputs>
+      <Unknown index="3" dependencies="2" dependenciesKind="dependent"/>
+      <Unknown index="9" dependencies="" dependenciesKind=""/>
+    </Outputs>
+    <InitialUnknowns>
+      <Unknown index="3" dependencies="2 4 5 6 7 8"
+        dependenciesKind="dependent dependent dependent dependent dependent dependent"/>
+      <Unknown index="9" dependencies="" dependenciesKind=""/>
+    </InitialUnknowns>
+  </ModelStructure>
+</fmiModelDescription>
+""".replace("FAULT", FAULT.description)
+
+
+def test_description_says_what_the_ports_are():
+    found = ElementTree.tostring(complete(ElementTree.fromstring(BEFORE), PORTS), "unicode")
+    expected, actual = (ElementTree.canonicalize(xml, strip_text=True) for xml in (AFTER, found))
+    assert actual == expected

@@ -1,0 +1,88 @@
+"""What a port takes, and what it says where it does not."""
+
+from __future__ import annotations
+
+from math import inf, nan
+
+import pytest
+
+from fmus.ports.port import Port, Refusal, parameter, parameters
+from fmus.ports.quantities import ETA_WITHOUT_ROLL, TAU, THETA, group_name, member_name, per_axis
+
+REAL = parameter("k", 1.0, "1", "Gain", 0.5, 2.5)
+UNBOUNDED = parameter("k", 1.0, "1", "Gain")
+INTEGER = Port("n", "parameter", "fixed", "Integer", "Number", start=0)
+BOOLEAN = Port("on", "parameter", "fixed", "Boolean", "Switch", start=False)
+STRING = Port("s", "parameter", "fixed", "String", "Kind", start="a", choices={"a": 7, "b": 8})
+LARGEST = float.fromhex("0x1.fffffffffffffp+1023")
+
+
+@pytest.mark.parametrize(
+    ("port", "value"),
+    [
+        (REAL, 0.5),
+        (REAL, 2.5),
+        (REAL, 1),
+        (UNBOUNDED, LARGEST),
+        (UNBOUNDED, -LARGEST),
+        (INTEGER, -(2**31)),
+        (BOOLEAN, True),
+        (STRING, "b"),
+    ],
+)
+def test_good_value_comes_back(port, value):
+    assert port.checked(value) is value
+
+
+@pytest.mark.parametrize(
+    ("port", "value", "why"),
+    [
+        (REAL, 0.4999, "k = 0.4999: must be at least 0.5"),
+        (REAL, 2.5001, "k = 2.5001: must be at most 2.5"),
+        (REAL, nan, "k = nan: must be finite"),
+        (REAL, inf, "k = inf: must be finite"),
+        (UNBOUNDED, -inf, "k = -inf: must be finite"),
+        (UNBOUNDED, 10**400, "k = 10000000000000000000: must be finite"),
+        (REAL, "1", "k = '1': must be a Real"),
+        (REAL, True, "k = True: must be a Real"),
+        (REAL, "x" * 99, "k = 'xxxxxxxxxxxxxxxxxxx: must be a Real"),
+        (INTEGER, 1.0, "n = 1.0: must be a Integer"),
+        (INTEGER, True, "n = True: must be a Integer"),
+        (BOOLEAN, 1, "on = 1: must be a Boolean"),
+        (STRING, "c", "s = 'c': use one of a, b"),
+        (STRING, 0, "s = 0: must be a String"),
+    ],
+)
+def test_bad_value_is_refused_with_the_reason(port, value, why):
+    with pytest.raises(Refusal) as refusal:
+        port.checked(value)
+    assert str(refusal.value) == why
+
+
+def test_choices_stand_for_what_the_equations_take():
+    assert STRING.meaning("b") == 8
+    assert REAL.meaning(2.0) == 2.0
+
+
+def test_parameters_of_a_group_have_a_start_value_each():
+    made = parameters("K", (1.0, 2.0), {"x": "m", 2: "N"}, "Gain", -9.0, 9.0, tunable=True)
+    assert made == (
+        Port("K.x", "parameter", "tunable", "Real", "Gain: x", "m", 1.0, -9.0, 9.0),
+        Port("K[2]", "parameter", "tunable", "Real", "Gain: 2", "N", 2.0, -9.0, 9.0),
+    )
+    with pytest.raises(TypeError, match="K: 1 start values for 2 members"):
+        parameters("K", (1.0,), {"x": "m", 2: "N"}, "Gain")
+
+
+@pytest.mark.parametrize(("member", "name"), [("x", "y.x"), (3, "y[3]")])
+def test_members_have_structured_names(member, name):
+    assert member_name("y", member) == name
+    assert group_name(name) == "y"
+    assert group_name("a.b[1].c") == "a"
+
+
+def test_members_of_the_quantities():
+    assert TAU == {"u": "N", "q": "N.m", "r": "N.m"}
+    assert [*ETA_WITHOUT_ROLL] == ["x", "y", "z", "theta", "psi"]
+    assert per_axis("kg/s") == {1: "kg/s", 2: "kg/s", 3: "kg/s"}
+    assert [*THETA] == [1, 2, 3, 4]
