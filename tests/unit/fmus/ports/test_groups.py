@@ -108,7 +108,7 @@ def test_parameters_become_the_set_of_the_equations_field_by_field():
     "fields", [{"K1": K1}, {"K1": K1[:2], "lambda_": LAMBDA}, {"K1": K1, "lambda_": K1}]
 )
 def test_a_field_that_is_missing_or_of_another_size_is_found_at_once(fields):
-    with pytest.raises(TypeError):
+    with pytest.raises(TypeError, match=r"Gains.* has the fields .*, its parameters are "):
         ParameterSet(Gains, **fields)
 
 

@@ -6,7 +6,7 @@ from math import inf, nan
 
 import pytest
 
-from fmus.ports.port import Port, Refusal, parameter, parameters
+from fmus.ports.port import Port, Refusal, inputs, parameter, parameters
 from fmus.ports.quantities import ETA_WITHOUT_ROLL, TAU, THETA, group_name, member_name, per_axis
 
 REAL = parameter("k", 1.0, "1", "Gain", 0.5, 2.5)
@@ -64,6 +64,15 @@ def test_choices_stand_for_what_the_equations_take():
     assert REAL.meaning(2.0) == 2.0
 
 
+def test_inputs_start_at_zero_and_parameters_are_fixed():
+    assert inputs("a", {"x": "m"}, "Place") == (
+        Port("a.x", "input", "continuous", "Real", "Place: x", "m", 0.0),
+    )
+    fixed = Port("k", "parameter", "fixed", "Real", "Gain", "1", 2.0)
+    assert parameter("k", 2.0, "1", "Gain") == fixed
+    assert parameters("k", (2.0,), {1: "1"}, "Gain")[0].variability == "fixed"
+
+
 def test_parameters_of_a_group_have_a_start_value_each():
     made = parameters("K", (1.0, 2.0), {"x": "m", 2: "N"}, "Gain", -9.0, 9.0, tunable=True)
     assert made == (
@@ -78,7 +87,7 @@ def test_parameters_of_a_group_have_a_start_value_each():
 def test_members_have_structured_names(member, name):
     assert member_name("y", member) == name
     assert group_name(name) == "y"
-    assert group_name("a.b[1].c") == "a"
+    assert group_name("a.b[1].c") == group_name("a[1][2]") == "a"
 
 
 def test_members_of_the_quantities():

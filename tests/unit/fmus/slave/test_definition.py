@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, nan
 from typing import NamedTuple, TypedDict
 
 import pytest
@@ -166,6 +166,7 @@ def test_outputs_are_sampled_once_at_the_start_and_once_a_step(slave):
         assert slave.do_step(k, 0.1)
     assert not slave.do_step(6.0, 0.1)
     assert slave.samples == 7
+    assert slave.log_queue[0].msg.endswith(": a sampled output is not finite")
 
 
 def test_parameters_that_do_not_fit_are_refused_before_a_step_and_leave_the_others(slave):
@@ -223,6 +224,19 @@ def test_fault_is_known_as_soon_as_it_is_asked_for(slave):
     slave.set_real([5], [10.0])
     slave.enter_initialization_mode()
     assert slave.get_boolean([8]) == [True]
+    assert slave._get_fmu_state()["refused"] == {
+        "initialisation": "initialisation refused: too much"
+    }
+
+
+def test_experiment_that_is_not_set_up_starts_at_zero(slave):
+    slave.enter_initialization_mode()
+    assert slave.get_real(C) == [0.0]
+
+
+def test_call_out_of_order_blocks_by_its_name(slave):
+    slave.terminate()
+    assert slave._get_fmu_state()["refused"].keys() == {"fmi2Terminate"}
 
 
 def test_fault_can_be_read_among_others(slave):
@@ -234,7 +248,9 @@ def test_state_of_whole_numbers_is_bounded_as_one_of_floats(slave):
     slave._set_fmu_state({**saved, "state": [[3, 4]], "outputs": [3, 4, 0.0]})
     assert slave._get_fmu_state()["state"] == ((3.0, 4.0),)
     slave._set_fmu_state({**saved, "state": [[10**200, 0]]})
-    assert "beyond" in slave.log_queue[0].msg
+    slave._set_fmu_state({**saved, "state": [[1e100, 0.0]]})
+    assert slave._get_fmu_state()["state"] == ((1e100, 0.0),)
+    assert [entry.msg for entry in slave.log_queue] == ["state refused: beyond 1e+100"]
 
 
 def test_state_that_cannot_be_saved_says_why_when_it_is_set(slave, monkeypatch):
@@ -244,3 +260,32 @@ def test_state_that_cannot_be_saved_says_why_when_it_is_set(slave, monkeypatch):
     monkeypatch.setattr(initialised(slave), "hidden_state", broken)
     slave._set_fmu_state(slave._get_fmu_state())
     assert [entry.msg for entry in slave.log_queue] == ["state refused: not now"]
+
+
+@pytest.mark.parametrize(
+    ("state", "b", "why"),
+    [
+        ((1.0, nan), 0.0, "the state is not finite, or beyond 1e+100"),
+        ((-1.1e100, 0.0), 0.0, "the state is not finite, or beyond 1e+100"),
+        ((0.0, 0.0), nan, "b.y = nan: must be finite"),
+        ((0.0, 0.0), -inf, "b.y = -inf: must be finite"),
+    ],
+)
+def test_state_and_outputs_are_checked_each_for_itself(slave, monkeypatch, state, b, why):
+    outcome = Place(state), {"b": (0.0, b), "c": (0.0,)}
+    monkeypatch.setattr(initialised(slave), "advance", lambda *arguments: outcome)
+    assert not slave.do_step(0.0, 0.1)
+    assert [entry.msg for entry in slave.log_queue] == [f"step refused at t = 0 s: {why}"]
+    assert slave.get_real(B) == [0.0, 0.0]
+
+
+def test_experiment_is_refused_by_name_until_a_good_one_comes(slave):
+    slave.setup_experiment(nan)
+    slave.setup_experiment(0.0, -1.0)
+    assert slave._get_fmu_state()["refused"].keys() == {"fmi2SetupExperiment"}
+    assert [entry.msg for entry in slave.log_queue] == [
+        "experiment refused: start time nan: must be finite",
+        "experiment refused: stop time -1.0: must not be before 0.0",
+    ]
+    slave.setup_experiment(2.0, 2.0)
+    assert slave._get_fmu_state()["refused"] == {}
