@@ -8,6 +8,7 @@
 room                        what it is for
 ==========================  ==========================================================
 :mod:`.errors`              what can go wrong, in words for the user
+:mod:`.reading`             files of the user's, read with care
 :mod:`.system`              what is simulated, and how it is written down
 :mod:`.master`              how it is stepped
 :mod:`.analysis`            the loop's signals by the paper's names; indices, figures

@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+#: Of a long text, such as all that is wrong with a description, this many lines and letters of
+#: each are said.
+_MOST_LINES, _LONGEST_LINE = 10, 300
+
 
 class InputError(ValueError):
     """The user asked for something that cannot be done; the text says what to change."""
@@ -15,10 +19,18 @@ class StartError(InputError):
 
 
 def reason(error: BaseException) -> str:
-    """All that an exception says, in one line."""
-    return "; ".join(line.strip() for line in str(error).splitlines() if line.strip()) or repr(
-        error
-    )
+    """What an exception says, in one line."""
+    if isinstance(error, MemoryError):
+        return "memory is short"
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    more = [f"and {len(lines) - _MOST_LINES} lines more"] * (len(lines) > _MOST_LINES)
+    said = (shortened(line, _LONGEST_LINE) for line in (*lines[:_MOST_LINES], *more))
+    return "; ".join(said).replace(":; ", ": ") or repr(error)
+
+
+def shortened(text: str, most: int = 80) -> str:
+    """A text for a message, cut where it gets long."""
+    return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
 def last_line(text: str, otherwise: str = "no reason given") -> str:

@@ -22,6 +22,9 @@ _Y, _TAU_APPLIED = _PLACES["y"], _PLACES["tau_applied"]
 #: Share of its length by which a normalised quaternion is off.
 _ROUNDING = 1e-12
 
+#: More standard deviations than any number of Random.gauss is off: sqrt(-2 log(2^-53)) is 8.6.
+_MOST_DEVIATIONS = 9.0
+
 
 class Inputs(NamedTuple):
     """Commanded force and moments, and the disturbance."""
@@ -81,8 +84,8 @@ class AuvPlant(Component[PlantState, Inputs, Outputs, Parameters]):
             raise Refusal("its quaternion is not of length one")
         u, q, r = outputs[_TAU_APPLIED]
         seen = self._pack(_seen(parameters, state, _limited(parameters, (u, q, r))))
-        # The noise in it could be any.
-        seen[_Y] = outputs[_Y]
+        most = _MOST_DEVIATIONS * parameters.noise.std
+        seen[_Y] = [b + min(max(a - b, -most), most) for a, b in zip(outputs[_Y], seen[_Y])]
         if not nearly_equal(seen, outputs):
             raise Refusal("its outputs are not those of its state")
 

@@ -16,6 +16,7 @@ import zipfile
 from importlib.metadata import version
 from modulefinder import ModuleFinder
 from pathlib import Path
+from typing import Any
 
 import pythonfmu
 
@@ -35,8 +36,11 @@ from {module} import {component}
 settle({component}, globals(), locals())
 """
 
-#: What a folder of built FMUs was built from.
+#: What a folder of built FMUs was built from, and what was built.
 MANIFEST = "build.json"
+
+#: How FMUs are loaded: by a library of our own, or by PythonFMU's.
+LOADERS = ("native", "plain")
 
 
 def fingerprint() -> str:
@@ -131,23 +135,36 @@ def build(destination: Path, loader: str | None = None) -> list[Path]:
     """
     destination.mkdir(parents=True, exist_ok=True)
     manifest = destination / MANIFEST
-    try:
-        before = json.loads(manifest.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        before = {}
+    before = _built_before(manifest)
     sources = fingerprint()
     current = before.get("fingerprint") == sources and loader in (None, before.get("loader"))
     chosen = loader or (before["loader"] if current else best_loader())
+    digests = before["sha256"] if current else {}
     written = []
     for component, module in components().items():
         path = destination / f"{component}.fmu"
-        if not current or not path.is_file():
+        if not path.is_file() or digests.get(path.name) != _digest(path):
             _build(component, module, chosen, destination)
+            digests[path.name] = _digest(path)
             written.append(path)
     if written:
-        content = {"fingerprint": sources, "loader": chosen}
+        content = {"fingerprint": sources, "loader": chosen, "sha256": digests}
         manifest.write_text(json.dumps(content) + "\n", encoding="utf-8")
     return written
+
+
+def _built_before(manifest: Path) -> dict[str, Any]:
+    """What a manifest says; empty if there is none, or it is none of ours."""
+    try:
+        content = json.loads(manifest.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    ours = isinstance(content, dict) and isinstance(content.get("sha256"), dict)
+    return content if ours and content.get("loader") in LOADERS else {}
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def best_loader() -> str:
@@ -159,7 +176,7 @@ def main() -> int:
     """Command line of the module."""
     parser = argparse.ArgumentParser(prog="python -m fmus.packaging.build", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("fmus", "dist"), help="folder to write")
-    parser.add_argument("--loader", choices=("native", "plain"), help="default: native if it can")
+    parser.add_argument("--loader", choices=LOADERS, help="default: native if it can")
     options = parser.parse_args()
     try:
         for path in build(options.out, options.loader):

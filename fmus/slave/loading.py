@@ -39,11 +39,11 @@ def settle(slave: type, module: dict[str, Any], found: dict[str, Any]) -> None:
     found.clear()
     # What is one reference short is given back, what has one too many is relieved of it.
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(module))
-    # Other threads may have put other folders before it.
+    # Other threads put other folders before it, and take them away.
     script = module["__name__"]
-    own = next((i for i, folder in enumerate(sys.path) if _resources_of(folder, script)), None)
-    if own is not None:
-        path = sys.path.pop(own)
+    path = next((folder for folder in [*sys.path] if _resources_of(folder, script)), None)
+    if path is not None:
+        sys.path.remove(path)
         _release_interpreter(Path(path))
         same_but_ours = f"{path}/"
         if sys.getrefcount(path) == sys.getrefcount(same_but_ours) + 1:

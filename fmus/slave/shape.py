@@ -6,8 +6,9 @@ optional. What is of another type is left as it is.
 
 from __future__ import annotations
 
+import sys
 from itertools import count
-from math import hypot, inf
+from math import hypot
 from typing import Any, Callable, Union, get_args, get_origin, get_type_hints
 
 from fmus.ports.port import Refusal
@@ -75,7 +76,7 @@ def restored(kind: Any, value: Any) -> Any:
     if _is_union(kind):
         return _as_one_of(get_args(kind), value)
     if kind is float and type(value) in (float, int):
-        if not abs(value) < inf:
+        if not abs(value) <= sys.float_info.max:
             raise Refusal("a value is not finite")
         return value
     if kind in _SCALARS and type(value) is not kind:

@@ -5,10 +5,8 @@ Everything is computed from the true state of the plant, which the controller do
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -35,6 +33,7 @@ from orchestrator.analysis.signals import (
     true_control_point,
     vehicle,
 )
+from orchestrator.master.files import CsvLines
 from orchestrator.master.observer import Ending, Header
 from orchestrator.master.selection import every
 from orchestrator.master.table import Table
@@ -109,7 +108,7 @@ class CertificatesFile:
         """
         self._path = path
         self._interval = interval
-        self._file: Any = None
+        self._lines: CsvLines | None = None
 
     def begin(self, header: Header) -> None:
         """Find out whether there will be certificates."""
@@ -129,13 +128,11 @@ class CertificatesFile:
             chosen = self._every.chosen(starts[:, 0])
             starts, ends = starts[chosen], ends[chosen]
         if len(starts):
-            if self._file is None:
-                self._file = self._path.open("w", newline="", encoding="utf-8")
-                self._writer = csv.writer(self._file, lineterminator="\n")
-                self._writer.writerow(COLUMNS)
-            self._writer.writerows(_certificates(self._header, starts, ends).tolist())
+            if self._lines is None:
+                self._lines = CsvLines(self._path, COLUMNS)
+            self._lines.write(_certificates(self._header, starts, ends).tolist())
 
     def end(self, ending: Ending) -> None:
         """Close the file."""
-        if self._file is not None:
-            self._file.close()
+        if self._lines is not None:
+            self._lines.close()

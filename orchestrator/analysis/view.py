@@ -119,8 +119,8 @@ def _errors(table: Table) -> Iterator[_Lines]:
 
 def _commands(table: Table) -> Iterator[_Lines]:
     for k, column in enumerate(COMMANDED):
-        known = not table.missing((), LIMITS)
-        limits = [parameter(table, bounds[k]) for bounds in (LOWER_LIMITS, UPPER_LIMITS)] * known
+        bounds = () if table.missing((), LIMITS) else (LOWER_LIMITS[k], UPPER_LIMITS[k])
+        limits = [parameter(table, name) for name in bounds]
         name = f"τ<sub>{ACTUATORS[k]}</sub>"
         unit = "N·m" if k else "N"
         values = table.step_values(column)

@@ -5,6 +5,7 @@ module              commands
 ==================  ==================================================================
 :mod:`.main`        the entry point
 :mod:`.parser`      all commands, and the exit status
+:mod:`.streams`     what is said and shown, whatever the standard streams are
 :mod:`.options`     options that several commands have
 :mod:`.build`       build, list, gains
 :mod:`.run`         run

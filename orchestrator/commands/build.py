@@ -8,6 +8,7 @@ from typing import Any
 
 from orchestrator.analysis import gains
 from orchestrator.commands.options import OK, add_out, add_set, assignments
+from orchestrator.commands.streams import show
 from orchestrator.experiments import bundle
 from orchestrator.experiments.own_controller import build_own
 from orchestrator.experiments.scenario import names, read_scenario
@@ -45,24 +46,24 @@ def add_to(commands: Any) -> None:
 
 def _build(options: argparse.Namespace) -> int:
     if options.script is not None:
-        print(build_own(options.script, options.out, options.loader))
+        show(build_own(options.script, options.out, options.loader))
         return OK
     folder = options.out or bundle.DEFAULT_FOLDER
     written = bundle.build(folder, options.loader)
     for path in written:
-        print(path)
+        show(path)
     state = "built" if written else "up to date"
-    print(f"{folder} is {state}, with the {bundle.loader_of(folder)} loader")
+    show(f"{folder} is {state}, with the {bundle.loader_of(folder)} loader")
     return OK
 
 
 def _list(_: argparse.Namespace) -> int:
     for name in names():
-        print(f"{name:10} {read_scenario(name).title}")
+        show(f"{name:10} {read_scenario(name).title}")
     return OK
 
 
 def _gains(options: argparse.Namespace) -> int:
     system = closed_loop(bundle.current_fmus()).with_parameters(assignments(options))
-    print(gains.check(system))
+    show(*gains.check(system).splitlines())
     return OK

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.commands.options import FAILED, OK, add_out, add_set, add_system, assignments
+from orchestrator.commands.streams import show
 from orchestrator.errors import InputError
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.exchange.verify import verify
@@ -90,13 +91,16 @@ def _export(options: argparse.Namespace) -> int:
     with replaced(folder) as unfinished:
         written = FORMATS[options.format](system, unfinished)
     for path in written:
-        print(folder / path.relative_to(unfinished))
+        show(folder / path.relative_to(unfinished))
     return OK
 
 
 def _verify(options: argparse.Namespace) -> int:
     system = load(options.scenario)
-    print(verify(options.table, system.with_parameters(assignments(options)), options.tolerance))
+    certificate = verify(
+        options.table, system.with_parameters(assignments(options)), options.tolerance
+    )
+    show(*certificate.splitlines())
     return OK
 
 
@@ -107,15 +111,15 @@ def _hosts(options: argparse.Namespace) -> int:
     system = load(options.scenario)
     step = system.step or DEFAULT_STEP
     verdicts = compare(system, options.host or list(HOSTS), options.steps, step)
-    print(f"{'host':13} {'package':34} {'max deviation':>14} {'steps/s':>8}  worst port")
+    show(f"{'host':13} {'package':34} {'max deviation':>14} {'steps/s':>8}  worst port")
     for verdict in verdicts:
         if verdict.failure is not None:
-            print(f"{verdict.host:13} {verdict.package:34} {verdict.failure}")
+            show(f"{verdict.host:13} {verdict.package:34} {verdict.failure}")
             continue
         host = HOSTS[verdict.host]
         note = f" ({host.why})" if host.why else ""
         note += "" if verdict.agrees else f", above {host.bound:g}"
-        print(
+        show(
             f"{verdict.host:13} {verdict.package:34} {verdict.deviation:14.2e} "
             f"{verdict.steps_per_second:8.0f}  {verdict.port}{note}"
         )

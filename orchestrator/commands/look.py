@@ -15,6 +15,7 @@ from orchestrator.analysis.signals import CONTROL_POINT
 from orchestrator.analysis.view import page
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.commands.options import OK, add_experiment, add_set, add_system, request, status
+from orchestrator.commands.streams import show
 from orchestrator.errors import InputError, reason
 from orchestrator.experiments.folder import whole
 from orchestrator.experiments.preparation import loaded, prepare
@@ -124,4 +125,4 @@ def _write(path: Path, write: Callable[[Path], object]) -> None:
             write(partial)
     except OSError as error:
         raise InputError(f"cannot write {path}: {reason(error)}; choose --out FILE") from error
-    print(path)
+    show(path)

@@ -2,19 +2,43 @@
 
 from __future__ import annotations
 
+import logging
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 
+from orchestrator.commands import streams
+from orchestrator.commands.streams import say
+from orchestrator.errors import reason
+from orchestrator.master.interrupts import orderly_end
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
+    # No matrix here is worth a thread, and where one cannot be had numpy's library ends in Ctrl-C.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Where it can keep no fonts it says so at length, and draws all the same.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
+    streams.fill()
+    status = 0
     try:
-        # Half a second of imports, in which Ctrl-C must find an answer, too.
-        return int(import_module("orchestrator.commands.parser").dispatch(arguments))
+        with orderly_end():
+            # Half a second of imports, in which Ctrl-C must find an answer, too.
+            status = int(import_module("orchestrator.commands.parser").dispatch(arguments))
+    except SystemExit as end:
+        # The parser has shown its help, or complained.
+        if not streams.finished():
+            raise SystemExit(end.code or 1) from None
+        raise
     except KeyboardInterrupt:
-        print("auv-fmu: interrupted", file=sys.stderr)
-        return 130
+        say("interrupted")
+        status = 130
+    except (OSError, MemoryError, ImportError) as error:
+        # Whatever else this machine does not give.
+        say(reason(error))
+        status = 2
+    return status if streams.finished() else status or 1
 
 
 if __name__ == "__main__":

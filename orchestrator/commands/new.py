@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.commands.options import OK
+from orchestrator.commands.streams import show
 from orchestrator.experiments.own_controller import BASES, new_controller
 
 
@@ -33,8 +34,8 @@ def add_to(commands: Any) -> None:
 def _controller(options: argparse.Namespace) -> int:
     script, scenario, *others = new_controller(options.name, options.folder, options.base)
     for path in (script, scenario, *others):
-        print(path)
-    print(f"change {script}, then build and run it:")
-    print(f"  auv-fmu build {script}")
-    print(f"  auv-fmu run {scenario} --out {script.parent}{os.sep}results")
+        show(path)
+    show(f"change {script}, then build and run it:")
+    show(f"  auv-fmu build {script}")
+    show(f"  auv-fmu run {scenario} --out {script.parent}{os.sep}results")
     return OK

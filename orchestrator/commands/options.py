@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
+from orchestrator.commands.streams import say
 from orchestrator.errors import InputError
 from orchestrator.experiments.preparation import Request
 from orchestrator.master.experiment import ORDERS
@@ -14,11 +14,6 @@ from orchestrator.system.names import PortName, port_name
 
 #: Exit status: done, a simulation failed, bad usage or input, ended by the user.
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-
-
-def say(text: str) -> None:
-    """A line for the user beside the output."""
-    print(f"auv-fmu: {text}", file=sys.stderr, flush=True)
 
 
 def add_system(parser: argparse.ArgumentParser) -> None:

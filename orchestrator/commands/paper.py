@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.commands.options import OK, add_out
+from orchestrator.commands.streams import show
 from orchestrator.experiments.scenario import names
 from orchestrator.paper.report import write_report
 
@@ -26,5 +27,5 @@ def add_to(commands: Any) -> None:
 
 def _report(options: argparse.Namespace) -> int:
     for path in write_report(options.out, [*names(), *options.scenarios], options.command):
-        print(path)
+        show(path)
     return OK

@@ -8,15 +8,16 @@ from collections.abc import Sequence
 from importlib.metadata import version
 
 from orchestrator.commands import build, exchange, look, new, paper, run, upkeep
-from orchestrator.commands.options import BAD_INPUT, FAILED, INTERRUPTED, say
+from orchestrator.commands.options import BAD_INPUT, FAILED, INTERRUPTED
+from orchestrator.commands.streams import Unheard, say
 from orchestrator.errors import InputError, StartError
 
 
 def dispatch(arguments: Sequence[str] | None) -> int:
     """Run what the arguments say; returns the exit status."""
-    options = parser().parse_args(arguments)
-    options.command = ["auv-fmu", *(sys.argv[1:] if arguments is None else arguments)]
     try:
+        options = parser().parse_args(arguments)
+        options.command = ["auv-fmu", *(sys.argv[1:] if arguments is None else arguments)]
         return int(options.action(options))
     except InputError as error:
         say(str(error))
@@ -24,9 +25,7 @@ def dispatch(arguments: Sequence[str] | None) -> int:
     except KeyboardInterrupt:
         say("interrupted")
         return INTERRUPTED
-    except BrokenPipeError:
-        # The reader of our output has gone; nothing more can be told to anybody.
-        sys.stderr.close()
+    except Unheard:
         return FAILED
 
 

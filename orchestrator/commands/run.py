@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,12 +19,13 @@ from orchestrator.commands.options import (
     add_set,
     add_system,
     request,
-    say,
     status,
 )
+from orchestrator.commands.streams import say, show
 from orchestrator.experiments.preparation import loaded, prepare, with_companion
 from orchestrator.experiments.run import Files, run_into
 from orchestrator.master.files import FORMATS
+from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.isolated import STEP_TIMEOUT, isolation_of
 
 
@@ -73,13 +75,25 @@ def _run(options: argparse.Namespace) -> int:
     runs = with_companion(prepare(*loaded(options.scenario), wanted), wanted)
     folder = options.out or Path("results", runs[0].scenario.name)
     files = Files(options.interval, options.columns, options.format, options.figures)
-    finished = run_into(folder, runs, files, options.command, say)
-    for run in finished:
-        _print_summary(run.metrics)
-    print(f"written to {finished[0].folder}{os.sep}")
-    if finished[0].folder != folder:
-        say(f"{folder} keeps the whole result that was there before")
-    return max(status(run.name, run.ending) for run in finished)
+    # Until all is said: who stops a run several times wants to know, too, where its rows are.
+    with held_interrupts(_answer):
+        finished = run_into(folder, runs, files, options.command, say)
+        for run in finished:
+            _print_summary(run.metrics)
+        show(f"written to {finished[0].folder}{os.sep}")
+        if finished[0].folder != folder:
+            say(f"{folder} keeps the whole result that was there before")
+        return max(status(run.name, run.ending) for run in finished)
+
+
+def _answer(interrupts: Interrupts) -> None:
+    """Tell the user at once what happens now, from within the handler of the signal."""
+    text = "stopping: writing what was computed and drawing it; once more leaves the figures out"
+    if interrupts.urgent:
+        text = "stopping at once, without figures; a third time ends an FMU that does not return"
+    # print could have been interrupted itself, and must not be entered a second time.
+    with suppress(OSError):
+        os.write(2, f"auv-fmu: {text}\n".encode())
 
 
 def _print_summary(values: Mapping[str, Any]) -> None:
@@ -91,10 +105,10 @@ def _print_summary(values: Mapping[str, Any]) -> None:
         "total_variation": "total variation u, q, r [N, N.m]",
         "final_error": f"largest error x, y, z in the last {last:g} s [m]",
     }
-    print(values["scenario"])
+    show(values["scenario"])
     for key, label in rows.items():
         if key in values:
-            print(f"  {label:44}" + "".join(f"{_number(value):>11}" for value in values[key]))
+            show(f"  {label:44}" + "".join(f"{_number(value):>11}" for value in values[key]))
 
 
 def _number(value: float) -> str:

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.commands.options import OK, add_out
-from orchestrator.errors import InputError, reason
+from orchestrator.commands.streams import show
 from orchestrator.exchange.reference import write_reference
 from orchestrator.experiments.bundle import current_fmus, run_fmus
+from orchestrator.experiments.folder import replaced, whole
 from orchestrator.experiments.scenario_page import scenario_page
 
 
@@ -25,20 +26,18 @@ def add_to(commands: Any) -> None:
 
 
 def _reference(options: argparse.Namespace) -> int:
-    try:
-        options.out.mkdir(parents=True, exist_ok=True)
-        written = write_reference(current_fmus(), options.out)
-    except OSError as error:
-        raise InputError(f"cannot write into {options.out}: {reason(error)}") from error
+    with replaced(options.out) as unfinished:
+        written = write_reference(current_fmus(), unfinished)
     for path in written:
-        print(path)
+        show(options.out / path.relative_to(unfinished))
     return OK
 
 
 def _docs(options: argparse.Namespace) -> int:
     written = run_fmus("packaging.documentation", options.out / "components")
     page = options.out / "scenarios.md"
-    page.write_text(scenario_page(), encoding="utf-8")
+    with whole(page) as partial:
+        partial.write_text(scenario_page(), encoding="utf-8")
     for path in (*written, page):
-        print(path)
+        show(path)
     return OK

@@ -26,7 +26,9 @@ from orchestrator.errors import InputError, last_line
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.simulation import completed
 from orchestrator.master.table import Table
+from orchestrator.system.children import run_module
 from orchestrator.system.container import write_container
+from orchestrator.system.leftovers import process_folder
 from orchestrator.system.osp import write_osp
 from orchestrator.system.ssp.reading import read_ssp
 from orchestrator.system.ssp.writing import write_ssp
@@ -209,25 +211,11 @@ def _verdict(
         labelled = f"{package} {version(package)}"
     except PackageNotFoundError:
         return Verdict(host, package, failure="not installed: pip install 'auv-fmu[hosts]'")
-    with TemporaryDirectory(prefix="auvfmu") as folder:
+    with TemporaryDirectory(dir=process_folder()) as folder:
         write_ssp(replace(system, name="given", step=step), Path(folder))
-        command = [
-            sys.executable,
-            "-P",
-            "-m",
-            "orchestrator.exchange.hosts",
-            host,
-            folder,
-            str(steps),
-        ]
+        arguments = [host, folder, str(steps), str(step)]
         try:
-            process = subprocess.run(
-                [*command, str(step)],
-                capture_output=True,
-                text=True,
-                check=False,
-                timeout=_TIMEOUT,
-            )
+            process = run_module("orchestrator.exchange.hosts", *arguments, timeout=_TIMEOUT)
         except subprocess.TimeoutExpired:
             return Verdict(host, labelled, failure=f"no end after {_TIMEOUT} s")
         if process.returncode != 0:

@@ -14,7 +14,7 @@ CHECKSUMS, BILL = "SHA256SUMS", "bom.cdx.json"
 
 def checksums(files: Sequence[Path]) -> bytes:
     """Checksums as `sha256sum --check` reads them."""
-    return "".join(f"{_digest(path)}  {path.name}\n" for path in files).encode()
+    return "".join(f"{digest_of(path)}  {path.name}\n" for path in files).encode()
 
 
 def bill(files: Sequence[Path]) -> bytes:
@@ -34,7 +34,7 @@ def bill(files: Sequence[Path]) -> bytes:
                 {
                     "type": "file",
                     "name": path.name,
-                    "hashes": [{"alg": "SHA-256", "content": _digest(path)}],
+                    "hashes": [{"alg": "SHA-256", "content": digest_of(path)}],
                 }
                 for path in files
             ),
@@ -56,5 +56,6 @@ def _package(name: str) -> dict[str, Any]:
     }
 
 
-def _digest(path: Path) -> str:
+def digest_of(path: Path) -> str:
+    """SHA-256 of a file."""
     return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import subprocess
-import sys
+import shutil
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,19 +18,27 @@ from tempfile import mkdtemp
 from platformdirs import user_cache_path
 
 from orchestrator.errors import InputError, last_line, reason
-from orchestrator.experiments.bill_of_materials import BILL, CHECKSUMS, bill, checksums
-from orchestrator.experiments.folder import whole
+from orchestrator.experiments.bill_of_materials import (
+    BILL,
+    CHECKSUMS,
+    bill,
+    checksums,
+    digest_of,
+)
+from orchestrator.experiments.folder import replaced, to_disk
 from orchestrator.experiments.wiring import closed_loop
+from orchestrator.system.children import run_module
+from orchestrator.system.leftovers import claimed, remove_left
 from orchestrator.system.ssp.writing import ssp_bytes
 
 #: Where `auv-fmu build` writes unless another folder is named.
 DEFAULT_FOLDER = Path("fmus", "dist")
 
-#: The archive of the closed loop, and what the FMUs beside it were built from.
+#: The archive of the closed loop, and what was built beside it, from what.
 ARCHIVE, MANIFEST = "auv.ssp", "build.json"
 
-#: Names the FMUs in a folder of the cache.
-_CONTENTS = "contents.txt"
+#: How the name of a folder of the cache begins that is being made.
+_PARTIAL = ".partial-"
 
 #: Packages that the FMUs are made of.
 _SOURCES = ("auv_fmu", "fmus", "pythonfmu")
@@ -52,24 +59,23 @@ def build(folder: Path, loader: str | None = None) -> list[Path]:
         InputError: the folder cannot be written, or the FMUs cannot be built.
 
     """
-    written = run_fmus("packaging.build", folder, *(("--loader", loader) if loader else ()))
-    archive = folder / ARCHIVE
-    try:
-        written += _write_if_changed(archive, ssp_bytes(closed_loop(folder)))
-        files = [*sorted(folder.glob("*.fmu")), archive]
-        written += _write_if_changed(folder / CHECKSUMS, checksums(files))
-        written += _write_if_changed(folder / BILL, bill(files))
-    except OSError as error:
-        raise InputError(f"cannot write the bundle into {folder}: {error}") from error
-    return written
-
-
-def _write_if_changed(path: Path, content: bytes) -> list[Path]:
-    if path.is_file() and path.read_bytes() == content:
-        return []
-    with whole(path) as partial:
-        partial.write_bytes(content)
-    return [path]
+    with replaced(folder) as unfinished:
+        # What is up to date is taken along, and not written anew.
+        for path in (*folder.glob("*.fmu"), folder / MANIFEST):
+            if path.is_file():
+                shutil.copy2(path, unfinished)
+        run_fmus("packaging.build", unfinished, *(("--loader", loader) if loader else ()))
+        archive = unfinished / ARCHIVE
+        archive.write_bytes(ssp_bytes(closed_loop(unfinished)))
+        files = [*sorted(unfinished.glob("*.fmu")), archive]
+        (unfinished / CHECKSUMS).write_bytes(checksums(files))
+        (unfinished / BILL).write_bytes(bill(files))
+        for path in unfinished.iterdir():
+            before = folder / path.name
+            if before.is_file() and before.read_bytes() == path.read_bytes():
+                path.unlink()
+        written = sorted(path.name for path in unfinished.iterdir())
+    return [folder / name for name in written]
 
 
 def loader_of(folder: Path) -> str:
@@ -81,8 +87,7 @@ def loader_of(folder: Path) -> str:
 def run_fmus(module: str, folder: Path, *options: str) -> list[Path]:
     """Run a module of the package fmus that writes into a folder.
 
-    In a process of its own: what PythonFMU imports to build must not stay in this one. Without -P
-    it would import from a folder fmus in the current one.
+    In a process of its own: what PythonFMU imports to build must not stay in this one.
 
     Returns:
         The files written.
@@ -91,12 +96,10 @@ def run_fmus(module: str, folder: Path, *options: str) -> list[Path]:
         InputError: it failed.
 
     """
-    process = subprocess.run(
-        [sys.executable, "-P", "-m", f"fmus.{module}", "--out", str(folder), *options],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    try:
+        process = run_module(f"fmus.{module}", "--out", str(folder), *options)
+    except OSError as error:
+        raise InputError(f"the FMUs cannot be built: {reason(error)}") from error
     if process.returncode != 0:
         raise InputError(last_line(process.stderr))
     return [Path(line) for line in process.stdout.splitlines()]
@@ -116,32 +119,40 @@ def current_fmus() -> Path:
         return folder
     try:
         cache_folder.mkdir(parents=True, exist_ok=True)
-        partial = Path(mkdtemp(prefix=".partial-", dir=cache_folder))
+        remove_left(cache_folder, f"{_PARTIAL}*")
+        partial = Path(mkdtemp(prefix=_PARTIAL, dir=cache_folder))
+        try:
+            with claimed(partial):
+                _build_cached(partial, folder)
+        finally:
+            rmtree(partial, ignore_errors=True)
     except OSError as error:
-        raise InputError(
-            f"cannot keep FMUs in {cache_folder}: {reason(error)}; set XDG_CACHE_HOME to a folder "
-            "that can be written"
-        ) from error
-    try:
-        names = [path.name for path in run_fmus("packaging.build", partial)]
-        (partial / _CONTENTS).write_text("\n".join(names), encoding="utf-8")
-        # What somebody has cleaned away in part is made anew.
-        rmtree(folder, ignore_errors=True)
-        partial.rename(folder)
-    except OSError:
-        # Another process was first; its folder holds the same.
+        # Or another process was first; its folder holds the same.
         if not _is_whole(folder):
-            raise
-    finally:
-        rmtree(partial, ignore_errors=True)
+            raise InputError(
+                f"cannot keep FMUs in {cache_folder}: {reason(error)}; set XDG_CACHE_HOME to a "
+                "folder that can be written"
+            ) from error
     return folder
 
 
+def _build_cached(partial: Path, folder: Path) -> None:
+    """Build into a folder that takes the place of another when it is whole."""
+    run_fmus("packaging.build", partial)
+    for path in (*partial.iterdir(), partial):
+        to_disk(path)
+    # What somebody has cleaned away in part is made anew.
+    rmtree(folder, ignore_errors=True)
+    partial.rename(folder)
+
+
 def _is_whole(folder: Path) -> bool:
-    contents = folder / _CONTENTS
-    return contents.is_file() and all(
-        (folder / name).is_file() for name in contents.read_text(encoding="utf-8").splitlines()
-    )
+    """Whether a folder holds the FMUs that were built into it, as they were then."""
+    try:
+        built = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["sha256"]
+        return all(digest_of(folder / name) == digest for name, digest in built.items())
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return False
 
 
 def _fingerprint() -> str:

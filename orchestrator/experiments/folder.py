@@ -1,17 +1,21 @@
-"""A folder of results that changes all at once.
+"""A folder of results that changes all at once, and files that do.
 
-Files are written into a hidden folder within it. When all are whole they take the place of those of
-an earlier run, `run.json` last: a folder without one holds no whole result. What an earlier run has
-written and this one does not is removed; files of others are left alone. A run that came to no end
-does not take the place of one that did: it goes into a folder beside it.
+Files are written into a hidden folder within it. When all are whole and on the disk, that folder
+gets another name: from then on its files are the result. They take the places of those of an
+earlier run, `run.json` last; if the process is killed meanwhile, whoever comes next goes on with
+it. What an earlier run has written and this one does not is removed; files of others are left
+alone. A run that came to no end does not take the place of one that did: it goes into a folder
+beside it.
 """
 
 from __future__ import annotations
 
+import errno
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from itertools import chain, count
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
@@ -19,12 +23,7 @@ from typing import Any
 from uuid import uuid4
 
 from orchestrator.errors import InputError, reason
-
-try:
-    import fcntl
-except ImportError:  # pragma: no cover
-    # Not a POSIX system: two runs into one folder are not told apart there.
-    fcntl = None  # type: ignore[assignment]
+from orchestrator.system.leftovers import claimed, remove_left
 
 #: The record of a run: what is there when everything is.
 RECORD = "run.json"
@@ -32,18 +31,28 @@ RECORD = "run.json"
 #: Where a run that came to no end goes, if there is a whole result already.
 INCOMPLETE = "incomplete"
 
-#: How the hidden folder's name begins.
-_UNFINISHED = ".unfinished-"
+#: The hidden folder: how its name begins as long as it is written into, and when it is whole.
+_UNFINISHED, _WHOLE = ".unfinished-", ".whole"
+
+#: The record of the result whose place is being taken.
+_EARLIER = ".earlier.json"
+
+#: How the name of a file begins that is being written.
+_PARTIAL = ".partial-"
+
+#: What file systems answer that know no fsync.
+_CANNOT = (errno.EINVAL, errno.ENOTSUP)
 
 
 @contextmanager
-def replaced(folder: Path) -> Iterator[Path]:
+def replaced(folder: Path, keep: Callable[[], bool] = lambda: False) -> Iterator[Path]:
     """A folder to write a result into; at the end it takes the place of what was there before.
 
     An exception in the context leaves the folder as it was.
 
     Args:
         folder: of the result, made if it does not exist.
+        keep: asked, when there is no more room, whether what was written before is to be kept.
 
     Raises:
         InputError: the folder cannot be written, or another run is writing into it.
@@ -56,33 +65,47 @@ def replaced(folder: Path) -> Iterator[Path]:
             # Whoever has left these was killed: the lock is ours.
             for left in folder.glob(f"{_UNFINISHED}*"):
                 rmtree(left)
+            _settle(folder)
             unfinished = Path(mkdtemp(prefix=_UNFINISHED, dir=folder))
             # As umask would have it, and not private.
             unfinished.chmod(folder.stat().st_mode)
             try:
                 yield unfinished
-                place = place_of(unfinished, folder)
-                _publish(unfinished, place)
-                if place == folder:
-                    _remove(folder / INCOMPLETE)
-            except OSError as error:
-                raise InputError(
-                    f"cannot write into {folder}: {reason(error)}; what was written so far is in "
-                    f"{unfinished} until the next run; choose another folder (--out DIR)"
-                ) from error
-            except BaseException:
+                publish(unfinished, folder)
+            except (OSError, MemoryError) as error:
+                rest = _rest(unfinished, folder) if keep() else ""
+                raise InputError(_cannot_write(folder, error, rest)) from error
+            finally:
                 rmtree(unfinished, ignore_errors=True)
-                raise
-            rmtree(unfinished)
     except OSError as error:
-        raise InputError(
-            f"cannot write into {folder}: {reason(error)}; choose another folder (--out DIR)"
-        ) from error
+        raise InputError(_cannot_write(folder, error)) from error
     finally:
         if made:
             with suppress(OSError):
                 # Fails where there is something in it.
                 folder.rmdir()
+
+
+def publish(unfinished: Path, folder: Path) -> Path:
+    """Have a folder that is whole take its place, which is given back."""
+    place = place_of(unfinished, folder)
+    _publish(unfinished, place)
+    return place
+
+
+def settle(folder: Path) -> None:
+    """Go on with what a killed process has begun: files that were taking their places.
+
+    Raises:
+        InputError: the folder cannot be written, or a run is writing into it.
+
+    """
+    if any((place / _WHOLE).is_dir() for place in (folder, folder / INCOMPLETE)):
+        try:
+            with _locked(folder):
+                _settle(folder)
+        except OSError as error:
+            raise InputError(_cannot_write(folder, error)) from error
 
 
 @contextmanager
@@ -91,37 +114,71 @@ def whole(path: Path) -> Iterator[Path]:
 
     An exception in the context leaves the other as it was.
     """
+    remove_left(path.parent, f"{_PARTIAL}*")
     # Ends as the other does: some writers tell the format by that.
-    partial = path.with_name(f".partial-{uuid4().hex}{path.suffix}")
+    partial = path.with_name(f"{_PARTIAL}{uuid4().hex}{path.suffix}")
     try:
-        yield partial
-        partial.replace(path)
+        partial.touch()
+        with claimed(partial):
+            yield partial
+            to_disk(partial)
+            partial.replace(path)
+        to_disk(path.parent)
     finally:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
 
 
+def to_disk(path: Path) -> None:
+    """Have a file, or the names in a folder, outlast a power cut.
+
+    Raises:
+        OSError: it is not all there; some file systems say so only now.
+
+    """
+    if os.name != "posix":
+        return
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in _CANNOT:
+            raise
+    finally:
+        os.close(descriptor)
+
+
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
     """Keep other runs out; the lock ends with the process, however it ends."""
-    if fcntl is None:
-        yield
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
     try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(
-                f"another run is writing into {folder}; wait for it, or choose another folder "
-                "(--out DIR)"
-            ) from None
-        except OSError:
-            # A file system without locks.
-            pass
-        yield
-    finally:
-        os.close(descriptor)
+        with claimed(folder):
+            yield
+    except BlockingIOError:
+        raise InputError(
+            f"another run is writing into {folder}; wait for it, or choose another folder "
+            "(--out DIR)"
+        ) from None
+
+
+def _cannot_write(folder: Path, error: Exception, rest: str = "") -> str:
+    hint = "; choose another folder (--out DIR)" if isinstance(error, OSError) else ""
+    return f"cannot write into {folder}: {reason(error)}{rest}{hint}"
+
+
+def _rest(unfinished: Path, folder: Path) -> str:
+    """Give what was written a name that can be seen; where it is, in words."""
+    if not unfinished.is_dir():
+        return ""
+    names = chain([INCOMPLETE], (f"{INCOMPLETE}-{n}" for n in count(2)))
+    kept = next(folder / name for name in names if not (folder / name).exists())
+    try:
+        # It may say that the run came to its end.
+        (unfinished / RECORD).unlink(missing_ok=True)
+        unfinished.rename(kept)
+    except OSError as error:
+        return f"; nor can what was written be kept: {reason(error)}"
+    return f"; what was written is in {kept}"
 
 
 def place_of(unfinished: Path, folder: Path) -> Path:
@@ -133,53 +190,76 @@ def place_of(unfinished: Path, folder: Path) -> Path:
 
 def failure_in(folder: Path) -> str | None:
     """Why the run came to no end whose result is in a folder; None: it did."""
-    failure = _record(folder).get("failure")
+    failure = _record(folder / RECORD).get("failure")
     return None if failure is None else str(failure)
 
 
-def _remove(folder: Path) -> None:
-    """Take away the result in a folder, and the folder if nothing else is in it."""
-    files = files_of(folder)
-    for file in files:
-        (folder / file).unlink(missing_ok=True)
-    for below in (*{(folder / file).parent for file in files} - {folder}, folder):
-        with suppress(OSError):
-            below.rmdir()
+def _publish(unfinished: Path, place: Path) -> None:
+    """Make a folder that is whole the result; what fails before changes nothing."""
+    for path in unfinished.rglob("*"):
+        to_disk(path)
+        target = place / path.relative_to(unfinished)
+        if target.exists() and target.is_dir() != path.is_dir():
+            raise FileExistsError(f"{target} is {'a' if target.is_dir() else 'no'} folder")
+    to_disk(unfinished)
+    place.mkdir(exist_ok=True)
+    unfinished.rename(place / _WHOLE)
+    to_disk(place)
+    _take_places(place)
 
 
-def _publish(unfinished: Path, folder: Path) -> None:
-    files = sorted(path.relative_to(unfinished) for path in unfinished.rglob("*") if path.is_file())
+def _settle(folder: Path) -> None:
+    for place in (folder, folder / INCOMPLETE):
+        if (place / _WHOLE).is_dir():
+            _take_places(place)
+
+
+def _take_places(place: Path) -> None:
+    """Move files out of the whole folder to where they belong; begun again, it goes on."""
+    source = place / _WHOLE
     # What is no result of a run, such as an export, takes no run's place.
-    is_result = Path(RECORD) in files
-    earlier = files_of(folder) if is_result else set()
-    for file in files:
-        if (folder / file).is_dir():
-            raise IsADirectoryError(f"{folder / file} is a folder")
+    is_result = (source / RECORD).is_file()
+    if is_result and (place / RECORD).is_file():
+        (place / RECORD).replace(source / _EARLIER)
+    for path in sorted(source.rglob("*")):
+        file = path.relative_to(source)
+        if path.is_file() and file not in (Path(RECORD), Path(_EARLIER)):
+            (place / file).parent.mkdir(parents=True, exist_ok=True)
+            path.replace(place / file)
     if is_result:
-        (folder / RECORD).unlink(missing_ok=True)
-    for file in sorted(files, key=lambda file: file == Path(RECORD)):
-        (folder / file).parent.mkdir(parents=True, exist_ok=True)
-        (unfinished / file).replace(folder / file)
-    for file in earlier - set(files):
+        _remove(place, files_of(source, _EARLIER) - files_of(source))
+        if failure_in(source) is None:
+            _remove(place / INCOMPLETE, files_of(place / INCOMPLETE))
+        to_disk(place)
+        (source / RECORD).replace(place / RECORD)
+    rmtree(source)
+
+
+def _remove(folder: Path, files: set[Path]) -> None:
+    """Take files away from a folder, and the folders that nothing else is in."""
+    for file in files:
         (folder / file).unlink(missing_ok=True)
-        if file.parent != Path() and not any((folder / file.parent).iterdir()):
-            (folder / file.parent).rmdir()
+    folders = {parent for file in files for parent in file.parents} | {Path()}
+    for below in sorted(folders, reverse=True):
+        with suppress(OSError):
+            # Fails where there is something in it.
+            (folder / below).rmdir()
 
 
-def files_of(folder: Path) -> set[Path]:
-    """The files that the run has written whose result is in a folder."""
+def files_of(folder: Path, record: str = RECORD) -> set[Path]:
+    """The files that the run has written whose record is in a folder."""
     try:
-        files = {Path(name) for name in _record(folder)["files"]}
+        files = {Path(name) for name in _record(folder / record)["files"]}
     except (KeyError, TypeError):
         return set()
     # A record that somebody has edited must not lead out of the folder.
     return {file for file in files if not file.is_absolute() and ".." not in file.parts}
 
 
-def _record(folder: Path) -> dict[str, Any]:
-    """The record in a folder; empty if there is none, or none of ours."""
+def _record(path: Path) -> dict[str, Any]:
+    """A record; empty if there is none, or none of ours."""
     try:
-        record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        record = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
     return record if isinstance(record, dict) else {}

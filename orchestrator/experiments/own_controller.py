@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import keyword
 import re
+import shutil
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from orchestrator.errors import InputError, reason
 from orchestrator.experiments.bundle import run_fmus
+from orchestrator.experiments.folder import whole
+from orchestrator.system.leftovers import process_folder
 
 _TEMPLATES = Path(__file__).with_name("templates")
 
@@ -69,7 +73,15 @@ def build_own(script: Path, folder: Path | None = None, loader: str | None = Non
     if not (script.is_file() and script.suffix == ".py"):
         raise InputError(f"{script}: no such Python file")
     options = [str(script), *(("--loader", loader) if loader else ())]
-    [path] = run_fmus("packaging.own", script.parent if folder is None else folder, *options)
+    with TemporaryDirectory(dir=process_folder()) as temporary:
+        [built] = run_fmus("packaging.own", Path(temporary), *options)
+        path = (script.parent if folder is None else folder) / built.name
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with whole(path) as partial:
+                shutil.copyfile(built, partial)
+        except OSError as error:
+            raise InputError(f"cannot write {path}: {reason(error)}") from error
     return path
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import platform
 import sys
@@ -10,8 +9,10 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
+from orchestrator.experiments.bill_of_materials import digest_of
 from orchestrator.experiments.folder import RECORD, whole
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.master.experiment import Experiment
@@ -22,13 +23,29 @@ from orchestrator.system.names import port_name
 PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy", "matplotlib")
 
 
+class Clock:
+    """When something has begun, and how long it has taken, even if somebody sets the time."""
+
+    def __init__(self) -> None:
+        """Begin now."""
+        self._started = datetime.now(UTC)
+        self._tick = monotonic()
+
+    def times(self) -> dict[str, object]:
+        """What a record says of it."""
+        return {
+            "started": self._started.isoformat(timespec="seconds"),
+            "seconds": round(monotonic() - self._tick, 3),
+        }
+
+
 def write_record(
     folder: Path,
     prepared: Prepared,
     header: Header,
     ending: Ending,
     command: Sequence[str],
-    started: datetime,
+    clock: Clock,
 ) -> None:
     """Write the record of a run into the folder of its files.
 
@@ -37,7 +54,7 @@ def write_record(
         prepared: what was run.
         header, ending: of its table.
         command: that has run it.
-        started: when.
+        clock: started with it.
 
     """
     experiment = header.experiment
@@ -47,8 +64,7 @@ def write_record(
         "label": prepared.scenario.label,
         "sha256": prepared.scenario.digest,
         "command": list(command),
-        "started": started.isoformat(timespec="seconds"),
-        "seconds": round((datetime.now(UTC) - started).total_seconds(), 3),
+        **clock.times(),
         "failure": ending.failure,
         "experiment": {
             "stop_time": experiment.stop_time,
@@ -95,8 +111,3 @@ def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
         Experiment(experiment["stop_time"], experiment["step"], experiment["order"]),
         {port_name(name): value for name, value in record["parameters"].items()},
     )
-
-
-def digest_of(path: Path) -> str:
-    """SHA-256 of a file."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Iterator, Mapping
-from datetime import UTC, datetime
 from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,7 +15,7 @@ from orchestrator.analysis.plot import plot
 from orchestrator.errors import InputError, did_you_mean
 from orchestrator.experiments.folder import replaced
 from orchestrator.experiments.preparation import Prepared, Request, loaded, prepare
-from orchestrator.experiments.record import write_record
+from orchestrator.experiments.record import Clock, write_record
 from orchestrator.experiments.run import metrics_json, write_metrics
 from orchestrator.experiments.scenario import Scenario
 from orchestrator.master.experiment import ORDERS
@@ -77,7 +76,7 @@ class Result(Table):
         """Take the rows of what is run."""
         super().__init__()
         self._prepared = prepared
-        self._started = datetime.now(UTC)
+        self._clock = Clock()
 
     def __repr__(self) -> str:
         """One line: what was run, and how far it came."""
@@ -153,7 +152,7 @@ class Result(Table):
             table.end(self.ending)
             write_metrics(unfinished, self.metrics())
             write_record(
-                unfinished, self._prepared, self.header, self.ending, sys.argv, self._started
+                unfinished, self._prepared, self.header, self.ending, sys.argv, self._clock
             )
         return folder
 

@@ -9,8 +9,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from orchestrator.errors import InputError, did_you_mean, reason
+from orchestrator.errors import InputError, did_you_mean, shortened
+from orchestrator.reading import explained, text_of
 from orchestrator.system.names import PortName, port_name
+
+#: What a file is not that cannot be read.
+_WHAT = "not a scenario"
 
 FOLDER = Path(__file__).parent / "scenarios"
 
@@ -166,26 +170,27 @@ def read_scenario(name: str) -> Scenario:
         InputError: there is no such scenario, or its file has a mistake.
 
     """
-    path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
-    try:
-        text = path.read_text(encoding="utf-8")
-        content = tomllib.loads(text)
-    except FileNotFoundError:
-        if name.endswith(".toml"):
-            raise InputError(f"{name}: no such scenario file") from None
+    if not name.endswith(".toml") and name not in names():
         raise InputError(
             f"no scenario {name!r}; there are {', '.join(names())}, or give a .toml or .ssp file"
             f"{did_you_mean(name, names())}"
-        ) from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: {reason(error)}") from error
+        )
+    path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
+    text = text_of(path, _WHAT)
+    with explained(path, _WHAT):
+        return _scenario(path, text)
+
+
+def _scenario(path: Path, text: str) -> Scenario:
+    content = tomllib.loads(text)
     for key, value in content.items():
         if key not in ENTRIES:
             hint = did_you_mean(key, ENTRIES) or f"; use {', '.join(ENTRIES)}"
             raise InputError(f"{path}: unknown entry {key!r}{hint}")
         if not ENTRIES[key].fits(value):
+            shown = shortened(repr(value))
             raise InputError(
-                f"{path}: {key} = {value!r} is of the wrong type, not a {ENTRIES[key].kind}"
+                f"{path}: {key} = {shown} is of the wrong type, not a {ENTRIES[key].kind}"
             )
     content["parameters"] = {
         port_name(key): value for key, value in _flattened(content.get("parameters", {}))

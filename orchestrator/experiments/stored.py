@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Sequence
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from orchestrator.analysis.visible import VisibleRows
-from orchestrator.errors import InputError, reason
-from orchestrator.experiments.folder import RECORD
+from orchestrator.errors import InputError
+from orchestrator.experiments.folder import RECORD, settle
 from orchestrator.experiments.record import read_header
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.files import FORMATS, read_columns, read_rows
 from orchestrator.master.observer import Ending, Header
 from orchestrator.master.table import Table
+from orchestrator.reading import explained, text_of
+
+#: What a file is not that cannot be read.
+_WHAT = "not the record of a run"
 
 #: Chooses the columns that are drawn among those that there are.
 Choice = Callable[[Sequence[str]], Collection[str]]
@@ -57,12 +61,11 @@ def table_in(path: Path) -> Path:
         InputError: there is none.
 
     """
-    try:
+    with explained(path, "not the name of a result"):
+        settle(path if path.is_dir() else path.parent)
         for file in (path, *(path / f"result.{ending}" for ending in FORMATS)):
             if file.is_file():
                 return file
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {reason(error)}") from error
     raise InputError(f"{path}: holds no result.csv or result.parquet")
 
 
@@ -74,16 +77,25 @@ def read_record(table: Path) -> dict[str, Any]:
 
     """
     file = table.with_name(RECORD)
-    if not file.is_file():
+    if not file.exists():
         return {}
-    try:
-        record = json.loads(file.read_text(encoding="utf-8"))
-        if table.name not in record["files"]:
-            return {}
-        read_header(record, ())
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{file}: not the record of a run") from error
+    with explained(file, _WHAT):
+        record = json.loads(text_of(file, _WHAT))
+        try:
+            if table.name not in record["files"]:
+                return {}
+            header = read_header(record, ())
+        except (KeyError, TypeError, AttributeError):
+            raise ValueError("it lacks what a run writes") from None
+        if not all(map(_is_value, header.parameters.values())):
+            raise ValueError("it holds parameters that no run has")
     return dict(record)
+
+
+def _is_value(value: object) -> bool:
+    return isinstance(value, float | int | str) and (
+        not isinstance(value, float) or isfinite(value)
+    )
 
 
 def _header(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import floor, isfinite
+from math import floor, isfinite, ulp
 from numbers import Real
 
 from orchestrator.errors import InputError
@@ -12,8 +12,8 @@ from orchestrator.errors import InputError
 #: Orders in which components are stepped; the first is the default.
 ORDERS = ("gauss-seidel", "jacobi")
 
-#: A rest of the stop time shorter than this share of a step is a rounding error.
-ROUNDING = 1e-9
+#: A rest shorter than this share of the run, and than that of a step, is a rounding error.
+ROUNDING, _MOST_OF_A_STEP = 1e-9, 1e-3
 
 #: More steps than this are taken for a mistake.
 MOST_STEPS = 1_000_000_000
@@ -41,10 +41,14 @@ class Experiment:
             if not isinstance(value, Real) or isinstance(value, bool):
                 raise InputError(f"stop time and step must be numbers, not {value!r}")
             # numpy's numbers do not go into JSON.
-            object.__setattr__(self, name, float(value))
+            try:
+                object.__setattr__(self, name, float(value))
+            except OverflowError:
+                raise InputError("stop time and step must be smaller than 1e308 s") from None
         if not all(isfinite(value) and value > 0.0 for value in (self.stop_time, self.step)):
             raise InputError(
-                f"stop time {self.stop_time:g} s and step {self.step:g} s must be positive"
+                f"stop time {self.stop_time:g} s and step {self.step:g} s must be positive, and "
+                "finite"
             )
         if self.stop_time / self.step > MOST_STEPS:
             raise InputError(
@@ -57,12 +61,20 @@ class Experiment:
     @property
     def full_steps(self) -> int:
         """How many steps have the whole length."""
-        return floor(self.stop_time / self.step * (1.0 + ROUNDING))
+        return floor(self._in_steps)
 
     @property
     def has_short_step(self) -> bool:
         """Whether a shorter step follows them."""
-        return self.stop_time - self.full_steps * self.step > ROUNDING * self.step
+        return self._in_steps > self.full_steps
+
+    @property
+    def _in_steps(self) -> float:
+        """The stop time in steps; a whole number where it is one but for rounding."""
+        # However small its share of a step, a run is not empty.
+        n = max(self.stop_time / self.step, ulp(0.0))
+        nearest = round(n)
+        return nearest if abs(n - nearest) <= min(ROUNDING * nearest, _MOST_OF_A_STEP) else n
 
     @property
     def rows(self) -> int:

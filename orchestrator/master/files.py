@@ -3,21 +3,61 @@
 from __future__ import annotations
 
 import csv
+import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from importlib.util import find_spec
+from io import StringIO
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
 from orchestrator.errors import InputError, reason
 from orchestrator.master.observer import Ending, Header
+from orchestrator.reading import lines_of
 
 #: Rows that are written to Parquet, or read, at once.
 _ROWS = 8192
+
+#: What Parquet needs at most: bytes of a value, and bytes that describe a column of the rows that
+#: are written at once, of which there may be a block too many.
+_BYTES, _CHUNK_BYTES, _MOST_ROWS = 9, 1024, _ROWS + 1024
+
+
+class CsvLines:
+    """A file of CSV that ends with a whole line, whenever and however writing ends."""
+
+    def __init__(self, path: Path, names: Sequence[str]) -> None:
+        """Make the file and write the names of its columns."""
+        self._path = path
+        self._file = path.open("wb", buffering=0)
+        self.write([names])
+
+    def write(self, lines: Sequence[Sequence[object]]) -> None:
+        """Write some lines, numbers so that they read back exactly.
+
+        Raises:
+            OSError: not all of them could be written; those that could are there.
+
+        """
+        _check_place(self._file, self._path)
+        text = StringIO(newline="")
+        csv.writer(text, lineterminator="\n").writerows(lines)
+        content = text.getvalue().encode()
+        begin, n = self._file.tell(), 0
+        try:
+            while n < len(content):
+                n += self._file.write(memoryview(content)[n:])
+        except OSError:
+            self._file.truncate(begin + content.rfind(b"\n", 0, n) + 1)
+            raise
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
 
 
 class CsvFile:
@@ -29,21 +69,23 @@ class CsvFile:
 
     def begin(self, header: Header) -> None:
         """Write the names of the columns."""
-        self._file = self._path.open("w", newline="", encoding="utf-8")
-        self._writer = csv.writer(self._file, lineterminator="\n")
-        self._writer.writerow(("time", *header.columns))
+        self._lines = CsvLines(self._path, ("time", *header.columns))
 
     def take(self, rows: np.ndarray) -> None:
         """Write some rows."""
-        self._writer.writerows(rows.tolist())
+        self._lines.write(rows.tolist())
 
     def end(self, ending: Ending) -> None:
         """Close the file."""
-        self._file.close()
+        self._lines.close()
 
 
 class ParquetFile:
-    """An observer that writes Apache Parquet, all columns as doubles."""
+    """An observer that writes Apache Parquet, all columns as doubles.
+
+    Without what is written last, nothing of such a file can be read: there is always room for that,
+    and for the rows that wait.
+    """
 
     def __init__(self, path: Path) -> None:
         """Write into a file, which is made when the run begins.
@@ -60,25 +102,59 @@ class ParquetFile:
         self._arrow: Any = import_module("pyarrow")
         double = self._arrow.float64()
         self._schema = self._arrow.schema([(name, double) for name in ("time", *header.columns)])
-        self._writer = import_module("pyarrow.parquet").ParquetWriter(self._path, self._schema)
+        self._file = self._path.open("wb")
+        self._writer = import_module("pyarrow.parquet").ParquetWriter(self._file, self._schema)
         self._waiting: list[np.ndarray] = []
+        self._n, self._room = 0, min(header.experiment.rows, _MOST_ROWS)
+        self._take_room()
 
     def take(self, rows: np.ndarray) -> None:
         """Write some rows, when there are enough of them."""
         self._waiting.append(rows.copy())
         if sum(map(len, self._waiting)) >= _ROWS:
             self._write()
+            self._take_room()
 
     def end(self, ending: Ending) -> None:
         """Write the rest and close the file."""
         self._write()
         self._writer.close()
+        self._file.truncate()
+        self._file.close()
 
     def _write(self) -> None:
         if self._waiting:
             columns = [self._arrow.array(column) for column in np.vstack(self._waiting).T]
             self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))
             self._waiting.clear()
+            self._n += 1
+
+    def _take_room(self) -> None:
+        """Take the room that the file needs until the next time, if it can be had.
+
+        Raises:
+            OSError: there is not enough.
+
+        """
+        _check_place(self._file, self._path)
+        self._file.flush()
+        if hasattr(os, "posix_fallocate"):
+            columns = len(self._schema)
+            needed = columns * (self._room * _BYTES + (self._n + 2) * _CHUNK_BYTES)
+            os.posix_fallocate(self._file.fileno(), self._file.tell(), needed)
+
+
+def _check_place(file: IO[bytes], path: Path) -> None:
+    """Check that a file is still where it was made.
+
+    Raises:
+        OSError: what is written would go nowhere.
+
+    """
+    with suppress(FileNotFoundError):
+        if os.path.samestat(os.fstat(file.fileno()), path.stat()):
+            return
+    raise FileNotFoundError(f"{path} was moved or deleted while it was written")
 
 
 #: Writers by the ending of their files.
@@ -96,7 +172,7 @@ def read_columns(path: Path) -> tuple[str, ...]:
         if path.suffix == ".parquet":
             with _parquet(path) as file:
                 return _behind_time(file.schema_arrow.names)
-        with path.open(encoding="utf-8-sig") as lines:
+        with lines_of(path) as lines:
             return _behind_time(next(csv.reader(lines), ()))
 
 
@@ -114,7 +190,7 @@ def read_rows(path: Path) -> Iterator[np.ndarray]:
                     columns = [column.to_numpy(zero_copy_only=False) for column in batch.columns]
                     yield np.column_stack(columns).astype(float, copy=False)
         else:
-            with path.open(encoding="utf-8-sig") as lines:
+            with lines_of(path) as lines:
                 width = 1 + len(_behind_time(next(csv.reader(lines), ())))
                 filled = (line for line in lines if line.strip())
                 while block := list(islice(filled, _ROWS)):

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import atexit
+import os
 import signal
+import sys
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from typing import Any
 
 #: Ctrl-C, what a batch system sends, and the end of the terminal.
 _STOPS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
+
+
+#: After so many signals, somebody does not want to wait any more.
+_INSISTENCE = 3
+
+#: Exit status of a process that a signal has ended, less the number of the signal.
+_SIGNALLED = 128
 
 
 class Interrupts:
@@ -18,6 +28,11 @@ class Interrupts:
     Python raises KeyboardInterrupt wherever it is, which may be inside an FMU: PythonFMU would
     then release its objects twice and crash the process. So signals are collected instead, and
     the loop asks after every step whether there are any.
+
+    Attributes:
+        signals: their numbers.
+        hand_over: tells observers of the last rows, before the process is given up.
+
     """
 
     def __init__(self, announce: Callable[[Interrupts], None] | None = None) -> None:
@@ -29,6 +44,7 @@ class Interrupts:
         """
         self.signals: list[int] = []
         self._announce = announce
+        self.hand_over: Callable[[], None] = lambda: None
 
     def __bool__(self) -> bool:
         """Whether somebody wants the work to end."""
@@ -39,11 +55,89 @@ class Interrupts:
         """Whether it is to end without what takes long: asked twice, or not from the keyboard."""
         return len(self.signals) > 1 or any(number != signal.SIGINT for number in self.signals)
 
+    @contextmanager
+    def insistence(self, give_up: Callable[[], None]) -> Iterator[None]:
+        """Within the context, have the third signal end the process, whatever an FMU does.
+
+        Args:
+            give_up: ends the process, from another thread.
+
+        """
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        end_of_thread, end_of_signals = os.pipe()
+        os.set_blocking(end_of_signals, False)
+        before = signal.set_wakeup_fd(end_of_signals, warn_on_full_buffer=False)
+        leaving = threading.Lock()
+        # A thread, because Python answers no signal as long as an FMU computes.
+        arguments = (end_of_thread, give_up, leaving)
+        with suppress(RuntimeError):
+            # Where none can be had, insistence is not heard.
+            threading.Thread(target=self._count, args=arguments, daemon=True).start()
+        try:
+            yield
+        finally:
+            # Not while it is giving up.
+            leaving.acquire()
+            signal.set_wakeup_fd(before)
+            os.close(end_of_signals)
+
+    def _count(self, numbers: int, give_up: Callable[[], None], leaving: threading.Lock) -> None:
+        n = 0
+        while number := os.read(numbers, 1):
+            n += number[0] in _STOPS
+            if n >= _INSISTENCE and leaving.acquire(blocking=False):
+                with suppress(Exception):
+                    self.hand_over()
+                give_up()
+        os.close(numbers)
+
     def take(self, number: int, _frame: Any) -> None:
         """Collect a signal: a handler for :func:`signal.signal`."""
         self.signals.append(number)
         if self._announce is not None:
             self._announce(self)
+
+
+@contextmanager
+def orderly_end() -> Iterator[None]:
+    """As long as the context lasts, leave by SIGTERM and SIGHUP as by any other exit.
+
+    What is temporary then goes, and child processes end. What comes once the process is on its way
+    out anyway changes nothing.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with _handled([n for n in _STOPS if signal.getsignal(n) is signal.SIG_DFL], _leave):
+        try:
+            yield
+        finally:
+            # Before what was registered earlier.
+            atexit.unregister(_ignore_stops)
+            atexit.register(_ignore_stops)
+
+
+def _ignore_stops() -> None:
+    for number in _STOPS:
+        signal.signal(number, signal.SIG_IGN)
+
+
+def _leave(number: int, _frame: Any) -> None:
+    # Once: the way out is not to be cut short.
+    signal.signal(number, signal.SIG_IGN)
+    sys.exit(_SIGNALLED + number)
+
+
+@contextmanager
+def _handled(numbers: Sequence[int], handler: Callable[[int, Any], None]) -> Iterator[None]:
+    before = {number: signal.signal(number, handler) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, previous in before.items():
+            signal.signal(number, previous)
 
 
 @contextmanager
@@ -69,9 +163,5 @@ def held_interrupts(
     interrupts = Interrupts(announce)
     # What is ignored stays so: nohup, or a shell's background.
     heeded = [n for n in _STOPS if signal.getsignal(n) not in (signal.SIG_IGN, None)]
-    before = {number: signal.signal(number, interrupts.take) for number in heeded}
-    try:
+    with _handled(heeded, interrupts.take):
         yield interrupts
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

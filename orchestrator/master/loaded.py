@@ -39,7 +39,7 @@ from orchestrator.master.instance import ComponentFailed, Instance, Part
 from orchestrator.master.log import Listener
 from orchestrator.master.transfer import Block
 from orchestrator.system.component import Component
-from orchestrator.system.unpacking import unpacked
+from orchestrator.system.unpacking import check_place, unpacked
 from orchestrator.system.values import Value
 
 
@@ -60,12 +60,7 @@ class Library:
             InputError: it cannot be loaded.
 
         """
-        if "%" in folder.as_uri().replace("%20", ""):
-            # PythonFMU 0.7 does not decode the URI and crashes its host.
-            raise InputError(
-                f"temporary folder {str(folder)!r}: FMUs need a path of plain ASCII characters; "
-                "set TMPDIR to one"
-            )
+        check_place(folder)
         try:
             self.fmu = FMU2Slave(
                 guid=description.guid,

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from orchestrator.errors import reason
 from orchestrator.master.experiment import Experiment
 from orchestrator.system.names import PortName
 
@@ -50,6 +51,10 @@ class Ending:
     failure: str | None = None
     messages: tuple[str, ...] = ()
     signals: tuple[int, ...] = ()
+
+
+class NotKept(Exception):
+    """An observer cannot take rows: the disk is full, or memory is short."""
 
 
 class Observer(Protocol):
@@ -92,10 +97,21 @@ class Blocks:
             self.hand_over()
 
     def hand_over(self) -> None:
-        """Tell the observers of the rows that they do not know yet."""
+        """Tell the observers of the rows that they do not know yet.
+
+        Raises:
+            NotKept: one of them failed; the others were told.
+
+        """
+        failures: list[Exception] = []
         if self._n:
             # Counted as told before they are told: an observer that fails is not told twice.
             rows, self._n = self._rows[: self._n], 0
             for observer in self._observers:
-                observer.take(rows)
+                try:
+                    observer.take(rows)
+                except (OSError, MemoryError) as error:
+                    failures.append(error)
+            if failures:
+                raise NotKept(f"stopped at t = {rows[-1, 0]:g} s: {reason(failures[0])}")
         self._due = monotonic() + _PATIENCE

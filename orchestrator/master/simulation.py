@@ -15,7 +15,7 @@ from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.isolated import Isolation, isolated
 from orchestrator.master.loaded import all_loaded
 from orchestrator.master.log import Log
-from orchestrator.master.observer import Blocks, Ending, Header, Observer
+from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import Stage, schedule, stages
 from orchestrator.system.names import PortName
@@ -61,8 +61,13 @@ def simulate(
         steps = schedule(system, plan, instances, row)
         with _told(header, observers) as tell:
             blocks = Blocks(len(row.values), observers)
+            interrupts.hand_over = blocks.hand_over
             order = [name for names in plan for name in names]
-            failure = _advance(experiment, steps, row, order, blocks, interrupts)
+            try:
+                failure = _advance(experiment, steps, row, order, blocks, interrupts)
+            except NotKept as error:
+                # Rows that cannot be kept need not be computed.
+                failure = str(error)
             if failure is None:
                 _terminate(instances)
             ending = Ending(failure, log.messages, tuple(interrupts.signals))

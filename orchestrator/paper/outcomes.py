@@ -20,9 +20,10 @@ import orchestrator
 from orchestrator.analysis.metrics import Metrics
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
+from orchestrator.experiments.bill_of_materials import digest_of
 from orchestrator.experiments.folder import whole
 from orchestrator.experiments.preparation import Prepared
-from orchestrator.experiments.record import PACKAGES, digest_of
+from orchestrator.experiments.record import PACKAGES
 from orchestrator.experiments.run import metrics_json
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observer import Ending, Header
@@ -192,7 +193,7 @@ def _read(file: Path) -> Outcome | None:
             Experiment(**text["experiment"]),
             {port_name(name): value for name, value in text["parameters"].items()},
         )
-    except (OSError, ValueError, KeyError, BadZipFile, zlib.error):
+    except (OSError, EOFError, ValueError, KeyError, BadZipFile, zlib.error):
         # Not there, or not whole.
         return None
     ending = Ending(messages=tuple(text["messages"]))

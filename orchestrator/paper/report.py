@@ -5,7 +5,6 @@ from __future__ import annotations
 import platform
 import shlex
 from collections.abc import Callable, Iterator, Sequence
-from datetime import UTC, datetime
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any
 from orchestrator.analysis import gains
 from orchestrator.experiments.bundle import current_fmus
 from orchestrator.experiments.folder import replaced
-from orchestrator.experiments.record import PACKAGES, write_files
+from orchestrator.experiments.record import PACKAGES, Clock, write_files
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.paper import readings
 from orchestrator.paper.claims import CLAIMS
@@ -69,7 +68,7 @@ def write_report(
         KeyboardInterrupt: the user does not want to wait; runs that are finished are kept.
 
     """
-    started = datetime.now(UTC)
+    clock = Clock()
     current_fmus()
     chapters = sections(scenarios)
     outcomes = Outcomes(folder / _RUNS, stop_time)
@@ -89,7 +88,7 @@ def write_report(
         text = f"{_TITLE}\n\n{readings.linked(_INTRODUCTION)}\n\n{contents(body)}\n\n{body}\n"
         (unfinished / "report.md").write_text(text, encoding="utf-8")
         (unfinished / "report.html").write_text(html(text, unfinished), encoding="utf-8")
-        write_files(unfinished, _record(command, started, outcomes))
+        write_files(unfinished, _record(command, clock, outcomes))
     outcomes.forget_others()
     return folder / "report.html", folder / "report.md"
 
@@ -154,12 +153,11 @@ def _claims(outcomes: Outcomes) -> str:
     return table(["claim", "paper", "ours", "verdict", "run"], rows)
 
 
-def _record(command: Sequence[str], started: datetime, outcomes: Outcomes) -> dict[str, object]:
+def _record(command: Sequence[str], clock: Clock, outcomes: Outcomes) -> dict[str, object]:
     return {
         "title": _TITLE.removeprefix("# "),
         "command": list(command),
-        "started": started.isoformat(timespec="seconds"),
-        "seconds": round((datetime.now(UTC) - started).total_seconds(), 3),
+        **clock.times(),
         "runs": [f"auv-fmu run {label}" for label in outcomes.labels],
         "versions": {"python": platform.python_version()}
         | {package: version(package) for package in PACKAGES},

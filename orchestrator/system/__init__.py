@@ -8,6 +8,8 @@ module                  what it holds
 :mod:`.component`       an FMU and what its description says about it
 :mod:`.structure`       components, connections and parameters: a system
 :mod:`.graph`           what depends on what: feedthrough, and what reaches a component
+:mod:`.leftovers`       what only one process may have, and what it leaves when it is killed
+:mod:`.children`        modules run in processes that do not outlive this one
 :mod:`.unpacking`       archives unpacked, once a process and version
 :mod:`.ssp`             systems as SSP 1.0 archives, read and written
 :mod:`.osp`             systems as libcosim's own configuration

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -10,7 +11,7 @@ import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from orchestrator.errors import InputError, did_you_mean, reason
-from orchestrator.system.unpacking import Version, version_of
+from orchestrator.system.unpacking import Version, unpacked, version_of
 from orchestrator.system.values import Value, typed
 
 
@@ -81,17 +82,21 @@ def read_component(name: str, fmu: Path) -> Component:
         InputError: the file is missing or is no FMI 2.0 co-simulation FMU.
 
     """
-    if not fmu.is_file():
-        raise InputError(f"{fmu}: no such FMU")
-    return Component(name, fmu, _description(version_of(fmu)))
+    return Component(name, fmu, _description(fmu, version_of(fmu)))
 
 
 @lru_cache(maxsize=256)
-def _description(fmu: Version) -> ModelDescription:
+def _description(fmu: Path, _: Version) -> ModelDescription:
+    folder = unpacked(fmu)
     try:
-        description = fmpy.read_model_description(fmu.path)
+        description = fmpy.read_model_description(folder)
     except Exception as error:
-        raise InputError(f"{fmu.path}: not a readable FMU: {reason(error)}") from error
+        raise InputError(f"{fmu}: not a readable FMU: {reason(error)}") from error
     if description.fmiVersion != "2.0" or description.coSimulation is None:
-        raise InputError(f"{fmu.path}: not an FMI 2.0 co-simulation FMU")
+        raise InputError(f"{fmu}: not an FMI 2.0 co-simulation FMU")
+    if not re.fullmatch(r"[A-Za-z_]\w*", description.coSimulation.modelIdentifier, re.ASCII):
+        raise InputError(
+            f"{fmu}: its model identifier {description.coSimulation.modelIdentifier!r} names no "
+            "library"
+        )
     return description

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
-import sys
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from orchestrator.errors import InputError, last_line
+from orchestrator.system.children import run_module
+from orchestrator.system.leftovers import process_folder
 from orchestrator.system.structure import System
 
 _TOOLBOX = "fmu_manipulation_toolbox"
@@ -55,18 +55,12 @@ def write_container(system: System, folder: Path) -> list[Path]:
             for port, value in system.parameters_of(name).items()
         ],
     }
-    with TemporaryDirectory(prefix="auvfmu") as work:
+    with TemporaryDirectory(dir=process_folder()) as work:
         for component in system.components.values():
             shutil.copyfile(component.fmu, Path(work, component.fmu.name))
         Path(work, "system.json").write_text(json.dumps(content), encoding="utf-8")
-        command = ["-m", f"{_TOOLBOX}.cli.fmucontainer", "-container", "system.json"]
-        process = subprocess.run(
-            [sys.executable, "-P", *command, "-fmu-directory", work],
-            cwd=work,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        options = ["-container", "system.json", "-fmu-directory", work]
+        process = run_module(f"{_TOOLBOX}.cli.fmucontainer", *options, folder=Path(work))
         built = Path(work, f"{system.name}.fmu")
         if process.returncode != 0 or not built.is_file():
             raise InputError(

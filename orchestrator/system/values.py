@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from fmpy.model_description import ModelVariable
 
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, shortened
 
 #: A value in the type of its variable.
 Value: TypeAlias = float | int | bool | str
@@ -15,8 +15,12 @@ Value: TypeAlias = float | int | bool | str
 #: What FMI's Integers can hold.
 _INTEGERS = -(2**31), 2**31 - 1
 
-_BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
-_KINDS = {"Real": "a real number", "Boolean": "a Boolean (true or false)"}
+BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
+_KINDS = {
+    "Real": "a real number",
+    "Boolean": "a Boolean (true or false)",
+    "String": "a text in UTF-8",
+}
 
 
 def typed(name: str, variable: ModelVariable, value: object) -> Value:
@@ -31,24 +35,46 @@ def typed(name: str, variable: ModelVariable, value: object) -> Value:
         InputError: it is not of that type, not finite, or outside the range of the variable.
 
     """
-    text = str(value).strip()
+    shown = ""
     try:
+        text = str(value).strip()
+        shown = f" = {shortened(text)}"
         if variable.type == "Boolean":
-            return _BOOLEANS[text.lower()]
+            return BOOLEANS[text.lower()]
         if variable.type == "String":
-            return text
-        number = float(text) if variable.type == "Real" else int(text)
+            return _transferable(text)
+        number = real(text) if variable.type == "Real" else int(_plain(text))
     except (KeyError, ValueError):
+        # Python itself refuses to write and to read integers of very many digits.
         kind = _KINDS.get(variable.type, "an integer")
-        raise InputError(f"{name} = {text}: not {kind}") from None
-    if not isfinite(number):
-        raise InputError(f"{name} = {text}: must be finite")
+        raise InputError(f"{name}{shown}: not {kind}") from None
+    if isinstance(number, float) and not isfinite(number):
+        raise InputError(f"{name}{shown}: must be finite")
     lower, upper = _range(variable)
     if lower is not None and number < lower:
-        raise InputError(f"{name} = {text}: must be at least {lower:g}")
+        raise InputError(f"{name}{shown}: must be at least {lower:g}")
     if upper is not None and number > upper:
-        raise InputError(f"{name} = {text}: must be at most {upper:.16g}")
+        raise InputError(f"{name}{shown}: must be at most {upper:.16g}")
     return number
+
+
+def real(text: str) -> float:
+    """A number as every program reads it: Python alone takes 1_000, and digits of any script."""
+    return float(_plain(text))
+
+
+def _plain(text: str) -> str:
+    if "_" in text or not text.isascii():
+        raise ValueError(f"{text!r} is no plain number")
+    return text
+
+
+def _transferable(text: str) -> str:
+    """A text that FMI can carry: in UTF-8, and ended by the first zero."""
+    text.encode()
+    if "\0" in text:
+        raise ValueError("a text ends at a zero")
+    return text
 
 
 def _range(variable: ModelVariable) -> tuple[float | None, float | None]:

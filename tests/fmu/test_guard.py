@@ -445,6 +445,28 @@ def test_threads_on_one_instance_take_turns(fmu: RawFmu, component: int):
     assert answers == [OK] * (4 * 200 * 3)
 
 
+def test_threads_that_make_instances_leave_the_process_as_it_was(folder, dist, tmp_path):
+    """Each puts its folder on sys.path while others look for theirs."""
+    fmpy.extract(dist / "MotionPlanner.fmu", unzipdir=tmp_path)
+    before, answers = list(sys.path), []
+
+    def run(place: Path) -> None:
+        fmu = RawFmu(place)
+        for _ in range(10):
+            made = fmu.initialised()
+            answers.append(steps(fmu, made))
+            fmu.FreeInstance(made)
+            assert fmu.instantiate(location=b"file:///nowhere") is None
+
+    threads = [threading.Thread(target=run, args=(place,)) for place in 3 * (folder, tmp_path)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert answers == [OK] * 60
+    assert sys.path == before
+
+
 # Slaves of other people
 
 FOREIGN = """

@@ -11,7 +11,7 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.packaging.loader import compiler
+from fmus.packaging.loader import FLAGS, FOLDER, compiler
 from fmus.packaging.own import build_own
 from orchestrator.experiments import bundle
 from support.instances import NAMES
@@ -121,19 +121,39 @@ def libraries_of(program: Path) -> list[Path]:
     return [Path(word) for word in found.split() if word.startswith("/")]
 
 
-@pytest.mark.skipif(
-    os.geteuid() != 0 or CHROOT is None, reason="only root may change the root folder"
-)
-def test_machine_with_nothing_but_a_c_library_tells_what_is_missing(dist: Path, tmp_path: Path):
-    host, arguments = compiled_host(tmp_path), unpacked(dist, tmp_path)
-    for library in libraries_of(host):
-        target = tmp_path / library.relative_to("/")
+def in_a_bare_root(folder: Path, dist: Path, *brought: Path) -> subprocess.CompletedProcess[str]:
+    """Run the host where there is nothing but it, the FMUs, and what these are linked against."""
+    host, arguments = compiled_host(folder), unpacked(dist, folder)
+    for library in {
+        *brought,
+        *(found for path in (host, *brought) for found in libraries_of(path)),
+    }:
+        near = "lib" if library in brought else library.parent.relative_to("/")
+        target = folder / near / library.name
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(library, target)
-    inside = [argument.replace(str(tmp_path), "") for argument in arguments]
-    process = run(Path("/host"), *inside, under=(str(CHROOT), str(tmp_path)))
+    inside = [argument.replace(str(folder), "") for argument in arguments]
+    return run(Path("/host"), *inside, under=(str(CHROOT), str(folder)), LD_LIBRARY_PATH="/lib")
+
+
+needs_root = pytest.mark.skipif(
+    os.geteuid() != 0 or CHROOT is None, reason="only root may change the root folder"
+)
+
+
+@needs_root
+def test_machine_with_nothing_but_a_c_library_tells_what_is_missing(dist: Path, tmp_path: Path):
+    process = in_a_bare_root(tmp_path, dist)
     assert process.returncode == 4
     assert "libpython3.9 to libpython3.13" in process.stdout
+
+
+@needs_root
+@needs_libpython
+def test_libpython_without_its_standard_library_does_not_end_the_host(dist, tmp_path):
+    process = in_a_bare_root(tmp_path, dist, LIBPYTHON)
+    assert process.returncode == 4
+    assert "fmi2Instantiate: Python does not start: " in process.stdout
 
 
 @needs_libpython
@@ -145,6 +165,17 @@ def test_threads_that_instantiate_at_the_same_moment(dist: Path, tmp_path: Path,
     for _ in range(REPETITIONS):
         process = run(host, *arguments)
         assert (process.returncode, process.stdout) == (0, f"{count} threads\n"), process.stderr
+
+
+@needs_libpython
+@pytest.mark.xfail(reason="PythonFMU's own start of Python takes no lock that others could take")
+def test_threads_with_fmus_that_have_no_loader(tmp_path: Path):
+    """What docs/hosts/c-program.md warns of."""
+    bundle.build(tmp_path, "plain")
+    host = compiled_host(tmp_path, name="threads")
+    arguments = unpacked(tmp_path, tmp_path / "plain")[:4]
+    for _ in range(REPETITIONS):
+        assert run(host, *arguments, LD_PRELOAD=str(LIBPYTHON)).returncode == 0
 
 
 @needs_libpython
@@ -240,6 +271,26 @@ def test_valgrind_finds_no_error_of_the_loader(dist: Path, tmp_path: Path, with_
     blocks = log.read_text(errors="replace").split("\n==")
     errors = [block for block in blocks if "at 0x" in block and "/AuvPlant.so)" in block]
     assert errors == []
+
+
+@needs_libpython
+@pytest.mark.parametrize("name", ["ObserverController", "MotionPlanner"])
+def test_sanitizers_find_nothing_whatever_a_host_calls(dist: Path, tmp_path: Path, name: str):
+    """Right and wrong calls in any order, the loader watched byte by byte."""
+    sanitizers = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-Wall",
+                  "-Wextra", "-Werror")  # fmt: skip
+    host = compiled_host(tmp_path, *FINDS_LIBPYTHON, *sanitizers, name="random_calls")
+    fmpy.extract(dist / f"{name}.fmu", unzipdir=tmp_path / "fmu")
+    library = tmp_path / "fmu/binaries/linux64" / f"{name}.so"
+    subprocess.run([str(compiler()), *sanitizers, "-o", library, *FLAGS], cwd=FOLDER, check=True)
+    for seed in range(3):
+        process = run(
+            host, str(library), (tmp_path / "fmu/resources").as_uri(), str(seed), "5000",
+            # Python keeps what it has until the process ends, and wants to know what is too much.
+            ASAN_OPTIONS="detect_leaks=0:allocator_may_return_null=1",
+        )  # fmt: skip
+        assert process.returncode == 0, process.stderr[-3000:]
+        assert "fatal 0," in process.stdout
 
 
 def test_plain_variant_is_there_on_request(tmp_path: Path):

@@ -19,7 +19,8 @@ ROOT = Path(__file__).parents[2]
 #: Rooms, each of which may import those before it.
 FLOORS = {
     "orchestrator": (
-        "errors", "system", "master", "analysis", "experiments", "exchange", "paper", "commands",
+        "errors", "reading", "system", "master", "analysis", "experiments", "exchange", "paper",
+        "commands",
     ),
     "fmus": ("ports", "slave", "components", "packaging"),
 }  # fmt: skip
@@ -35,7 +36,7 @@ ALLOWED = {
 }  # fmt: skip
 
 #: Rooms that run any system.
-GENERAL = ("errors", "system", "master")
+GENERAL = ("errors", "reading", "system", "master")
 
 
 def folder_of(package: str) -> Path:

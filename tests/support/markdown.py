@@ -1,4 +1,4 @@
-"""Code in Markdown pages, for tests that run it."""
+"""Code and tables in Markdown pages, for tests that run or hold them."""
 
 from __future__ import annotations
 
@@ -25,3 +25,29 @@ def blocks(page: Path, *languages: str) -> list[Block]:
         for token in tokens
         if token.type == "fence" and token.info in languages
     ]
+
+
+class Section(NamedTuple):
+    """A heading and the table below it, cell by cell."""
+
+    heading: str
+    header: list[str]
+    rows: list[list[str]]
+
+
+def sections(page: Path) -> list[Section]:
+    """The sections of a page that have a table."""
+    found: list[Section] = []
+    heading, rows = "", []
+    tokens = iter(MarkdownIt("commonmark").enable("table").parse(page.read_text(encoding="utf-8")))
+    for token in tokens:
+        if token.type == "heading_open":
+            heading = next(tokens).content
+        elif token.type == "tr_open":
+            rows.append([])
+        elif token.type in ("th_open", "td_open"):
+            rows[-1].append(next(tokens).content)
+        elif token.type == "table_close":
+            found.append(Section(heading, rows[0], rows[1:]))
+            rows = []
+    return found

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 MODEL_EXCHANGE, CO_SIMULATION = range(2)
 
-_Logger = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
+Logger = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 
 #: What each function takes after the component.
 SIGNATURES: dict[str, tuple[Any, ...]] = {
@@ -51,9 +51,11 @@ class Message(NamedTuple):
     text: str
 
 
-class _Callbacks(ctypes.Structure):
+class Callbacks(ctypes.Structure):
+    """fmi2CallbackFunctions."""
+
     _fields_ = (
-        ("logger", _Logger),
+        ("logger", Logger),
         ("allocate", c_void_p),
         ("release", c_void_p),
         ("step_finished", c_void_p),
@@ -83,7 +85,7 @@ class RawFmu:
         self.messages: list[Message] = []
         #: Called by the logger; what it does is the test's business.
         self.when_told = lambda: None
-        self._callbacks = _Callbacks(_Logger(self._log), None, None, None, None)
+        self._callbacks = Callbacks(Logger(self._log), None, None, None, None)
 
     def _log(self, environment: Any, instance: bytes, status: int, category: bytes, text: bytes):
         self.messages.append(Message(instance.decode(), status, category.decode(), text.decode()))

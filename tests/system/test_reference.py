@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from orchestrator.exchange.reference import reference_outputs
 from orchestrator.exchange.verify import verify
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.system.component import read_component
+from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from support.runs import run, write
 
@@ -41,7 +43,7 @@ def test_a_fresh_run_of_each_fmu_is_the_reference(dist: Path, name: str):
 
 
 def test_a_fresh_run_of_the_system_is_the_reference(system: System):
-    assert "agree over 4 s, in jacobi order" in verify(COMMITTED / "auv_ref.csv", system, 1e-9)
+    assert "to 4 s, in jacobi order" in verify(COMMITTED / "auv_ref.csv", system, 1e-9)
 
 
 def test_own_table_is_verified_in_its_order(system: System, tmp_path: Path):
@@ -58,7 +60,10 @@ def test_table_of_another_tool_is_understood(system: System, tmp_path: Path):
     lines = ['"Time", "auv.plant::eta.x[REAL]","controller.fault","controller.saturation"']
     lines += [f"{t!r}, {x!r},False,tanh" for t, x in ((float(t), float(x)) for t, x in rows)]
     path.write_text("\n".join(lines))
-    assert "2 ports agree over 2 s, in jacobi order" in verify(path, system, 1e-9)
+    said = verify(path, system, 1e-9)
+    assert "2 of 64 outputs agree to 1e-09 in 20 rows from t = 0.1 to 2 s, in jacobi order" in said
+    assert "no outputs: controller.saturation" in said
+    assert "not in the table: plant.eta.y, " in said
 
 
 def test_first_port_that_differs_is_named(system: System, tmp_path: Path):
@@ -70,19 +75,97 @@ def test_first_port_that_differs_is_named(system: System, tmp_path: Path):
         verify(tmp_path / "wrong.csv", system, 1e-6)
 
 
+def cells(path: Path) -> list[list[str]]:
+    with path.open() as lines:
+        return [line.rstrip("\n").split(",") for line in lines]
+
+
+@pytest.mark.parametrize("separator", [";", "\t", ", "])
+@pytest.mark.parametrize("mark", ["", "\ufeff"])
+def test_table_with_another_separator_and_a_byte_order_mark_is_read(
+    system: System, tmp_path: Path, separator: str, mark: str
+):
+    rows = cells(COMMITTED / "auv_ref.csv")
+    path = tmp_path / "table.csv"
+    path.write_text(mark + "\r\n".join(map(separator.join, rows)), encoding="utf-8")
+    assert "in 200 rows from t = 0.02 to 4 s" in verify(path, system, 1e-9)
+
+
+def test_what_was_not_compared_is_named(system: System, tmp_path: Path):
+    """The row at the start, inputs, parameters, what looks like a port, and what is missing."""
+    rows = cells(COMMITTED / "auv_ref.csv")[:102]
+    keep = [rows[0].index(name) for name in ("time", "plant.eta.x", "plant.tau.u", "plant.y.z")]
+    rows = [[row[i] for i in keep] for row in rows]
+    for i, row in enumerate(rows):
+        row += ["plant.eta.X", "comment"] if i == 0 else ["7", "said, nothing"]
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join(",".join(f'"{cell}"' for cell in row) for row in rows))
+    compared, *others = verify(path, system, 1e-9).splitlines()
+    assert compared.startswith("2 of 64 outputs agree to 1e-09 in 100 rows from t = 0.02 to 2 s")
+    assert "row at t = 0" in others[0]
+    assert "stop time of 100 s" in others[1]
+    assert others[2].endswith("no outputs: plant.tau.u, plant.eta.X, comment")
+    absent = others[3].removeprefix("not in the table: ").split(", ")
+    assert len(absent) == 62
+    assert not {"plant.eta.x", "plant.y.z"} & set(absent)
+
+
+def test_text_columns_named_after_ports_are_not_taken_for_numbers(system: System, tmp_path: Path):
+    path = tmp_path / "table.csv"
+    path.write_text("time,plant.eta.x\n0,2\n0.02,wet\n")
+    with pytest.raises(InputError, match=r"line 3, plant\.eta\.x: 'wet' is no number"):
+        verify(path, system, 1e-6)
+
+
+@pytest.mark.parametrize("tolerance", [float("inf"), float("nan"), -1e-9, 1.0])
+def test_tolerance_that_would_accept_anything_is_refused(system: System, tolerance: float):
+    with pytest.raises(InputError, match="tolerance"):
+        verify(COMMITTED / "auv_ref.csv", system, tolerance)
+
+
+def test_own_run_that_fails_certifies_nothing(system: System):
+    failing = system.with_parameters({PortName("plant", "nu0.p"): 1e150})
+    with pytest.raises(InputError, match="our own run fails"):
+        verify(COMMITTED / "auv_ref.csv", failing, 1e-9)
+
+
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("", "not a readable table"),
-        ("time,plant.eta.x\n0,1\n1,nan\n", "differs first"),
+        ("", "no column of its first line is named time"),
+        ("time\n0\n1\n", "no column is named after an output"),
+        ("time,plant.eta.x\n0,1\n1,nan\n", "line 3, plant.eta.x: 'nan' is not finite"),
+        ("time,plant.eta.x\n0,1\n1,1e999\n", "'1e999' is not finite"),
+        ("time,plant.eta.x\n0,1\n1,\n", "line 3, plant.eta.x: '' is no number"),
+        ("time,plant.eta.x\n0,1\n1,1_0\n", "'1_0' is no number"),
+        ("time,plant.eta.x\n0,1\n1,\u0661\n", "is no number"),
+        ("time;plant.eta.x\n0;1\n1;2,5\n", "'2,5' is no number"),
         ("time,depth\n0,1\n1,2\n", "no column is named after an output"),
-        ("clock,plant.eta.x\n0,1\n1,2\n", "no column of numbers is named time"),
-        ("time,plant.eta.x\n0,1\n0,2\n", "does not advance"),
-        ("time,plant.eta.x\nzero,1\none,2\n", "no column of numbers is named time"),
+        ("clock,plant.eta.x\n0,1\n1,2\n", "no column of its first line is named time"),
+        ("time plant.eta.x\n0 1\n1 2\n", "no column of its first line is named time"),
+        ("time,Time,plant.eta.x\n0,0,1\n1,1,2\n", "2 columns are named time"),
+        ("time,plant.eta.x\n0,1\n0,2\n", "line 3: time 0 s follows 0 s; it must grow"),
+        ("time,plant.eta.x\n0,1\n2,2\n1,2\n", "time 1 s follows 2 s"),
+        ("time,plant.eta.x\n-1,1\n1,2\n", "line 2: time -1 s is before the start"),
+        ("time,plant.eta.x\n0,1\nnan,2\n1,2\n", "line 3, time: 'nan' is not finite"),
+        ("time,plant.eta.x\n0,1\n", "no row after t = 0"),
+        ("time,plant.eta.x\n", "no row after t = 0"),
+        ("time,plant.eta.x\nzero,1\none,2\n", "'zero' is no number"),
+        ("time,plant.eta.x\n0,1\n1\n", "line 3 has 1 values below 2 names"),
+        ("time,plant.eta.x\n0,1\n1,2,3\n", "line 3 has 3 values below 2 names"),
+        ("time,plant.eta.x\n0,1\n\n1,2\n", "line 3 is empty"),
+        ('time,plant.eta.x\n0,1\n1,"2"5\n', "expected after"),
+        ('time,plant.eta.x\n0,1\n1,"2\n', "end of data"),
+        ('time,plant.eta.x,b\n0,1,"\n1,2,"\n2,1,a\n', "line 2: a value in quotes goes on"),
+        ("time,plant.eta.x,plant::eta.x[REAL]\n0,1,1\n", "columns 2 and 3 are both plant.eta.x"),
+        ("time,auv.plant.eta.x,plant.eta.x\n0,1,1\n", "columns 2 and 3 are both plant.eta.x"),
+        ("time,controller.fault\n0,false\n1,maybe\n", "'maybe' is no number"),
+        ("time,plant.eta.x\n0,true\n1,true\n", "'true' is no number"),
     ],
 )
 def test_table_that_cannot_be_used_is_refused(system, tmp_path, text, reason):
     path = tmp_path / "table.csv"
     path.write_text(text)
-    with pytest.raises(InputError, match=reason):
+    with pytest.raises(InputError, match=re.escape(reason)) as error:
         verify(path, system, 1e-6)
+    assert "\n" not in str(error.value)

@@ -74,7 +74,7 @@ def test_the_stranger_is_in_the_report(folder, text, page):
 
 def test_a_scenario_that_cannot_run_says_why_and_breaks_nothing(text):
     [reason] = re.findall(r"\*\*The run lost ended early:\*\* (.*)", text)
-    assert "lost.fmu: no such FMU" in reason
+    assert "lost.fmu: no such file" in reason
 
 
 def test_links_lead_somewhere(folder, page):

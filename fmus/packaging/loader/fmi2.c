@@ -126,8 +126,9 @@ EXPORT void fmi2FreeInstance(component c) {
     /* What is lost may have been freed by PythonFMU in part: it is left alone. */
     int sound = this.instance->condition != LOST;
     while ((state = state_of(c)) != NULL) {
-        if (sound) free_state(this.instance, thing_of(state, STATE));
+        void *object = thing_of(state, STATE);
         drop(state);
+        if (sound) free_state(this.instance, object);
     }
     if (sound) free_slave(this.instance->slave);
     drop(c);

@@ -35,9 +35,9 @@ int preflight(string resources, string guid, char *why) {
                       : py.PyObject_CallFunction(refusal, "ss", resources, guid != NULL ? guid : "");
     string text = words == NULL ? NULL : py.PyUnicode_AsUTF8(words);
     int good = text != NULL && text[0] == '\0';
-    if (text != NULL) {
+    if (text != NULL && !good) {
         snprintf(why, WHY, "%s", text);
-    } else if (!exception(why)) {
+    } else if (text == NULL && !exception(why)) {
         snprintf(why, WHY, "the loader is broken");
     }
     py.Py_DecRef(words);

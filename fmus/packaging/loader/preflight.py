@@ -7,12 +7,28 @@ compiled into it, before it forwards fmi2Instantiate. It must need nothing but P
 from __future__ import annotations
 
 import importlib
+import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
+from typing import NamedTuple
 
 #: Attribute of a script's module: the text that it was made from, once that was found good.
 _TEXT = "__checked_text__"
+
+
+class _Sound(NamedTuple):
+    """A folder from which an instance can be made."""
+
+    script: str
+    guid: str
+    #: What this rests on, and what these files looked like.
+    files: list[str]
+    stamps: list[tuple[int, int, int]]
+
+
+_sound: dict[str, _Sound] = {}
 
 
 def refusal(resources: str, guid: str) -> str:
@@ -33,30 +49,42 @@ def refusal(resources: str, guid: str) -> str:
 
 def forget(resources: str) -> None:
     """Take a folder off sys.path."""
-    if resources in sys.path:
+    with suppress(ValueError):
         sys.path.remove(resources)
 
 
 def _check(resources: str, guid: str) -> None:
-    folder = Path(resources)
-    script = (folder / "slavemodule.txt").read_text(encoding="utf-8")
+    sound = _sound.get(resources)
+    if sound is None or sound.script not in sys.modules or _stamps(sound.files) != sound.stamps:
+        sound = _sound[resources] = _examined(resources)
+    if guid and guid.strip("{}") != sound.guid.strip("{}"):
+        raise ValueError(f"GUID {guid} is not that of this FMU, {sound.guid}")
+
+
+def _stamps(files: list[str]) -> list[tuple[int, int, int]]:
+    """What changes when files do."""
+    found = map(os.stat, files)
+    return [(stat.st_ino, stat.st_size, stat.st_mtime_ns) for stat in found]
+
+
+def _examined(resources: str) -> _Sound:
+    names = Path(resources, "slavemodule.txt")
+    script = names.read_text(encoding="utf-8")
     if not script.isidentifier():
-        raise ValueError(f"{resources}/slavemodule.txt names no module")
-    text = (folder / f"{script}.py").read_bytes()
-    own = (folder / "guid.txt").read_text(encoding="utf-8")
-    if guid and guid.strip("{}") != own.strip("{}"):
-        raise ValueError(f"GUID {guid} is not that of this FMU, {own}")
-    module = sys.modules.get(script)
-    if module is None or _TEXT not in vars(module):
-        # It tells what is wrong with a text, where an import may find the bytes of an older one.
-        compile(text, f"{resources}/{script}.py", "exec")
-        module = _imported(script, resources)
-        if Path(str(module.__file__)).read_bytes() == text:
-            if not _has_slave(module):
-                raise ValueError(f"{resources}/{script}.py holds no slave")
-            setattr(module, _TEXT, text)
+        raise ValueError(f"{names} names no module")
+    path, own_guid = Path(resources, f"{script}.py"), Path(resources, "guid.txt")
+    files = [str(names), str(path), str(own_guid)]
+    stamps, text = _stamps(files), path.read_bytes()
+    # It tells what is wrong with a text, where an import may find the bytes of an older one.
+    compile(text, path, "exec")
+    module = _imported(script, resources)
+    if _TEXT not in vars(module) and Path(str(module.__file__)).read_bytes() == text:
+        if not _has_slave(module):
+            raise ValueError(f"{path} holds no slave")
+        setattr(module, _TEXT, text)
     if vars(module).get(_TEXT) != text:
         raise ValueError(f"another module {script} is loaded in this process")
+    return _Sound(script, own_guid.read_text(encoding="utf-8"), files, stamps)
 
 
 def _imported(script: str, resources: str) -> ModuleType:

@@ -142,7 +142,7 @@ static int load_pythonfmu(char *why) {
         snprintf(why, WHY, "cannot load PythonFMU's library: %s",
                  companion[0] == '\0' ? "its path is too long" : dlerror());
     } else if (dlsym(library, "finalizePythonInterpreter") == NULL) {
-        snprintf(why, WHY, "%s is not PythonFMU's library", companion);
+        snprintf(why, WHY, "the library beside the loader is not PythonFMU's");
     } else {
         pythonfmu = library;
     }

@@ -46,3 +46,15 @@ def test_fmu_contains_what_runs_in_it_and_no_more(dist: Path, name: str):
     assert len(components - {"__init__.py", "ports", "slave"}) == 1
     assert {package for package, _ in ours} == {"auv_fmu", "fmus"}
     assert ("auv_fmu", "proof") not in ours
+
+
+@pytest.mark.parametrize(
+    "content",
+    ["", "[]", "{}", "null", "[" * 100_000, "\0", '{"sha256": {}}',
+     '{"sha256": [], "loader": "native"}', '{"sha256": {}, "loader": "other"}'],
+)  # fmt: skip
+def test_manifest_that_is_none_counts_as_none(tmp_path: Path, content: str):
+    manifest = tmp_path / build.MANIFEST
+    assert build._built_before(manifest) == {}
+    manifest.write_text(content)
+    assert build._built_before(manifest) == {}

@@ -72,6 +72,9 @@ SPOILED = {
     "outputs missing": ("outputs", lambda saved: []),
     "output not finite": ("outputs", lambda saved: [inf, *saved["outputs"][1:]]),
     "posture of another state": ("outputs", lambda saved: [1.0, *saved["outputs"][1:]]),
+    "measured elsewhere": ("outputs", lambda saved: [
+        *saved["outputs"][:14], saved["outputs"][14] + 0.01, *saved["outputs"][15:],
+    ]),
     "moment beyond its limit": ("outputs", lambda saved: [*saved["outputs"][:-1], 1e6]),
     "mode bogus": ("mode", lambda saved: "bogus"),
     "mode of another type": ("mode", lambda saved: ["stepping"]),

@@ -2,29 +2,43 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
+import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from shutil import rmtree
 
 import pytest
 
 from orchestrator.errors import InputError
-from orchestrator.experiments.folder import RECORD, replaced, whole
+from orchestrator.experiments.folder import RECORD, replaced, settle, whole
+from support.machine import contents, ended, forked, killed_at
 
 
-def write(folder: Path, *names: str, text: str = "new", failure: str | None = None) -> None:
-    with replaced(folder) as unfinished:
+def write(
+    folder: Path,
+    *names: str,
+    text: str = "new",
+    failure: str | None = None,
+    keep: Callable[[], bool] = lambda: False,
+) -> None:
+    with replaced(folder, keep) as unfinished:
         for name in names:
-            (unfinished / name).parent.mkdir(exist_ok=True)
+            (unfinished / name).parent.mkdir(parents=True, exist_ok=True)
             (unfinished / name).write_text(text)
         (unfinished / RECORD).write_text(
             json.dumps({"files": [*names, RECORD], "failure": failure})
         )
 
 
-def write_half(folder: Path, error: BaseException) -> None:
-    with replaced(folder) as unfinished:
+def write_half(
+    folder: Path, error: BaseException, keep: Callable[[], bool] = lambda: False
+) -> None:
+    with replaced(folder, keep) as unfinished:
         (unfinished / "a.csv").write_text("rows so far")
         raise error
 
@@ -92,13 +106,138 @@ def test_second_run_into_the_same_folder_is_refused(tmp_path: Path):
     write(tmp_path / "r", "a.csv")
 
 
-def test_a_failing_disk_keeps_what_was_there_and_says_where_the_rest_is(tmp_path: Path):
+def test_a_failing_disk_keeps_what_was_there_and_what_is_worth_it(tmp_path: Path):
     write(tmp_path / "r", "a.csv", text="old")
-    with pytest.raises(InputError, match=r"No space left.*\.unfinished-"):
-        write_half(tmp_path / "r", OSError(28, "No space left on device"))
-    assert (tmp_path / "r" / "a.csv").read_text() == "old"
-    [left] = (tmp_path / "r").glob(".unfinished-*/a.csv")
-    assert left.read_text() == "rows so far"
+    before = contents(tmp_path)
+    full = OSError(errno.ENOSPC, "No space left on device")
+    with pytest.raises(InputError, match="No space left on device; choose another folder"):
+        write_half(tmp_path / "r", full)
+    assert contents(tmp_path) == before
+    for name in ("incomplete", "incomplete-2"):
+        with pytest.raises(InputError, match=f"what was written is in .*/{name};"):
+            write_half(tmp_path / "r", full, keep=lambda: True)
+        before[f"r/{name}/a.csv"] = b"rows so far"
+        assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("call", ["fsync", "rename"])
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO, errno.EXDEV, errno.EDQUOT])
+def test_a_disk_that_fails_at_the_last_moment(tmp_path: Path, monkeypatch, call, number):
+    """As a server does that takes everything and says only then that it cannot keep it."""
+    write(tmp_path / "r", "a.csv", text="old")
+    before = contents(tmp_path)
+
+    def fail(*_: object) -> None:
+        monkeypatch.undo()
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, call, fail)
+    with pytest.raises(InputError, match=rf"{os.strerror(number)}; what was written is in"):
+        write(tmp_path / "r", "a.csv", keep=lambda: True)
+    # Without a record that says that it came to its end.
+    assert contents(tmp_path) == before | {"r/incomplete/a.csv": b"new"}
+
+
+def test_a_file_system_without_fsync_is_written_all_the_same(tmp_path: Path, monkeypatch):
+    def cannot(_: int) -> None:
+        raise OSError(errno.EINVAL, "Invalid argument")
+
+    monkeypatch.setattr(os, "fsync", cannot)
+    write(tmp_path / "r", "a.csv")
+    assert (tmp_path / "r" / "a.csv").read_text() == "new"
+
+
+def test_everything_is_on_the_disk_before_it_counts(tmp_path: Path, monkeypatch):
+    """After a power cut a name may lead to an empty file, if the contents were not there first."""
+    calls: list[tuple[str, str]] = []
+    fsync, rename = os.fsync, os.rename
+
+    def recorded_fsync(descriptor: int) -> None:
+        calls.append(("fsync", str(Path(f"/proc/self/fd/{descriptor}").readlink())))
+        fsync(descriptor)
+
+    def recorded_rename(source: Path, target: Path) -> None:
+        calls.append(("rename", str(target)))
+        rename(source, target)
+
+    monkeypatch.setattr(os, "fsync", recorded_fsync)
+    monkeypatch.setattr(os, "rename", recorded_rename)
+    write(tmp_path / "r", "a.csv", "below/b.csv")
+    names = [call if call == "rename" else Path(path).name for call, path in calls]
+    before = names[: names.index("rename")]
+    assert {"a.csv", "b.csv", "below", RECORD} < set(before)
+    assert names[names.index("rename") + 1] == "r"
+
+
+def test_killed_at_any_moment_the_folder_holds_the_old_result_or_the_new_one(tmp_path: Path):
+    old, new, folder = tmp_path / "old", tmp_path / "new", tmp_path / "r"
+
+    def write_old(to: Path) -> None:
+        write(to, "a.csv", "old.png", "below/deep/b.csv", text="old")
+
+    def write_new(to: Path) -> None:
+        write(to, "a.csv", "new.png", "below/c.csv")
+
+    write_old(old)
+    write_new(new)
+    n = 0
+    while True:
+        rmtree(folder, ignore_errors=True)
+        write_old(folder)
+        if not killed_at(n, lambda: write_new(folder)):
+            break
+        # What looks like a result now is one, unless the next command will look after it first.
+        if not (folder / ".whole").is_dir():
+            visible = {k: v for k, v in contents(folder).items() if not k.startswith(".")}
+            assert visible in (contents(old), contents(new)), n
+        settle(folder)
+        visible = {k: v for k, v in contents(folder).items() if not k.startswith(".")}
+        assert visible in (contents(old), contents(new)), n
+        write_new(folder)
+        assert contents(folder) == contents(new), n
+        n += 1
+    assert n > 20
+
+
+def test_killed_again_while_the_next_command_goes_on_with_it(tmp_path: Path):
+    new, folder = tmp_path / "new", tmp_path / "r"
+    write(new, "a.csv", "new.png")
+
+    def begin() -> None:
+        rmtree(folder, ignore_errors=True)
+        write(folder, "a.csv", "old.png", text="old")
+        # Just before the first file is moved.
+        assert killed_at(1, lambda: write(folder, "a.csv", "new.png"), ["replace"])
+        assert (folder / ".whole").is_dir()
+
+    n = 0
+    while True:
+        begin()
+        if not killed_at(n, lambda: settle(folder)):
+            break
+        settle(folder)
+        assert contents(folder) == contents(new), n
+        n += 1
+    assert n > 4
+
+
+def test_a_killed_writer_of_a_file_leaves_nothing_for_ever(tmp_path: Path):
+    path = tmp_path / "view.html"
+    with whole(path) as partial:
+        partial.write_text("old")
+
+    def half() -> None:
+        with whole(path) as partial:
+            partial.write_text("half")
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    assert ended(forked(half)) == -signal.SIGKILL
+    assert len(contents(tmp_path)) == 2
+    with whole(path) as partial, whole(tmp_path / "other.html") as other:
+        partial.write_text("new")
+        other.write_text("of one who writes at the same time")
+    assert contents(tmp_path).keys() == {"view.html", "other.html"}
+    assert path.read_text() == "new"
 
 
 def test_an_edited_record_does_not_lead_out_of_the_folder(tmp_path: Path):

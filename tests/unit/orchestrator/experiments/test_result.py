@@ -78,7 +78,7 @@ def test_mistakes_are_told_in_the_words_of_the_command_line(name, value, tmp_pat
     ("arguments", "complaint"),
     [
         ({"system": "fig44"}, "did you mean fig4"),
-        ({"system": "mine.toml"}, "mine.toml: no such scenario file"),
+        ({"system": "mine.toml"}, "mine.toml: no such file"),
         ({"system": Path("mine.ssp")}, "mine.ssp"),
         ({"system": "fig4", "stop_time": -1.0}, "must be positive"),
         ({"system": "fig4", "step": 0.0}, "must be positive"),

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+from math import ceil, floor
+
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from orchestrator.errors import InputError
-from orchestrator.master.experiment import Experiment
+from orchestrator.master.experiment import MOST_STEPS, Experiment
 
 
 @given(step=st.floats(1e-3, 1.0), n=st.integers(1, 200), rest=st.floats(0.0, 0.99))
@@ -22,6 +25,31 @@ def test_steps_follow_each_other_and_end_at_the_stop_time(step, n, rest):
     assert steps[-1][2] == pytest.approx(experiment.stop_time, rel=1e-9)
 
 
+@given(stop_time=st.floats(5e-324, 1.7e308), step=st.floats(5e-324, 1.7e308))
+@example(5e-324, 1e308)
+@example(1e-300, 0.02)
+@example(4.0, 1e12)
+@example(1.7e308, 1.7e308)
+@example(5e8 + 0.6, 1.0)
+@example(1e7, 0.01)
+def test_the_number_of_steps_is_that_of_exact_arithmetic(stop_time, step):
+    """Two neighbouring answers where the quotient is a whole number but for rounding."""
+    exact = Fraction(stop_time) / Fraction(step)
+    if exact > MOST_STEPS:
+        with pytest.raises(InputError, match="more than"):
+            Experiment(stop_time, step)
+        return
+    experiment = Experiment(stop_time, step)
+    rest = exact - floor(exact)
+    near = min(Fraction(1, 1000), exact * Fraction(1, 10**9))
+    wanted = {ceil(exact)} if near < rest < 1 - near else {floor(exact), ceil(exact)}
+    assert experiment.rows - 1 in wanted - {0}
+    if experiment.rows < 1000:
+        steps = list(experiment.steps())
+        assert len(steps) == experiment.rows - 1
+        assert all(h > 0.0 and t + h > 0.0 for t, h, _ in steps)
+
+
 def test_a_rest_within_rounding_is_no_step():
     assert Experiment(0.3, 0.1).rows == 4
     assert Experiment(1.0, 0.03).rows == 35
@@ -31,6 +59,11 @@ def test_a_rest_within_rounding_is_no_step():
 def test_impossible_experiments_are_refused(values):
     with pytest.raises(InputError, match="must be positive"):
         Experiment(*values)
+
+
+def test_a_number_beyond_all_floats_is_refused():
+    with pytest.raises(InputError, match="must be smaller"):
+        Experiment(10**400, 0.1)
 
 
 def test_text_is_no_time():

@@ -60,3 +60,25 @@ def test_what_is_ignored_stays_ignored():
             assert not interrupts
     finally:
         signal.signal(signal.SIGHUP, before)
+
+
+def test_without_a_thread_nobody_insists_and_everything_else_goes_on(monkeypatch):
+    def cannot(_: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", cannot)
+    with held_interrupts() as interrupts, interrupts.insistence(lambda: None):
+        os.kill(os.getpid(), signal.SIGINT)
+        assert interrupts
+
+
+def test_signals_before_and_after_are_no_insistence():
+    given_up: list[str] = []
+    with held_interrupts() as interrupts:
+        for _ in range(3):
+            os.kill(os.getpid(), signal.SIGINT)
+        with interrupts.insistence(lambda: given_up.append("now")):
+            os.kill(os.getpid(), signal.SIGINT)
+        for _ in range(3):
+            os.kill(os.getpid(), signal.SIGINT)
+    assert given_up == []

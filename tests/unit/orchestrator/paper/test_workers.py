@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+from contextlib import suppress
 from functools import partial
 from multiprocessing import active_children
 
@@ -35,6 +36,19 @@ def _interrupted_after_the_first(tasks):
     with workers() as crew:
         for _ in crew.results(tasks, "nap"):
             os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_a_process_that_swallows_what_ends_it_is_ended():
+    with pytest.raises(KeyboardInterrupt):
+        _interrupted_after_the_first({0: os.getpid, 1: _swallow})
+    assert active_children() == []
+
+
+def _swallow() -> None:
+    """As a run does with a signal, and PythonFMU with an exception."""
+    for _ in range(10):
+        with suppress(BaseException):
+            time.sleep(600)
 
 
 def test_a_process_that_dies_is_said_in_a_line():

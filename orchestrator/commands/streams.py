@@ -1,0 +1,79 @@
+"""Standard streams, which may be closed, full, or without a reader; and what is written to them."""
+
+from __future__ import annotations
+
+import os
+import sys
+from contextlib import suppress
+from typing import TextIO
+
+from orchestrator.errors import shortened
+
+#: Letters of a line for the user: a name or a value in it may be a whole file.
+_LONGEST = 4000
+
+
+class Unheard(Exception):
+    """Standard output cannot be written, which has been said."""
+
+
+def fill() -> None:
+    """Put the null device where a standard stream is closed.
+
+    The next file that is opened would take its place, and get what is printed.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(number, "w" if number else "r", closefd=False))
+
+
+def say(text: str) -> None:
+    """A line for the user beside the output."""
+    with suppress(OSError):
+        print(shortened(f"auv-fmu: {_plain(text)}", _LONGEST), file=sys.stderr, flush=True)
+
+
+def show(*lines: object) -> None:
+    """Lines of output.
+
+    Raises:
+        Unheard: they cannot be written.
+
+    """
+    try:
+        for line in lines:
+            print(_plain(str(line)))
+    except OSError as error:
+        _give_up(sys.stdout, error)
+        raise Unheard from error
+
+
+def _plain(text: str) -> str:
+    """A text in one line, in which nothing of a name speaks to the terminal."""
+    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
+
+
+def finished() -> bool:
+    """Whether all output could be written; says why, if it could not."""
+    return all([_flushed(sys.stdout), _flushed(sys.stderr)])
+
+
+def _flushed(stream: TextIO) -> bool:
+    try:
+        stream.flush()
+    except OSError as error:
+        _give_up(stream, error)
+        return False
+    return True
+
+
+def _give_up(stream: TextIO, error: OSError) -> None:
+    # Python would try again when the process ends, and complain.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    # Where a reader has gone, nobody misses the rest.
+    if not isinstance(error, BrokenPipeError):
+        say(f"cannot write the output: {error.strerror}")

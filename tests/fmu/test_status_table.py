@@ -1,0 +1,104 @@
+"""docs/status.md, cell by cell, for each FMU as a C program would call it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import fmpy
+import pytest
+
+from orchestrator.experiments import bundle
+from support.calls import CASES
+from support.instances import NAMES
+from support.status_table import (
+    CREATION,
+    ERROR,
+    WITHOUT_AN_INSTANCE,
+    creations,
+    rows,
+    without_an_instance,
+    without_the_loader,
+)
+from support.trials import SKIPPED, Cell, trials
+from support.worker import Lost, Worker
+
+#: Longest time for a trial, on a slow machine [s].
+PATIENCE = 60.0
+
+#: By name: what the test of a cell is called.
+CELLS: dict[str, Cell] = {
+    **{f"{row} - {state}": (key, state) for key, row in rows().items() for state in row.cells},
+    **{f"{CREATION}: {case}": ((CREATION, case), "") for case in creations()},
+    **{f"on {what}": ((WITHOUT_AN_INSTANCE, what), "") for what in without_an_instance()},
+}
+
+#: Cells that PythonFMU's own library has a part in, and no guard of ours.
+UNGUARDED = ("fmi2FreeFMUstate", CREATION, WITHOUT_AN_INSTANCE)
+
+#: Cells that hold without the native loader.
+OF_THE_SLAVE = {
+    name: (key, state)
+    for name, (key, state) in CELLS.items()
+    if key[0] not in UNGUARDED and state != ERROR and rows()[key].cells[state].answer.name != ERROR
+}
+
+
+def unpacked(fmus: Path, folder: Path, *names: str) -> list[Path]:
+    for name in names:
+        fmpy.extract(fmus / f"{name}.fmu", unzipdir=folder / name)
+    return [folder / name for name in names]
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def worker(
+    request: pytest.FixtureRequest, dist: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Worker[Cell, str]]:
+    """A process that tries cells on one of the FMUs."""
+    another = NAMES[NAMES.index(request.param) - 1]
+    folders = unpacked(dist, tmp_path_factory.mktemp("status"), request.param, another)
+    with Worker(trials, *folders) as process:
+        yield process
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Worker[Cell, str]]:
+    """The same for the FMU with ports of most types, without the native loader."""
+    folder = tmp_path_factory.mktemp("plain")
+    bundle.build(folder, "plain")
+    with Worker(trials, *unpacked(folder, folder, "ObserverController", "AuvPlant")) as process:
+        yield process
+
+
+def hold(worker: Worker[Cell, str], cell: Cell) -> None:
+    wrong = worker.ask(cell, PATIENCE)
+    assert not isinstance(wrong, Lost), f"the process is lost: {wrong.why}"
+    if wrong == SKIPPED:
+        pytest.skip("this FMU has no such port")
+    assert wrong == ""
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_cell(worker: Worker[Cell, str], cell: str):
+    hold(worker, CELLS[cell])
+
+
+@pytest.mark.parametrize("cell", OF_THE_SLAVE)
+def test_cell_of_a_plain_fmu(plain: Worker[Cell, str], cell: str):
+    hold(plain, OF_THE_SLAVE[cell])
+
+
+@pytest.mark.parametrize("key", without_the_loader(), ids=": ".join)
+def test_what_is_said_of_a_plain_fmu(plain: Worker[Cell, str], key: tuple[str, str]):
+    wrong = plain.ask((key, "stepping"), PATIENCE)
+    expected = without_the_loader()[key]
+    if isinstance(wrong, Lost):
+        assert wrong.why.startswith("SIG"), wrong
+        assert "crash" in expected
+    else:
+        # What is freed twice does not crash each time.
+        assert wrong.endswith(expected.removeprefix("fmi2").removesuffix(", then crash"))
+
+
+def test_every_row_is_tried():
+    assert CASES.keys() == rows().keys()

@@ -1,0 +1,399 @@
+"""Attack the command line with files that are not what they should be.
+
+    python -m tests.fuzz.files --runs 1000                    all kinds of files, in turn
+    python -m tests.fuzz.files --runs 10000 --only table      one kind
+    python -m tests.fuzz.files --runs 1 --only ssd --seed 17  the one that a finding names
+    python -m tests.fuzz.files --guided --only scenario       by coverage; `pip install atheris`
+
+A valid file of each kind is mutated (:mod:`.files_mutators`) and handed to a command. Whatever it
+has become, the command ends with 0, or with 2 and one line; no exception leaves it; it writes into
+the current and the temporary folder alone; and it is done within seconds and some hundred
+megabytes. A table that `verify` certifies agrees in full (:mod:`.files_oracle`). A run depends on
+its kind and seed alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import io
+import os
+import resource
+import signal
+import sys
+import tempfile
+import traceback
+import zipfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout, suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from random import Random
+from types import FrameType, FunctionType
+from typing import Any, NamedTuple
+from unittest.mock import patch
+
+import numpy as np
+
+from orchestrator import Result, simulate
+from orchestrator.commands.main import main as auv_fmu
+from orchestrator.errors import InputError
+from orchestrator.exchange import verify
+from orchestrator.experiments.bundle import current_fmus
+from orchestrator.experiments.scenario import FOLDER as SCENARIOS
+from orchestrator.experiments.scenario import read_scenario
+from orchestrator.experiments.wiring import closed_loop
+from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.files import CsvFile
+from orchestrator.master.observer import Observer
+from orchestrator.master.table import Table
+from orchestrator.system.leftovers import _process_folder
+from orchestrator.system.ssp.writing import ssp_bytes
+from orchestrator.system.unpacking import _unpacked
+
+from . import files_mutators as mutators
+from .files_oracle import agreement
+
+#: What a command may take: seconds, bytes of memory more than there were, and letters to explain.
+SECONDS, BYTES, LETTERS = 20, 2 * 2**30, 5000
+
+#: How far the runs go that tables are held against [s], and how close these must be.
+RECORDED, TOLERANCE = 1.0, 1e-6
+
+
+class Finding(AssertionError):
+    """A command did with a file what it must not."""
+
+
+class Overdue(BaseException):
+    """A command took too long; no handler of the program's own shall keep this."""
+
+
+class Place(NamedTuple):
+    """What a command meets, by the names of files in the current folder, and the command."""
+
+    files: Mapping[str, bytes]
+    arguments: list[str]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of file.
+
+    Attributes:
+        valid: such a file.
+        mutate: makes another of it.
+        place: puts a file where a command meets it.
+        check: says what is wrong with what a command has said with status 0; empty: nothing.
+
+    """
+
+    valid: bytes
+    mutate: mutators.Mutator
+    place: Callable[[bytes], Place]
+    check: Callable[[bytes, str], str] = lambda content, said: ""
+
+
+def kinds(runs: Mapping[str, Result]) -> dict[str, Kind]:
+    """All kinds of files, each with a valid one; some need plotly."""
+    fmus = {
+        # Descriptions need no code; a system of such FMUs can be read and written, not run.
+        fmu.name: _zipped({"modelDescription.xml": _entries(fmu.read_bytes())[_DESCRIPTION]})
+        for fmu in sorted(current_fmus().glob("*.fmu"))
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        for name, content in fmus.items():
+            Path(folder, name).write_bytes(content)
+        system = closed_loop(Path(folder), read_scenario("fig5"))
+        archive = ssp_bytes(replace(system, stop_time=0.1, step=0.02))
+        saved = runs[ORDERS[0]].save(Path(folder, "saved"))
+        stored = {path.name: path.read_bytes() for path in saved.iterdir()}
+        table = Path(folder, "table.csv")
+        file = CsvFile(table)
+        _tell(file, runs["jacobi"])
+        columns = table.read_bytes()
+    entries, fmu = _entries(archive), fmus["ObserverController.fmu"]
+
+    def exported(content: bytes) -> Place:
+        return Place({"mine.ssp": content}, ["export", "mine.ssp"])
+
+    def in_archive(name: str) -> Callable[[bytes], Place]:
+        return lambda content: exported(_zipped({**entries, name: content}))
+
+    def as_controller(content: bytes) -> Place:
+        scenario = b'[components]\ncontroller = "mine.fmu"\n'
+        return Place({"mine.fmu": content, "mine.toml": scenario}, ["export", "mine.toml"])
+
+    def beside_the_others(name: str, *command: str) -> Callable[[bytes], Place]:
+        return lambda content: Place({**stored, name: content}, [*command])
+
+    found = {
+        "description": Kind(
+            _entries(fmu)[_DESCRIPTION],
+            mutators.xml,
+            lambda content: as_controller(_zipped({_DESCRIPTION: content})),
+        ),
+        "fmu": Kind(fmu, mutators.archive, as_controller),
+        "ssd": Kind(entries[_STRUCTURE], mutators.xml, in_archive(_STRUCTURE)),
+        "ssv": Kind(entries[_VALUES], mutators.xml, in_archive(_VALUES)),
+        "ssp": Kind(archive, mutators.archive, exported),
+        "scenario": Kind(
+            (SCENARIOS / "fig5.toml").read_bytes(),
+            mutators.toml,
+            lambda content: Place({"mine.toml": content}, ["export", "mine.toml"]),
+        ),
+        "plot": Kind(stored["result.csv"], mutators.table, beside_the_others("result.csv", *_PLOT)),
+        "view": Kind(stored["result.csv"], mutators.table, beside_the_others("result.csv", *_VIEW)),
+        "record": Kind(stored["run.json"], mutators.json, beside_the_others("run.json", *_VIEW)),
+        "table": _table(runs, columns),
+    }
+    if find_spec("plotly") is None:
+        del found["view"], found["record"]
+    return found
+
+
+_DESCRIPTION, _STRUCTURE, _VALUES = (
+    "modelDescription.xml", "SystemStructure.ssd", "parameters/controller.ssv",
+)  # fmt: skip
+_PLOT, _VIEW = ("plot", ".", "plant.y", "--out", "plot.svg"), ("view", ".")
+
+
+def _zipped(entries: Mapping[str, bytes]) -> bytes:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for name, data in entries.items():
+            archive.writestr(zipfile.ZipInfo(name), data)
+    return content.getvalue()
+
+
+def _entries(content: bytes) -> dict[str, bytes]:
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def _tell(observer: Observer, run: Table) -> None:
+    observer.begin(run.header)
+    for rows in np.array_split(run.rows, 3):
+        observer.take(rows)
+    observer.end(run.ending)
+
+
+def _replay(
+    runs: Mapping[str, Table], _: object, experiment: Experiment, observers: Sequence[Observer]
+) -> None:
+    """What `verify` meets instead of a new run."""
+    if experiment.stop_time > RECORDED + 1e-9:
+        raise InputError("not recorded")
+    for observer in observers:
+        _tell(observer, runs[experiment.order])
+
+
+def _table(runs: Mapping[str, Result], valid: bytes) -> Kind:
+    """Tables for `verify`, whose answers are judged."""
+    outputs = [
+        f"{component.name}.{variable.name}"
+        for component in runs["jacobi"].system.components.values()
+        for variable in component.having("output")
+    ]
+    booleans = {name for name in outputs if name.endswith(".fault")}
+    columns = {
+        order: {name: run[name].tolist() for name in ("time", *outputs)}
+        for order, run in runs.items()
+    }
+
+    def check(content: bytes, said: str) -> str:
+        [order] = [order for order in ORDERS if f"in {order} order" in said]
+        found = agreement(content, columns[order], booleans, TOLERANCE)
+        if found is None:
+            return "certified, and does not agree"
+        wanted = (
+            f"{found.columns} of {len(outputs)} outputs agree to {TOLERANCE:g} in {found.rows} "
+            f"rows from t = {found.start:g} to {found.end:g} s"
+        )
+        return "" if said.startswith(wanted) else f"certified more than {wanted!r}"
+
+    command = ["verify", "t.csv", "--tolerance", str(TOLERANCE)]
+    return Kind(valid, mutators.table, lambda content: Place({"t.csv": content}, command), check)
+
+
+def attack(kind: Kind, content: bytes) -> int:
+    """Hand a file to its command; returns the exit status.
+
+    Raises:
+        Finding: the command did what it must not.
+
+    """
+    place = kind.place(content)
+    said, complaint = io.StringIO(), io.StringIO()
+    with tempfile.TemporaryDirectory() as folder, chdir(folder):
+        for name, data in place.files.items():
+            Path(name).write_bytes(data)
+        try:
+            with redirect_stdout(said), redirect_stderr(complaint), _bounded(folder) as outside:
+                status = auv_fmu(place.arguments)
+        except Overdue as error:
+            raise Finding(f"no end after {SECONDS} s, in {_where(error)}") from None
+        except (Exception, SystemExit) as error:
+            raise Finding(f"{type(error).__name__}: {error!s:.200}, in {_where(error)}") from error
+    text = complaint.getvalue()
+    if outside:
+        raise Finding(f"wrote outside: {', '.join(outside)}")
+    if "MemoryError" in text or "MemoryError" in said.getvalue():
+        raise Finding(f"out of memory: {text:.200}")
+    if status == 0 and (wrong := kind.check(content, said.getvalue())):
+        raise Finding(wrong)
+    if status not in (0, 2):
+        raise Finding(f"status {status}: {text:.200}")
+    if status == 2 and not (text.count("\n") == 1 and text.isprintable() is False):
+        raise Finding(f"not one line: {text[:500]!r}")
+    if len(text) > LETTERS or not text.strip("\n").isprintable():
+        raise Finding(f"no line to read: {text[:300]!r}, {len(text)} letters")
+    return status
+
+
+def _where(error: BaseException) -> str:
+    frames = traceback.extract_tb(error.__traceback__)
+    return " < ".join(f"{Path(frame.filename).name}:{frame.lineno}" for frame in frames[:-4:-1])
+
+
+#: Where a command may write, while one runs, and where it did write besides.
+_watched: tuple[tuple[str, ...], list[str]] | None = None
+
+_WRITING = {"os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.symlink", "os.link", "os.chmod"}
+
+
+def _watch(event: str, arguments: tuple[Any, ...]) -> None:
+    if _watched is None or event not in _WRITING | {"open"}:
+        return
+    if event == "open":
+        path, mode, flags = arguments
+        if not (set(mode or "") & set("wax+") or (flags or 0) & (os.O_WRONLY | os.O_RDWR)):
+            return
+    else:
+        path, *others = arguments
+        # A path below an open folder, as rmtree has it: that folder was looked at.
+        if any(isinstance(other, int) and other >= 0 for other in others[-1:]):
+            return
+    if isinstance(path, int):
+        return
+    allowed, outside = _watched
+    where = os.path.abspath(os.fsdecode(path))  # noqa: PTH100  # resolves no links
+    if not where.startswith((*allowed, "/dev/", "/proc/self/")):
+        outside.append(where)
+
+
+@contextmanager
+def _bounded(folder: str) -> Iterator[list[str]]:
+    """Bound time and memory, and list what is written outside the folders that may be."""
+    global _watched  # noqa: PLW0603
+    outside: list[str] = []
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + BYTES, hard))
+    before = signal.signal(signal.SIGALRM, _stop)
+    signal.alarm(SECONDS)
+    _watched = ((folder, tempfile.gettempdir()), outside)
+    try:
+        yield outside
+    finally:
+        _watched = None
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def _stop(_: int, __: FrameType | None) -> None:
+    raise Overdue
+
+
+@contextmanager
+def prepared() -> Iterator[dict[str, Kind]]:
+    """All kinds of files, after one run of each with its valid file."""
+    before = tempfile.tempdir, sys.dont_write_bytecode
+    with tempfile.TemporaryDirectory(prefix="mutated-files-") as folder:
+        # Temporary files go into a folder of their own, so that writing beside it is seen.
+        tempfile.tempdir, sys.dont_write_bytecode = folder, True
+        _process_folder.cache_clear()
+        try:
+            runs = {order: simulate("fig4", stop_time=RECORDED, order=order) for order in ORDERS}
+            with patch.object(verify, "completed", partial(_replay, runs)):
+                found = kinds(runs)
+                for name, kind in found.items():
+                    # The first use of a library may write into its cache.
+                    assert attack(kind, kind.valid) == 0, name
+                sys.addaudithook(_watch)
+                yield found
+        finally:
+            tempfile.tempdir, sys.dont_write_bytecode = before
+            _unpacked.cache_clear()
+            _process_folder.cache_clear()
+
+
+def main() -> int:
+    """Attack, and tell of what was found."""
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz.files", description=__doc__)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("--runs", type=int, default=1000, help="of each kind; default: 1000")
+    parser.add_argument("--seed", type=int, default=0, help="of the first run; default: 0")
+    parser.add_argument("--only", metavar="KIND", help="one kind of file; default: all")
+    parser.add_argument("--guided", action="store_true", help="let coverage choose, by atheris")
+    options = parser.parse_args()
+    with prepared() as found:
+        return _attacks(found, options)
+
+
+def _attacks(found: Mapping[str, Kind], options: argparse.Namespace) -> int:
+    chosen = {options.only: found[options.only]} if options.only else found
+    if options.guided:
+        _guided(*chosen.values(), runs=options.runs)
+    findings = 0
+    for name, kind in chosen.items():
+        statuses = {0: 0, 2: 0}
+        seen: set[str] = set()
+        for seed in range(options.seed, options.seed + options.runs):
+            content = kind.mutate(kind.valid, Random(f"{name} {seed}"))
+            try:
+                statuses[attack(kind, content)] += 1
+            except Finding as finding:
+                findings += 1
+                if str(finding) not in seen:
+                    seen.add(str(finding))
+                    print(f"{name} {seed}: {finding}", flush=True)
+        print(f"{name}: {options.runs} files, {statuses[0]} taken, {statuses[2]} refused")
+    return 1 if findings else 0
+
+
+#: Packages whose coverage guides.
+_INSTRUMENTED = ("orchestrator", "fmpy", "tomllib", "zipfile", "json", "csv")
+
+
+def _guided(kind: Kind, runs: int) -> None:
+    """Let atheris choose what to mutate further; ends the process."""
+    import atheris  # type: ignore[import-not-found]  # noqa: PLC0415
+
+    def mutate(content: bytes, most: int, seed: int) -> bytes:
+        random = Random(seed)
+        if random.random() < 0.5:
+            with suppress(Exception):
+                return kind.mutate(content, random)[:most]
+        return bytes(atheris.Mutate(content, most))
+
+    corpus = Path(tempfile.mkdtemp())
+    (corpus / "valid").write_bytes(kind.valid)
+    for function in gc.get_objects():
+        if isinstance(function, FunctionType):
+            package, _, _ = (function.__module__ or "").partition(".")
+            if package in _INSTRUMENTED:
+                atheris.instrument_func(function)
+    atheris.Setup(
+        [sys.argv[0], str(corpus), f"-runs={runs}", f"-max_len={4 * len(kind.valid)}"],
+        lambda content: attack(kind, content),
+        custom_mutator=mutate,
+    )
+    atheris.Fuzz()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

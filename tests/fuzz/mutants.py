@@ -1,0 +1,155 @@
+"""Mutated states: none is taken that a fresh instance could not have reached."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite
+from random import Random
+from typing import Any
+
+from fuzz.reachable import faults, without_checksum
+from support import states
+from support.calls import Draw
+from support.raw import Description, Host, Library, Status, instance
+
+#: Steps of the runs whose states are mutated, and their length [s].
+STEPS, H = 4, 0.02
+
+#: What no state of those runs has, to tell an instance that has taken none.
+_MARK = 123.5
+
+
+class Taken(Exception):
+    """A state that should have been refused, or that did harm."""
+
+
+def reached(library: Library, seed: int) -> list[bytes]:
+    """States that legal calls lead to: one in each mode, one with a refusal."""
+    random = Random(seed)
+    found: list[bytes] = []
+    with instance(library) as host:
+        draw = Draw(random, host.description)
+        found.append(host.content())
+        host.setup(random.choice((0.0, 2.0)))
+        for variable in draw.settable("Real"):
+            if random.random() < 0.5:
+                host.set("Real", [variable.reference], [draw.good_value(variable)])
+        host.enter()
+        found.append(host.content())
+        host.exit()
+        for k in range(STEPS):
+            inputs = host.description.of("input")
+            host.set("Real", [v.reference for v in inputs], [draw.good_value(v) for v in inputs])
+            assert host.step(k * H, H) == Status.OK
+            found.append(host.content())
+        host.get("Real", [len(host.description.variables)])
+        found.append(host.content())
+        host.call("fmi2Terminate")
+        found.append(host.content())
+    return found
+
+
+def _marked(host: Host) -> None:
+    """A run that no other is like."""
+    host.setup(_MARK)
+    for variable in [*host.description.of("input"), *host.description.of("parameter", "Real")][:1]:
+        host.set("Real", [variable.reference], [_MARK])
+    assert host.enter() == host.exit() == host.step(_MARK, H) == Status.OK
+
+
+class Trials:
+    """Mutated states of one FMU, one after the other, on one instance."""
+
+    def __init__(self, host: Host, bases: Sequence[bytes], others: Sequence[bytes]) -> None:
+        self._host, self._bases = host, bases
+        self._lenders = [said for said in map(states.read, [*bases, *others]) if said is not None]
+        self._samples = [said for said in map(without_checksum, bases) if said is not None]
+        _marked(host)
+        self._marked = host.get_state()
+        self._content = states.without_refusals(host.content())
+        self._values = host.values()
+
+    def __call__(self, seed: int) -> None:
+        """Try the mutant of a seed.
+
+        Raises:
+            Taken: it was taken, or did harm.
+
+        """
+        random = Random(seed)
+        self.hold(states.mutant(random.choice(self._bases), random, self._lenders))
+
+    def hold(self, mutant: states.Mutant) -> None:
+        """Hold the instance against a mutant; afterwards it is as it was before.
+
+        Raises:
+            Taken: the mutant was taken, or did harm.
+
+        """
+        try:
+            self._try(mutant.content)
+        except Exception as error:
+            raise Taken(f"{mutant.said}: {type(error).__name__}: {error}") from error
+        finally:
+            assert self._host.set_state(self._marked) == Status.OK
+            assert not self._host.fault()
+
+    def _try(self, content: bytes) -> None:
+        host = self._host
+        status, state = host.deserialised(content)
+        if state is None:
+            assert status == Status.Error, status.name
+        else:
+            assert status == Status.OK, status.name
+            assert host.set_state(state) == Status.OK
+            assert host.free_state(state) == Status.OK
+            values = {**host.values(), "fault": False}
+            if values == {**self._values, "fault": False}:
+                self._check_refused()
+            else:
+                self._check_taken()
+
+    def _check_refused(self) -> None:
+        host = self._host
+        assert states.without_refusals(host.content()) == self._content, "changed, though refused"
+        assert host.fault(), "refused without a fault"
+        assert host.step(_MARK + H, H) == Status.Discard, "a step after a refused state"
+
+    def _check_taken(self) -> None:
+        host = self._host
+        said = without_checksum(host.content())
+        if said is not None:
+            wrong = faults(said, host.description, self._samples)
+            assert not wrong, f"taken with {wrong[0]}"
+            self._check_start(said)
+        for name, value in host.values().items():
+            assert not isinstance(value, float) or isfinite(value), f"taken with {name} = {value}"
+        status = host.step(0.0, self._length(host.description))
+        assert status in (Status.OK, Status.Discard), status.name
+        for name, value in host.values().items():
+            assert not isinstance(value, float) or isfinite(value), f"{name} = {value} after a step"
+
+    def _check_start(self, said: dict[str, Any]) -> None:
+        """Before the first step all follows from what can be set: it is set on a new instance."""
+        mode, description = said["mode"], self._host.description
+        if mode not in ("instantiated", "initialising") or "initialisation" in said["refused"]:
+            return
+        inputs = dict(zip((v.name for v in description.of("input")), said["inputs"], strict=True))
+        with instance(self._host.library) as host:
+            host.setup(said["start_time"])
+            for name, value in {**inputs, **said["parameters"]}.items():
+                variable = description.find(name)
+                value = value.encode() if isinstance(value, str) else value
+                host.set(variable.kind, [variable.reference], [value])
+            if mode == "initialising":
+                host.enter()
+            assert not host.fault(), "taken with values that are refused"
+            made = states.without_refusals(host.content())
+            assert made == states.without_refusals(self._host.content()), (
+                f"taken with another start than its values have ({mode})"
+            )
+
+    def _length(self, description: Description) -> float:
+        """A step of few internal steps, whatever h_max has become."""
+        longest = [v for v in description.variables if v.name == "h_max"]
+        return min([H, *(10.0 * self._host.value(v) for v in longest)])

@@ -1,0 +1,268 @@
+"""Sequences of calls, played on FMUs and held against the model and against a second instance.
+
+The second instance of each gets the good calls alone, and of a call that is good in part the good
+part: whatever was refused, both must be equal bit for bit after every call.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from fuzz.model import Model, keep, slot_of
+from support import states
+from support.calls import Call, Saved, make
+from support.raw import KINDS, Host, Library, Status
+from support.status_table import creations, without_an_instance
+from support.trials import CREATIONS
+
+#: After so many calls the serialised states are compared, too, and in the end.
+STATES_EVERY = 10
+
+#: Calls that make and free instances: the model of a sequence knows them beside the table.
+MAKE, FREE = "fmi2Instantiate", "fmi2FreeInstance"
+
+#: What an instance is made with where nothing is wrong.
+GOOD = "everything as it should be"
+
+#: Calls that the rest of a run depends on, and those that save and free states.
+_MOVING = {
+    *(f"fmi2Set{kind}" for kind in KINDS),
+    "fmi2SetupExperiment",
+    "fmi2EnterInitializationMode",
+    "fmi2ExitInitializationMode",
+    "fmi2Terminate",
+    "fmi2Reset",
+    "fmi2DoStep",
+    "fmi2GetFMUstate",
+    "fmi2SetFMUstate",
+    "fmi2FreeFMUstate",
+}
+
+
+class Action(NamedTuple):
+    """A call on an instance, or on what stands in its place."""
+
+    instance: str
+    call: Call
+    on: str = ""
+
+
+class Calls(NamedTuple):
+    """Actions, and which FMU each instance is of."""
+
+    fmus: Mapping[str, str]
+    actions: Sequence[Action]
+    threads: bool = False
+
+    def shown(self, libraries: Mapping[str, Library]) -> list[str]:
+        """The sequence as lines to be read."""
+        lines = [f"{name}: {fmu}" for name, fmu in self.fmus.items()]
+        if self.threads:
+            lines.append("each instance in a thread of its own")
+        for i, (name, call, on) in enumerate(self.actions):
+            text = call.shown(libraries[self.fmus[name]].description)
+            lines.append(f"{i:4} {name}{f' ({on})' if on else ''}: {text}")
+        return lines
+
+
+class Difference(Exception):
+    """An answer that is not the table's."""
+
+
+@dataclass
+class _Side:
+    """One of the two instances, and the states that were saved of it."""
+
+    host: Host
+    saved: Saved = field(default_factory=Saved)
+
+
+class Pair:
+    """An instance, and the one beside it that gets the good calls alone."""
+
+    def __init__(self, library: Library, saved: Saved, beside: Saved) -> None:
+        self.library = library
+        self.tried, self.beside = _Side(Host(library), saved), _Side(Host(library), beside)
+        self.known = Model(library.description)
+        self.count = 0
+        self.stale: int | None = None
+
+    @property
+    def lives(self) -> bool:
+        return self.tried.host.component is not None
+
+    def make(self, case: str) -> None:
+        made = self.tried.host.instantiate(**CREATIONS[case])
+        if made != creations()[case]:
+            said = [message.text for message in self.tried.host.messages]
+            raise Difference(f"{'an' if made else 'no'} instance with {case}: {said}")
+        if made and not self.beside.host.instantiate():
+            raise Difference("no instance beside it")
+        self.known = Model(self.library.description)
+
+    def free(self) -> None:
+        self.stale = self.tried.host.component
+        for side in (self.tried, self.beside):
+            side.host.free()
+
+    def play_on(self, call: Call, on: str) -> None:
+        """A call on NULL or on the instance that was freed."""
+        host = self.tried.host
+        lives, host.component = host.component, self.stale if on != "NULL" else None
+        try:
+            status = make(host, call, self.tried.saved)
+        finally:
+            host.component = lives
+        if f"fmi2{status.name}" != without_an_instance()[on]:
+            raise Difference(f"{status.name} on {on}")
+
+    def play(self, call: Call, models: dict[str, Model]) -> None:
+        cell = self.known.cell(call)
+        known = self.known.after(call, models)
+        expected = cell.answer.status
+        if cell.answer.name in ("OK", "partly", "new", "restored"):
+            status = self._make_beside(call)
+            if self.known.wild and call.function == "fmi2DoStep":
+                expected = f"fmi2{status.name}"
+                if status != Status.OK:
+                    known = self.known
+            elif status != Status.OK:
+                raise Difference(f"the instance beside it answers {status.name}")
+        try:
+            status = make(self.tried.host, call, self.tried.saved)
+        except AssertionError as error:
+            raise Difference(str(error)) from error
+        if f"fmi2{status.name}" != expected:
+            raise Difference(f"{status.name} in the state {self.known.state}, not {expected}")
+        keep(models, call, self.known)
+        self.known = known
+        self.count += 1
+        self.compare(cell.answer.changes_nothing, self.count % STATES_EVERY == 0)
+
+    def _make_beside(self, call: Call) -> Status:
+        """The good part of a call, if a run depends on it."""
+        side = self.beside
+        if call.function not in _MOVING:
+            return Status.OK
+        if call.function == "fmi2SetFMUstate":
+            return side.host.set_state(side.saved.states[slot_of(call)])
+        if "items" in call.arguments:
+            items = [item for item in call.arguments["items"] if item.good]
+            call = call._replace(arguments={**call.arguments, "items": items})
+        return make(side.host, call, side.saved)
+
+    def compare(self, values: bool, state: bool) -> None:
+        """Hold the two instances against each other; outputs and `fault` always."""
+        tried, beside = self.tried.host, self.beside.host
+        try:
+            if tried.outputs() != beside.outputs():
+                raise Difference("other outputs than without the refused calls")
+            # What overflows without any refused call raises it, too.
+            if tried.fault() != (self.known.fault or beside.fault()):
+                raise Difference(f"fault is {tried.fault()}")
+            if values:
+                ours, theirs = ({**host.values(), "fault": None} for host in (tried, beside))
+                if ours != theirs:
+                    changed = [name for name in ours if ours[name] != theirs[name]]
+                    raise Difference(f"other values than without refused calls: {changed[:5]}")
+            if state:
+                contents = [states.without_refusals(host.content()) for host in (tried, beside)]
+                if contents[0] != contents[1]:
+                    raise Difference("another state than without the refused calls")
+        except AssertionError as error:
+            raise Difference(str(error)) from error
+
+    def applies(self, call: Call) -> bool:
+        """Whether the slots that a call names are there: shrinking may have taken them away."""
+        saved, arguments = self.tried.saved, call.arguments
+        if "freed" in arguments:
+            return arguments["freed"] in saved.freed
+        if call.function == "fmi2GetFMUstate":
+            return not arguments.get("again") or arguments["slot"] in saved.states
+        wanted = arguments.get("slot") or arguments.get("bytes of")
+        return wanted is None or wanted in saved.states
+
+
+def play(sequence: Calls, libraries: Mapping[str, Library]) -> None:
+    """Play a sequence.
+
+    Args:
+        sequence: to be played.
+        libraries: by the names of their FMUs.
+
+    Raises:
+        Difference: an answer is not the table's; says after which action.
+
+    """
+    used = set(sequence.fmus.values())
+    saved, beside = ({fmu: Saved() for fmu in used} for _ in range(2))
+    pairs = {
+        name: Pair(libraries[fmu], saved[fmu], beside[fmu]) for name, fmu in sequence.fmus.items()
+    }
+    models: dict[str, Model] = {}
+    try:
+        if sequence.threads:
+            _play_in_threads(sequence, pairs, models)
+        else:
+            for i, action in enumerate(sequence.actions):
+                _play_one(i, action, pairs, models)
+        for pair in pairs.values():
+            if pair.lives:
+                pair.compare(values=True, state=True)
+    finally:
+        for pair in pairs.values():
+            pair.free()
+
+
+def _play_one(i: int, action: Action, pairs: Mapping[str, Pair], models: dict[str, Model]) -> None:
+    name, call, on = action
+    pair = pairs[name]
+    try:
+        if call.function == MAKE:
+            if not pair.lives:
+                pair.make(call.case)
+        elif on:
+            if on == "NULL" or (pair.stale is not None and not pair.lives):
+                pair.play_on(call, on)
+        elif not pair.lives:
+            pass
+        elif call.function == FREE:
+            pair.compare(values=True, state=True)
+            pair.free()
+            for side in (pair.tried, pair.beside):
+                for slot in [slot for slot in side.saved.states if slot.startswith(f"{name}.")]:
+                    side.saved.freed[slot] = side.saved.states.pop(slot)
+                    models.pop(slot, None)
+        elif pair.applies(call):
+            pair.play(call, models)
+    except Difference as difference:
+        raise Difference(f"after action {i}, {name}: {difference}") from difference
+
+
+def _play_in_threads(sequence: Calls, pairs: Mapping[str, Pair], models: dict[str, Model]) -> None:
+    barrier = threading.Barrier(len(pairs))
+    differences: list[Difference] = []
+
+    def run(name: str) -> None:
+        barrier.wait()
+        try:
+            for i, action in enumerate(sequence.actions):
+                if action.instance == name:
+                    _play_one(i, action, pairs, models)
+        except Difference as difference:
+            differences.append(difference)
+
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)
+    threads = [threading.Thread(target=run, args=(name,)) for name in pairs]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    sys.setswitchinterval(interval)
+    if differences:
+        raise differences[0]

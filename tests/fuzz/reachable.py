@@ -1,0 +1,233 @@
+"""Whether a fresh instance could have reached a state by legal calls with legal values.
+
+Told from modelDescription.xml, from states that runs have led to, and from what the equations keep
+true: independent of the code that restores states. What it finds no fault with may still be out of
+reach; what it finds fault with is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from itertools import chain, pairwise
+from math import hypot, isclose, isfinite
+from typing import Any
+
+from auv_fmu import motion_planner, plant
+from auv_fmu.motion_planner import PlannerState
+from auv_fmu.plant import PlantState
+from fmus.motion_planner.ports import PARAMETERS
+from support import states
+from support.calls import CHOICES
+from support.raw import Description, Variable
+from support.status_table import MODES
+
+#: Rounding of what is 1, or equal, in exact arithmetic.
+TOLERANCE = 1e-9
+
+#: Of the Mersenne Twister that makes noise: words of its state, and one more number, its place.
+_TWISTER, _WORD = 624, 2**32
+
+#: Where the groups eta, nu, y, dy and tau_applied of the plant's outputs begin and end.
+_PLANT_OUTPUTS = (0, 6, 12, 15, 18, 21)
+
+#: random.gauss cannot go further from zero: it takes the logarithm of a number of 53 bits.
+_MOST_SIGMAS = 8.6
+
+
+def faults(said: Any, description: Description, samples: Sequence[dict[str, Any]]) -> list[str]:
+    """What speaks against a state; nothing: it may have been reached.
+
+    Args:
+        said: the state.
+        description: of its FMU.
+        samples: states that runs have led to.
+
+    """
+    if not isinstance(said, dict) or said.keys() != samples[0].keys():
+        return ["other parts than those of a state"]
+    found = [*_faults(said, description, samples)]
+    kept_true = _INVARIANTS.get(description.name)
+    # After an initialisation that was refused, values are others than those the state came from.
+    if found or kept_true is None or said["state"] is None or "initialisation" in said["refused"]:
+        return found
+    return [*kept_true(said)]
+
+
+def _faults(
+    said: dict[str, Any], description: Description, samples: Sequence[dict[str, Any]]
+) -> Iterator[str]:
+    if said["identity"] != samples[0]["identity"]:
+        yield "another component"
+    if said["mode"] not in MODES:
+        yield "no mode"
+    if not _is_number(said["start_time"]):
+        yield "the start time is no number"
+    for key, causality in (("inputs", "input"), ("outputs", "output")):
+        ports, values = description.of(causality, "Real"), said[key]
+        if not isinstance(values, list) or len(values) != len(ports):
+            yield f"other {key}"
+        else:
+            yield from (
+                f"{p.name} = {v!r:.30}"
+                for p, v in zip(ports, values, strict=True)
+                if not _fits(p, v)
+            )
+    parameters = {port.name: port for port in description.of("parameter")}
+    values = said["parameters"]
+    if not isinstance(values, dict) or values.keys() != parameters.keys():
+        yield "other parameters"
+    else:
+        yield from (f"{n} = {v!r:.30}" for n, v in values.items() if not _fits(parameters[n], v))
+    yield from _faults_of_refusals(said)
+    yield from _faults_of_state(said, samples)
+
+
+def _faults_of_refusals(said: dict[str, Any]) -> Iterator[str]:
+    refused = said["refused"]
+    if not isinstance(said["fault"], bool):
+        yield "fault is neither true nor false"
+    if not isinstance(refused, dict) or not all(isinstance(v, str) for v in refused.values()):
+        yield "refusals that are no text"
+    elif refused and said["fault"] is not True:
+        yield "refusals without a fault"
+
+
+def _faults_of_state(said: dict[str, Any], samples: Sequence[dict[str, Any]]) -> Iterator[str]:
+    state = said["state"]
+    if state is None:
+        if said["hidden"] is not None:
+            yield "something hidden without a state"
+        return
+    if said["mode"] == MODES[0]:
+        yield "a state before the initialisation"
+    reached = [sample for sample in samples if sample["state"] is not None]
+    if not any(_alike(state, sample["state"]) for sample in reached):
+        yield "a state of another shape"
+    elif any(not isfinite(x) for x in _numbers(state)):
+        yield "a state that is not finite"
+
+
+def _is_number(value: Any) -> bool:
+    """Whether it is a float, or an integer that is one."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    try:
+        return isfinite(value)
+    except OverflowError:
+        return False
+
+
+def _fits(port: Variable, value: Any) -> bool:
+    if port.kind == "String":
+        return value in CHOICES.get(port.name, (port.start,))
+    if port.kind == "Boolean":
+        return isinstance(value, bool)
+    if port.kind == "Integer" and not isinstance(value, int):
+        return False
+    if not _is_number(value) or (port.kind == "Integer" and not -(2**31) <= value < 2**31):
+        return False
+    low, high = port.minimum, port.maximum
+    return (low is None or low <= value) and (high is None or value <= high)
+
+
+def _alike(value: Any, sample: Any) -> bool:
+    """Whether two values are of the same shape, number for number."""
+    if isinstance(sample, list):
+        return (
+            isinstance(value, list)
+            and len(value) == len(sample)
+            and all(map(_alike, value, sample))
+        )
+    if isinstance(sample, (int, float)) and not isinstance(sample, bool):
+        try:
+            float(value)
+        except (TypeError, ValueError, OverflowError):
+            return False
+        return isinstance(value, (int, float)) and not isinstance(value, bool)
+    return type(value) is type(sample)
+
+
+def _numbers(value: Any) -> Iterator[float]:
+    if isinstance(value, list):
+        for element in value:
+            yield from _numbers(element)
+    else:
+        yield float(value)
+
+
+# What the equations keep true
+
+
+def _near(values: Sequence[float], others: Sequence[float]) -> bool:
+    """Whether values are equal but for the rounding of another machine."""
+    close = partial(isclose, rel_tol=2 * TOLERANCE, abs_tol=2 * TOLERANCE)
+    return all(map(close, values, others))
+
+
+def _is_unit(vector: Sequence[float]) -> bool:
+    return abs(hypot(*vector) - 1.0) <= TOLERANCE
+
+
+def _plant(said: dict[str, Any]) -> Iterator[str]:
+    position, quaternion, nu = said["state"]
+    if not _is_unit(quaternion):
+        yield f"a quaternion that is no unit: {quaternion}"
+        return
+    yield from _generator(said["hidden"])
+    parameters, outputs = said["parameters"], said["outputs"]
+    state = PlantState(position, quaternion, nu)
+    euler, y, dy = plant.outputs(state, parameters["ell"])
+    eta, found_nu, found_y, found_dy, tau = (outputs[i:j] for i, j in pairwise(_PLANT_OUTPUTS))
+    if not _near([*eta, *found_nu, *found_dy], [*position, *euler, *nu, *dy]):
+        yield "outputs that are not those of the state"
+    most = _MOST_SIGMAS * parameters["noise.std"] + TOLERANCE * hypot(*y)
+    if any(abs(measured - true) > most for measured, true in zip(found_y, y, strict=True)):
+        yield "noise that no generator makes"
+    limits = ((parameters[f"tau_min.{k}"], parameters[f"tau_max.{k}"]) for k in "uqr")
+    if not all(low <= value <= high for value, (low, high) in zip(tau, limits, strict=True)):
+        yield "applied forces beyond the limits"
+
+
+def _generator(hidden: Any) -> Iterator[str]:
+    """Random.getstate(): version, words and place, and a number that may be kept for later."""
+    if not isinstance(hidden, list) or len(hidden) != 3:
+        yield "no generator of noise"
+        return
+    version, words, kept = hidden
+    if version != 3 or isinstance(version, (bool, float)):
+        yield "a generator of another version"
+    if not isinstance(words, list) or len(words) != _TWISTER + 1:
+        yield "a generator of another size"
+    elif not all(type(word) is int and 0 <= word < _WORD for word in words):
+        yield "words that are none"
+    elif words[-1] > _TWISTER:
+        yield "a place beyond the generator"
+    elif not any(words[:-1]):
+        yield "a generator that gives zeros"
+    if kept is not None and not _is_number(kept):
+        yield "a number kept that is none"
+
+
+def _planner(said: dict[str, Any]) -> Iterator[str]:
+    position, theta, psi, nu = said["state"]
+    parameters = PARAMETERS.of(said["parameters"])
+    state = PlannerState(tuple(position), theta, psi, tuple(nu))
+    moving = motion_planner.motion(parameters.vehicle, state, parameters.tau_d)
+    reference = motion_planner.reference(state, moving, parameters.ell)
+    if not _near(said["outputs"], [*chain(*reference), *position, theta, psi]):
+        yield "outputs that are not those of the state"
+
+
+_INVARIANTS: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
+    "AuvPlant": _plant,
+    "MotionPlanner": _planner,
+}
+
+
+def without_checksum(content: bytes) -> dict[str, Any] | None:
+    """What a state says, if it is JSON."""
+    said = states.read(content)
+    if said is not None:
+        said.pop(states.CHECKSUM, None)
+    return said

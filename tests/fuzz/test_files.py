@@ -1,0 +1,42 @@
+"""Mutated files in a number that takes seconds; `tests.fuzz.files` makes as many as one likes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from random import Random
+
+import pytest
+
+from fuzz import files
+
+#: Files of each kind.
+RUNS = 25
+
+#: Files for `verify`, whose answers are judged by an oracle.
+TABLES = 200
+
+NAMES = (
+    "description", "fmu", "ssd", "ssv", "ssp", "scenario", "plot", "view", "record", "table",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def kinds() -> Iterator[dict[str, files.Kind]]:
+    with files.prepared() as found:
+        yield found
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_mutated_files_are_taken_or_refused_in_one_line(kinds, name: str):
+    if name not in kinds:
+        pytest.skip("needs plotly")
+    for seed in range(TABLES if name == "table" else RUNS):
+        content = kinds[name].mutate(kinds[name].valid, Random(f"{name} {seed}"))
+        try:
+            files.attack(kinds[name], content)
+        except files.Finding as finding:
+            pytest.fail(f"python -m tests.fuzz.files --only {name} --seed {seed}: {finding}")
+
+
+def test_all_kinds_are_tried(kinds):
+    assert {*kinds} | {"view", "record"} == {*NAMES}

@@ -1,0 +1,201 @@
+"""The fuzzer in CI: few of what it does by the night, and whether it would notice."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+
+from fuzz.model import Model
+from fuzz.mutants import Trials, reached
+from fuzz.player import GOOD, MAKE, Action, Calls
+from fuzz.reachable import faults, without_checksum
+from fuzz.sequences import Finding, Fuzzer, unpacked
+from support import states
+from support.calls import CASES, Call, Draw, Item
+from support.instances import NAMES
+from support.raw import Description, Library, Variable, instance
+from support.worker import Lost, Worker
+
+#: Seeds of CI: those of the night come after them.
+SEQUENCES, STATES = range(200), range(400)
+
+
+@pytest.fixture(scope="module")
+def folders(dist: Path) -> Iterator[dict[str, Path]]:
+    with unpacked([dist / f"{name}.fmu" for name in NAMES]) as found:
+        yield found
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def fuzzer(request: pytest.FixtureRequest, folders: dict[str, Path]) -> Iterator[Fuzzer]:
+    with Fuzzer(folders, request.param) as attacker:
+        yield attacker
+
+
+@pytest.fixture(scope="module")
+def planner(folders: dict[str, Path]) -> Iterator[Fuzzer]:
+    with Fuzzer(folders, "MotionPlanner") as attacker:
+        yield attacker
+
+
+def explained(fuzzer: Fuzzer, kind: str, findings: list[Finding]) -> str:
+    return fuzzer.explained(kind, findings[0]) if findings else ""
+
+
+def test_sequences_are_answered_as_the_table_says(fuzzer: Fuzzer):
+    findings = [f for _, found in fuzzer.attack("sequences", SEQUENCES) for f in found]
+    assert not findings, explained(fuzzer, "sequences", findings)
+
+
+def test_no_state_is_taken_that_cannot_be_reached(fuzzer: Fuzzer):
+    findings = [f for _, found in fuzzer.attack("states", STATES) for f in found]
+    assert not findings, explained(fuzzer, "states", findings)
+
+
+# What it found
+
+
+def state_of_a(change: str | None = None, **arguments: object) -> Call:
+    cases = {None: "a state", "changed": "bytes that were changed"}
+    of = {"slot": "a.s0"} if change is None else {"bytes of": "a.s0", "change": change, "seed": 1}
+    return Call("fmi2SetFMUstate", cases[change], {**of, **arguments})
+
+
+STEP = Call("fmi2DoStep", "a step", {"time": 0.0, "h": 0.02})
+KEEP = Call("fmi2GetFMUstate", "", {"slot": "a.s0"})
+BEGIN = [
+    Call(MAKE, GOOD, {}),
+    Call("fmi2EnterInitializationMode", "", {}),
+    Call("fmi2ExitInitializationMode", "", {}),
+]
+
+
+def of_planner(*calls: Call) -> Calls:
+    return Calls({"a": "MotionPlanner"}, [Action("a", call) for call in calls])
+
+
+def test_state_saved_while_a_refused_state_blocks_blocks_when_it_is_restored(planner: Fuzzer):
+    calls = of_planner(*BEGIN, KEEP, state_of_a("changed"), KEEP, state_of_a(), STEP)
+    assert planner.replay(calls) == ""
+
+
+def test_refused_state_blocks_after_the_state_error(planner: Fuzzer):
+    null = Call("fmi2SetReal", "values NULL, n > 0", {"items": [Item(0, 1.0)], "null": "values"})
+    calls = of_planner(*BEGIN, KEEP, null, STEP, state_of_a("changed"), STEP, state_of_a(), STEP)
+    assert planner.replay(calls) == ""
+
+
+#: Changes of a stepping state that were taken once, by what they change.
+TAKEN_ONCE: dict[str, tuple[list[str], Callable[[dict[str, Any]], None]]] = {
+    "start time too large": (NAMES, lambda said: said.update(start_time=10**400)),
+    "still initialising": (NAMES, lambda said: said.update(mode="initialising")),
+    "outputs before the start": (
+        NAMES, lambda said: said.update(mode="instantiated", state=None, hidden=None)
+    ),
+    "eta": (["AuvPlant"], lambda said: change_output(said, 0, 1.0)),
+    "nu": (["AuvPlant"], lambda said: change_output(said, 9, 1.0)),
+    "y": (["AuvPlant"], lambda said: change_output(said, 14, -2e199)),
+    "tau_applied": (["AuvPlant"], lambda said: change_output(said, 18, 1e6)),
+    "ddy_d": (["MotionPlanner"], lambda said: change_output(said, 7, 1.0)),
+    "damping": (["MotionPlanner"], lambda said: said["parameters"].update(d11=4e11)),
+}  # fmt: skip
+
+
+def change_output(said: dict[str, Any], i: int, more: float) -> None:
+    said["outputs"][i] += more
+
+
+@pytest.mark.parametrize(
+    ("name", "what"), [(name, what) for what, (names, _) in TAKEN_ONCE.items() for name in names]
+)
+def test_state_that_was_taken_once_does_no_harm(folders, name, what):
+    library = Library(folders[name])
+    contents = reached(library, 1)
+    said = next(state for state in map(states.read, contents) if state["mode"] == "stepping")
+    _, change = TAKEN_ONCE[what]
+    change(said)
+    with instance(library) as host:
+        Trials(host, contents, []).hold(states.Mutant(states.sealed(said), what))
+
+
+# Whether it would notice
+
+
+def test_answer_that_is_not_the_tables_is_noticed_and_shrunk(planner: Fuzzer):
+    """A good value where the table speaks of NaN: the FMU takes it, which the model denies."""
+    reference = planner_port(planner).reference
+    wrong = Call("fmi2SetReal", "NaN", {"items": [Item(reference, 5.0, False)]})
+    calls = of_planner(*BEGIN[:1], KEEP, KEEP, wrong, KEEP, *BEGIN[1:], STEP, STEP)
+    assert "fault is False" in planner.replay(calls)
+    shrunk = planner.shrunk(calls)
+    assert [action.call for action in shrunk.actions] == [BEGIN[0], wrong]
+    assert planner.show(shrunk).splitlines()[-1].endswith("tau_d.u=5.0)   # NaN")
+
+
+def planner_port(planner: Fuzzer) -> Variable:
+    return planner.description().find("tau_d.u")
+
+
+def test_seed_gives_the_same_sequence_again(planner: Fuzzer):
+    assert planner.sequence(7) == planner.sequence(7)
+    assert planner.sequence(7) != planner.sequence(8)
+
+
+def doing(task: str) -> Callable[[str], str]:
+    assert task == "harm"
+    return _do
+
+
+def _do(task: str) -> str:
+    if task == "crash":
+        os.abort()
+    if task == "hang":
+        time.sleep(60.0)
+    return task
+
+
+def test_process_that_crashes_or_hangs_is_told_and_replaced():
+    with Worker(doing, "harm") as worker:
+        assert worker.ask("crash", 30.0) == Lost("SIGABRT")
+        assert worker.ask("fine", 30.0) == "fine"
+        hung = worker.ask("hang", 0.5)
+        assert isinstance(hung, Lost) and "hangs" in hung.why
+        assert worker.ask("fine", 30.0) == "fine"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_states_that_were_reached_are_told_from_others(folders: dict[str, Path], name: str):
+    library = Library(folders[name])
+    contents = reached(library, 1)
+    said = [without_checksum(content) for content in contents]
+    samples = [state for state in said if state is not None]
+    assert len(samples) == len(contents)
+    for content, state in zip(contents, samples, strict=True):
+        assert faults(state, library.description, samples) == []
+        assert states.sealed(state) == content, "the checksum is another one"
+    random = Random(1)
+    changed = [states.mutant(random.choice(contents), random, samples) for _ in range(300)]
+    found = [without_checksum(mutant.content) for mutant in changed]
+    assert sum(not faults(state, library.description, samples) for state in found) < 100
+
+
+def test_model_follows_a_run():
+    description = Description("none", "", "", ())
+    known = Model(description)
+    draw = Draw(Random(1), description)
+    for function, mode in (
+        ("fmi2EnterInitializationMode", "initialising"),
+        ("fmi2ExitInitializationMode", "stepping"),
+        ("fmi2Terminate", "terminated"),
+    ):
+        arguments = CASES[function, ""](draw)
+        assert arguments is not None
+        known = known.after(Call(function, "", arguments), {})
+        assert known == replace(Model(description), mode=mode)

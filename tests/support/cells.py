@@ -1,0 +1,291 @@
+"""One cell of docs/status.md held against an FMU: the call, what it changes, what comes after."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from random import Random
+from typing import NamedTuple
+
+from support import states
+from support.calls import CASES, NO_START, OVERFLOWING, Call, Draw, Saved, Setting, make
+from support.raw import Host, Library, Status, Variable, instance
+from support.status_table import ERROR, SOUND, Answer, Cell, Row, rows
+
+#: Step of the trials [s], and how many come before the state stepping is tried.
+H, STEPS = 0.02, 3
+
+#: The rows that need values of their own, by the names of the FMUs that have such values.
+_SETTINGS: Mapping[tuple[str, str], Mapping[str, Setting]] = {
+    ("fmi2DoStep", "values that the equations overflow with"): OVERFLOWING,
+    ("fmi2ExitInitializationMode", "values that give no start"): NO_START,
+    ("fmi2GetReal", "outputs of values that give no start"): NO_START,
+}
+
+_WHILE_REFUSED = "anything, while a refusal is not mended"
+
+
+class Company(NamedTuple):
+    """What there is beside the instance of a trial."""
+
+    other: Host  #: another instance of the same FMU, stepping
+    foreign: bytes  #: a serialised state of another FMU
+
+
+def check(library: Library, key: tuple[str, str], state: str, company: Company) -> bool:
+    """Hold an FMU against a cell.
+
+    Args:
+        library: of the FMU.
+        key: function and case of the row.
+        state: the column.
+        company: of the instance.
+
+    Returns:
+        Whether this FMU has such a call.
+
+    Raises:
+        AssertionError: it answers otherwise.
+
+    """
+    row = rows()[key]
+    cell = row.cells[state]
+    for goes_on in _ways_on(row, cell.answer):
+        with instance(library) as host:
+            trial = Trial(host, company, row, state)
+            if trial.call is None:
+                return False
+            trial.check_call()
+            goes_on(trial)
+    return True
+
+
+def _ways_on(row: Row, answer: Answer) -> list[Callable[[Trial], None]]:
+    """What is tried after the call, each on an instance of its own."""
+    if not (answer.blocks or answer.name == ERROR):
+        return [Trial.check_next_step]
+    ways = [Trial.check_next_step, Trial.check_reset, Trial.check_restored]
+    return [*ways, Trial.check_mended] if row.mended_by and answer.blocks else ways
+
+
+class Trial:
+    """An instance in the state of a cell, and the call that the cell is about."""
+
+    def __init__(self, host: Host, company: Company, row: Row, state: str) -> None:
+        self.host, self.row, self.state = host, row, state
+        self.cell: Cell = row.cells[state]
+        self.mode = "stepping" if state == ERROR else state
+        self.time = 0.0
+        self.setting = _SETTINGS.get(row.key, {}).get(host.description.name)
+        self._reach(state)
+        self.good = host.get_state()
+        freed = host.get_state()
+        self.saved = Saved(
+            {"own": host.get_state(), "other": company.other.get_state()}, {"freed": freed}
+        )
+        assert host.free_state(freed) == Status.OK
+        self.draw = Draw(
+            Random(1), host.description, ["own"], ["other"], ["freed"], company.foreign, self.time
+        )
+        arguments = CASES[row.key](self.draw)
+        self.call = None if arguments is None else Call(*row.key, arguments)
+
+    def _reach(self, state: str) -> None:
+        host = self.host
+        if state == "instantiated":
+            return
+        assert host.setup() == Status.OK
+        if self.setting is not None:
+            self._set(self.setting.at_start)
+        assert host.enter() == Status.OK
+        if state == "initialising":
+            return
+        assert host.exit() == Status.OK
+        for _ in range(STEPS):
+            assert self._step() == Status.OK
+        if state == "terminated":
+            assert host.call("fmi2Terminate") == Status.OK
+        if state == ERROR:
+            assert host.call("fmi2SetReal", None, 1, None) == Status.Error
+
+    def _set(self, values: Mapping[str, float]) -> None:
+        for name, value in values.items():
+            variable = self.host.description.find(name)
+            assert self.host.set(variable.kind, [variable.reference], [value]) == Status.OK
+
+    def _step(self) -> Status:
+        status = self.host.step(self.time, H)
+        if status == Status.OK:
+            self.time += H
+        return status
+
+    def _good_step(self) -> Status:
+        """A step, after a good initialisation if there was none yet."""
+        if self.mode == "instantiated":
+            assert self.host.enter() == Status.OK
+        if self.mode in ("instantiated", "initialising"):
+            assert self.host.exit() == Status.OK
+        self.mode = "stepping"
+        return self._step()
+
+    # The call
+
+    def check_call(self) -> None:
+        host, call, answer = self.host, self.call, self.cell.answer
+        assert call is not None
+        if self.row.case == _WHILE_REFUSED:
+            host.get("Real", [len(host.description.variables)])
+        if answer.name == "restored" and self.state == "stepping":
+            assert self._step() == Status.OK
+        values, content, fault = host.values(), _content(host), host.fault()
+        if self.setting is not None:
+            self._set(self.setting.values)
+        host.messages.clear()
+        status = make(host, call, self.saved)
+        assert f"fmi2{status.name}" == answer.status, f"the status is {status.name}"
+        logged = {f"fmi2{message.status.name}" for message in host.messages}
+        if self.state != ERROR or answer.name != ERROR:
+            assert not answer.message or answer.message in logged, f"messages: {logged or 'none'}"
+        if self.cell.leads_to not in (ERROR, SOUND):
+            self.mode = self.cell.leads_to
+        if answer.name == "restored":
+            self._check_what_is_restored(call)
+        elif answer.name == "new":
+            self._check_as_new()
+        else:
+            assert host.fault() == (answer.raises_fault or fault), f"fault is {host.fault()}"
+            if not self._check_what_is_set(call, values) and answer.changes_nothing:
+                self._check_unchanged(values, content)
+
+    def _check_what_is_set(self, call: Call, before: Mapping[str, object]) -> bool:
+        """Whether the call is one that changes values, and has changed those alone."""
+        if not call.function.startswith("fmi2Set") or "items" not in call.arguments:
+            return False
+        if self.cell.answer.changes_nothing:
+            return False
+        names = {v.reference: v for v in self.host.description.variables}
+        taken = {names[i.reference]: i.value for i in call.arguments["items"] if i.good}
+        after = self.host.values()
+        for variable, value in taken.items():
+            found = after[variable.name]
+            assert _same(variable, found, value), f"{variable.name} is {found}, not {value}"
+        allowed = {variable.name for variable in taken} | {"fault"}
+        if self.state == "initialising":
+            allowed |= {v.name for v in self.host.description.of("output")}
+        changed = {name for name in before if after[name] != before[name]}
+        assert changed <= allowed, f"{sorted(changed - allowed)} changed"
+        return True
+
+    def _check_unchanged(self, values: Mapping[str, object], content: object) -> None:
+        after = self.host.values()
+        changed = {name for name in values if after[name] != values[name]} - {"fault"}
+        if self.setting is not None:
+            changed -= self.setting.values.keys()
+        assert not changed, f"{sorted(changed)} changed"
+        if self.setting is None:
+            assert _content(self.host) == content, "the state has changed"
+
+    def _check_what_is_restored(self, call: Call) -> None:
+        slot = call.arguments.get("slot") or call.arguments["bytes of"]
+        assert self.host.content() == self.host.serialised(self.saved.states[slot])
+        self.mode = "stepping" if slot == "other" or self.state == ERROR else self.state
+
+    def _check_as_new(self) -> None:
+        with instance(self.host.library) as fresh:
+            assert self.host.content() == fresh.content(), "not what a new instance is"
+        self.time = 0.0
+
+    # What comes after it
+
+    def check_next_step(self) -> None:
+        answer = self.cell.answer
+        if self.cell.leads_to == ERROR and answer.name != "restored":
+            self._check_error()
+        elif self.mode == "terminated":
+            assert self._step() == Status.Discard, "a step after the end"
+        elif answer.blocks or answer.name == "blocked":
+            assert self._good_step() == Status.Discard, "a step, though something was refused"
+        else:
+            if self.setting is not None:
+                self._set(self.setting.good)
+            assert self._good_step() == Status.OK, "the next good step is refused"
+
+    def _check_error(self) -> None:
+        host = self.host
+        for what, status in (
+            ("a step", host.step(self.time, H)),
+            ("fmi2SetReal", host.set("Real", [], [])),
+            ("fmi2EnterInitializationMode", host.enter()),
+            ("fmi2Terminate", host.call("fmi2Terminate")),
+        ):
+            assert status == Status.Error, f"{what} is answered {status.name} in the state error"
+        host.values()
+
+    def check_reset(self) -> None:
+        assert self.host.call("fmi2Reset") == Status.OK
+        assert not self.host.fault()
+        self.mode, self.time = "instantiated", 0.0
+        assert self._good_step() == Status.OK, "a step is refused after fmi2Reset"
+
+    def check_restored(self) -> None:
+        assert self.host.set_state(self.good) == Status.OK
+        assert not self.host.fault()
+        self.mode = "stepping" if self.state == ERROR else self.state
+        if self.mode != "terminated":
+            assert self._good_step() == Status.OK, "a step is refused after fmi2SetFMUstate"
+
+    def check_mended(self) -> None:
+        """What the last column names mends where the table takes it."""
+        if self.state == ERROR:
+            return
+        if self.row.mended_by == "a good value":
+            taken = self._set_good_values()
+        elif self.row.function == "fmi2SetupExperiment":
+            assert self.host.setup() == Status.OK
+            taken = _is_taken(("fmi2SetupExperiment", "start"), self.state)
+        else:
+            self.check_restored()
+            return
+        assert self.host.fault()
+        if self.mode != "terminated":
+            expected = Status.OK if taken else Status.Discard
+            assert self._good_step() == expected, f"after {self.row.mended_by}"
+
+    def _set_good_values(self) -> bool:
+        """Whether the table says that they are taken."""
+        assert self.call is not None
+        if self.setting is not None:
+            self._set(self.setting.good)
+            return True
+        taken = True
+        for item in self.call.arguments["items"]:
+            [variable] = [
+                v for v in self.host.description.variables if v.reference == item.reference
+            ]
+            value = self.draw.good_value(variable)
+            value = value.encode() if isinstance(value, str) else value
+            assert self.host.set(variable.kind, [variable.reference], [value]) == Status.OK
+            taken = taken and _is_taken(_row_of(variable), self.state)
+        return taken
+
+
+def _content(host: Host) -> object:
+    """The state, without what tells of refusals; None where it cannot be read."""
+    return states.without_refusals(host.content())
+
+
+def _row_of(variable: Variable) -> tuple[str, str]:
+    """The row about a good value of a port."""
+    if variable.causality == "input":
+        return "fmi2SetReal", "an input"
+    return f"fmi2Set{variable.kind}", f"a {variable.variability} parameter"
+
+
+def _is_taken(key: tuple[str, str], state: str) -> bool:
+    return rows()[key].cells[state].answer.name == "OK"
+
+
+def _same(variable: Variable, found: object, wanted: object) -> bool:
+    if variable.kind == "String":
+        assert isinstance(found, bytes)
+        return found.decode() == wanted
+    return bool(found) == bool(wanted) if variable.kind == "Boolean" else found == wanted

@@ -1,0 +1,307 @@
+"""An FMU's library as a C program calls it: every argument as it is, every status as it comes.
+
+fmpy turns a status into an exception and NULL into an error of its own; here both go through.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from ctypes import (
+    CDLL,
+    byref,
+    c_char_p,
+    c_double,
+    c_int,
+    c_size_t,
+    c_uint,
+    c_void_p,
+    cast,
+    create_string_buffer,
+    string_at,
+)
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+
+from support.raw_fmi import CO_SIMULATION, Callbacks, Logger
+
+
+class Status(IntEnum):
+    """fmi2Status."""
+
+    OK = 0
+    Warning = 1
+    Discard = 2
+    Error = 3
+    Fatal = 4
+
+
+KINDS = ("Real", "Integer", "Boolean", "String")
+TERMINATED_KIND, LAST_SUCCESSFUL_TIME_KIND = 3, 2
+
+#: What every process has: calloc and free.
+_LIBC = CDLL(None)
+
+_C_TYPES = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
+
+
+class Variable(NamedTuple):
+    """A scalar variable, as modelDescription.xml declares it."""
+
+    name: str
+    reference: int
+    kind: str
+    causality: str
+    variability: str
+    start: Any
+    minimum: float | None
+    maximum: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """What modelDescription.xml says. Read here: importing fmpy takes a second a process."""
+
+    name: str
+    guid: str
+    identifier: str
+    variables: tuple[Variable, ...]
+
+    def of(self, causality: str, kind: str | None = None) -> list[Variable]:
+        """The variables of a causality."""
+        return [v for v in self.variables if v.causality == causality and kind in (None, v.kind)]
+
+    @cached_property
+    def names(self) -> dict[tuple[int, str], str]:
+        """By value reference and type."""
+        return {(v.reference, v.kind): v.name for v in self.variables}
+
+    def find(self, name: str) -> Variable:
+        return next(v for v in self.variables if v.name == name)
+
+
+def read_description(folder: Path) -> Description:
+    root = ElementTree.parse(folder / "modelDescription.xml").getroot()
+    implementation = root.find("CoSimulation")
+    assert implementation is not None
+    return Description(
+        root.attrib["modelName"],
+        root.attrib["guid"],
+        implementation.attrib["modelIdentifier"],
+        tuple(_variable(element) for element in root.iterfind("ModelVariables/ScalarVariable")),
+    )
+
+
+def _variable(element: ElementTree.Element) -> Variable:
+    [value] = [child for child in element if child.tag in KINDS]
+    start = value.get("start")
+    convert = {"Real": float, "Integer": int, "Boolean": lambda text: text == "true"}
+    limits = [value.get("min"), value.get("max")]
+    return Variable(
+        element.attrib["name"],
+        int(element.attrib["valueReference"]),
+        value.tag,
+        element.attrib["causality"],
+        element.attrib["variability"],
+        start if start is None or value.tag == "String" else convert[value.tag](start),
+        *(None if limit is None else float(limit) for limit in limits),
+    )
+
+
+class Library:
+    """The functions of an unpacked FMU."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.description = read_description(folder)
+        self.functions = CDLL(
+            str(folder / "binaries" / "linux64" / f"{self.description.identifier}.so")
+        )
+        self.functions.fmi2Instantiate.restype = c_void_p
+        self.functions.fmi2FreeInstance.restype = None
+        self.functions.fmi2GetVersion.restype = c_char_p
+        self.functions.fmi2GetTypesPlatform.restype = c_char_p
+
+    @property
+    def location(self) -> str:
+        return (self.folder / "resources").as_uri()
+
+
+class Message(NamedTuple):
+    """What an FMU has logged."""
+
+    status: Status
+    text: str
+
+
+class _Arrays:
+    """What a get call of the same variables needs, made once."""
+
+    def __init__(self, kind: str, variables: Sequence[Variable]) -> None:
+        self.kind = kind
+        self.names = [variable.name for variable in variables]
+        self.n = c_size_t(len(variables))
+        self.references = (c_uint * len(variables))(*(v.reference for v in variables))
+        self.values = (_C_TYPES[kind] * len(variables))()
+
+
+class Host:
+    """One instance, its callbacks, and the messages it has sent."""
+
+    def __init__(self, library: Library) -> None:
+        self.library = library
+        self.description = library.description
+        self.messages: list[Message] = []
+        self._logger = Logger(self._log)
+        memory = (cast(_LIBC.calloc, c_void_p), cast(_LIBC.free, c_void_p))
+        self.callbacks = Callbacks(self._logger, *memory, None, None)
+        self.component: int | None = None
+        self._arrays = {
+            kind: _Arrays(kind, [v for v in self.description.variables if v.kind == kind])
+            for kind in KINDS
+        }
+        self._fault = self.description.find("fault")
+        self._outputs = _Arrays("Real", self.description.of("output", "Real"))
+
+    def _log(self, _environment: int, _name: bytes, status: int, _category: bytes, text: bytes):
+        self.messages.append(Message(Status(status), (text or b"").decode("utf-8", "replace")))
+
+    def instantiate(
+        self,
+        name: bytes | None = b"raw",
+        kind: int = CO_SIMULATION,
+        guid: bytes | None = b"as declared",
+        location: bytes | None = b"as unpacked",
+        callbacks: str = "all",
+        logging: bool = True,
+    ) -> bool:
+        """Whether there is an instance; the defaults are a good call."""
+        if guid == b"as declared":
+            guid = self.description.guid.encode()
+        if location == b"as unpacked":
+            location = self.library.location.encode()
+        if callbacks == "no logger":
+            self.callbacks.logger = Logger()
+        self.component = self.library.functions.fmi2Instantiate(
+            c_char_p(name),
+            kind,
+            c_char_p(guid),
+            c_char_p(location),
+            None if callbacks == "none" else byref(self.callbacks),
+            0,
+            int(logging),
+        )
+        return self.component is not None
+
+    def free(self) -> None:
+        if self.component is not None:
+            self.library.functions.fmi2FreeInstance(c_void_p(self.component))
+            self.component = None
+
+    def call(self, function: str, *arguments: Any) -> Status:
+        """Call a function on the instance."""
+        return self.call_on(self.component, function, *arguments)
+
+    def call_on(self, component: int | None, function: str, *arguments: Any) -> Status:
+        """Call a function on anything; arguments are what ctypes takes."""
+        return Status(getattr(self.library.functions, function)(c_void_p(component), *arguments))
+
+    # Good calls, in short
+
+    def setup(self, start: float = 0.0) -> Status:
+        return self.call("fmi2SetupExperiment", 0, c_double(0.0), c_double(start), 0, c_double(0.0))
+
+    def enter(self) -> Status:
+        return self.call("fmi2EnterInitializationMode")
+
+    def exit(self) -> Status:
+        return self.call("fmi2ExitInitializationMode")
+
+    def step(self, time: float, h: float) -> Status:
+        return self.call("fmi2DoStep", c_double(time), c_double(h), 1)
+
+    def set(self, kind: str, references: Sequence[int], values: Sequence[Any]) -> Status:
+        n = len(references)
+        return self.call(
+            f"fmi2Set{kind}", (c_uint * n)(*references), c_size_t(n), (_C_TYPES[kind] * n)(*values)
+        )
+
+    def get(self, kind: str, references: Sequence[int]) -> tuple[Status, list[Any]]:
+        n = len(references)
+        values = (_C_TYPES[kind] * n)()
+        status = self.call(f"fmi2Get{kind}", (c_uint * n)(*references), c_size_t(n), values)
+        return status, list(values)
+
+    def value(self, variable: Variable) -> Any:
+        status, [value] = self.get(variable.kind, [variable.reference])
+        assert status == Status.OK, f"{variable.name} cannot be read: {status.name}"
+        return value
+
+    def _read(self, arrays: _Arrays) -> list[Any]:
+        status = self.call(f"fmi2Get{arrays.kind}", arrays.references, arrays.n, arrays.values)
+        assert status == Status.OK, f"values cannot be read: {status.name}"
+        return list(arrays.values)
+
+    def values(self) -> dict[str, Any]:
+        """The values of all ports, by name."""
+        found: dict[str, Any] = {}
+        for arrays in self._arrays.values():
+            if arrays.names:
+                found |= zip(arrays.names, self._read(arrays), strict=True)
+        return found
+
+    def outputs(self) -> list[float]:
+        """The values of the Real outputs, which take least time."""
+        return self._read(self._outputs)
+
+    def fault(self) -> bool:
+        return bool(self.value(self._fault))
+
+    def get_state(self) -> int:
+        state = c_void_p()
+        status = self.call("fmi2GetFMUstate", byref(state))
+        assert status == Status.OK and state.value is not None, f"no state: {status.name}"
+        return state.value
+
+    def set_state(self, state: int | None) -> Status:
+        return self.call("fmi2SetFMUstate", c_void_p(state))
+
+    def free_state(self, state: int) -> Status:
+        return self.call("fmi2FreeFMUstate", byref(c_void_p(state)))
+
+    def serialised(self, state: int) -> bytes:
+        size = c_size_t()
+        status = self.call("fmi2SerializedFMUstateSize", c_void_p(state), byref(size))
+        assert status == Status.OK, f"no size of a state: {status.name}"
+        content = create_string_buffer(size.value)
+        status = self.call("fmi2SerializeFMUstate", c_void_p(state), content, size)
+        assert status == Status.OK, f"a state cannot be serialised: {status.name}"
+        return string_at(content, size.value)
+
+    def deserialised(self, content: bytes) -> tuple[Status, int | None]:
+        state = c_void_p()
+        status = self.call("fmi2DeSerializeFMUstate", content, c_size_t(len(content)), byref(state))
+        return status, state.value
+
+    def content(self) -> bytes:
+        """The serialised state as it is now."""
+        state = self.get_state()
+        try:
+            return self.serialised(state)
+        finally:
+            self.free_state(state)
+
+
+@contextmanager
+def instance(library: Library, **arguments: Any) -> Iterator[Host]:
+    """An instance, freed in the end."""
+    host = Host(library)
+    assert host.instantiate(**arguments), [message.text for message in host.messages]
+    try:
+        yield host
+    finally:
+        host.free()

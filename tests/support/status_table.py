@@ -1,0 +1,121 @@
+"""docs/status.md, read: what an FMU answers to each call in each state."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+from support.markdown import DOCS, Section, sections
+
+PAGE = DOCS / "status.md"
+
+#: Columns of the tables of calls.
+MODES = ("instantiated", "initialising", "stepping", "terminated")
+ERROR = "error"
+STATES = (*MODES, ERROR)
+
+#: What an arrow leads to that ends the state error, whatever was before it.
+SOUND = "sound"
+
+#: Rows that are about no instance: the function that makes one, and what stands in its place.
+CREATION, WITHOUT_AN_INSTANCE = "fmi2Instantiate", "no instance"
+
+_NOT_POSSIBLE = "\u2013"
+
+
+class Answer(NamedTuple):
+    """What becomes of a call: a line of the table of answers."""
+
+    name: str
+    status: str
+    message: str
+    fault: str
+    changes: str
+    afterwards: str
+
+    @property
+    def blocks(self) -> bool:
+        """Whether steps are refused from then on."""
+        return self.fault == "rises" and self.afterwards.startswith("fmi2Discard")
+
+    @property
+    def raises_fault(self) -> bool:
+        return self.fault == "rises"
+
+    @property
+    def changes_nothing(self) -> bool:
+        return self.changes.startswith("nothing")
+
+
+class Cell(NamedTuple):
+    """What a call is answered with in a state, and the state that it leads to."""
+
+    answer: Answer
+    leads_to: str
+
+
+class Row(NamedTuple):
+    """A call with some arguments."""
+
+    function: str
+    case: str
+    cells: dict[str, Cell]
+    mended_by: str
+
+    @property
+    def key(self) -> tuple[str, str]:
+        return self.function, self.case
+
+    def __str__(self) -> str:
+        return f"{self.function}: {self.case}" if self.case else self.function
+
+
+@cache
+def _sections() -> dict[str, Section]:
+    return {section.heading: section for section in sections(PAGE)}
+
+
+@cache
+def answers() -> dict[str, Answer]:
+    return {line[0]: Answer(*line) for line in _sections()["Answers"].rows}
+
+
+@cache
+def rows() -> dict[tuple[str, str], Row]:
+    """All calls on an instance, by function and case."""
+    found: dict[tuple[str, str], Row] = {}
+    for section in _sections().values():
+        if section.header[-1] == "mended by":
+            columns = section.header[2:-1]
+            assert columns == [*STATES], section.heading
+            for function, case, *cells, mended_by in section.rows:
+                row = Row(function, case, _cells(dict(zip(columns, cells, strict=True))), mended_by)
+                assert row.key not in found, f"{row} stands twice"
+                found[row.key] = row
+    return found
+
+
+def _cells(texts: dict[str, str]) -> dict[str, Cell]:
+    return {state: _cell(text, state) for state, text in texts.items() if text != _NOT_POSSIBLE}
+
+
+def _cell(text: str, state: str) -> Cell:
+    name, _, leads_to = (part.strip() for part in text.partition("→"))
+    answer = answers()[name or "OK"]
+    return Cell(answer, leads_to or (ERROR if name == ERROR else state))
+
+
+def creations() -> dict[str, bool]:
+    """Whether fmi2Instantiate gives an instance, by what it is called with."""
+    return {case: answer == "instance" for case, answer in _sections()["Creating an instance"].rows}
+
+
+def without_an_instance() -> dict[str, str]:
+    """The status of any call, by what stands in the place of an instance."""
+    return dict(_sections()["No instance"].rows)
+
+
+def without_the_loader() -> dict[tuple[str, str], str]:
+    """What becomes of calls on FMUs without the native loader, by function and case."""
+    rows = _sections()["Without the native loader"].rows
+    return {(function, case): answer for function, case, answer in rows}

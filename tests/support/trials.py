@@ -1,0 +1,172 @@
+"""The cells of docs/status.md, tried in a process that may crash."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from ctypes import addressof, c_double, c_int, c_void_p
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from support.calls import MANY
+from support.cells import Company, check
+from support.raw import Host, Library, Status, instance
+from support.raw_fmi import MODEL_EXCHANGE
+from support.status_table import (
+    CREATION,
+    WITHOUT_AN_INSTANCE,
+    creations,
+    without_an_instance,
+)
+
+#: A row and a column.
+Cell = tuple[tuple[str, str], str]
+
+SKIPPED = "skipped"
+
+_NOT_UTF_8 = b"ta\xffnh"
+
+#: Arguments of fmi2Instantiate that differ from those of a good call.
+CREATIONS: dict[str, dict[str, Any]] = {
+    "everything as it should be": {},
+    "a name that is empty": {"name": b""},
+    "a name of 100,000 characters": {"name": b"n" * MANY},
+    "a name that is NULL": {"name": None},
+    "a name that is not UTF-8": {"name": _NOT_UTF_8},
+    "the type fmi2ModelExchange": {"kind": MODEL_EXCHANGE},
+    "a GUID that is NULL": {"guid": None},
+    "a GUID that is empty": {"guid": b""},
+    "a GUID of another FMU": {"guid": b"{8c4e810f-3df3-4a00-8276-176fa3c9f9e0}"},
+    "a GUID that is not UTF-8": {"guid": _NOT_UTF_8},
+    "a resource location that is NULL": {"location": None},
+    "a resource location that does not exist": {"location": b"file:///nowhere/to/be/found"},
+    "a resource location that is not UTF-8": {"location": b"file:///" + _NOT_UTF_8},
+    "callbacks that are NULL": {"callbacks": "none"},
+    "callbacks without a logger": {"callbacks": "no logger"},
+    "logging off": {"logging": False},
+}
+
+
+def trials(folder: Path, other: Path) -> Callable[[Cell], str]:
+    """Prepare a process for trials on an FMU.
+
+    Args:
+        folder: of the unpacked FMU.
+        other: of another one.
+
+    Returns:
+        What tells what is wrong with a cell, empty: nothing.
+
+    """
+    library = Library(folder)
+    with instance(Library(other)) as foreign:
+        content = foreign.content()
+    beside = Host(library)
+    assert beside.instantiate()
+    assert beside.setup() == beside.enter() == beside.exit() == Status.OK
+    company = Company(beside, content)
+
+    def trial(cell: Cell) -> str:
+        (function, case), state = cell
+        try:
+            if function == CREATION:
+                _check_creation(library, case)
+            elif function == WITHOUT_AN_INSTANCE:
+                _check_without_an_instance(library, case)
+            elif not check(library, (function, case), state, company):
+                return SKIPPED
+        except Exception as error:  # PythonFMU may leave one behind that is not of this trial.
+            return f"{type(error).__name__}: {error}".splitlines()[0]
+        return ""
+
+    return trial
+
+
+@contextmanager
+def _location(library: Library, case: str) -> Iterator[dict[str, Any]]:
+    """Folders that are not what a resource location should be."""
+    resources = library.folder / "resources"
+    with TemporaryDirectory(prefix="auv_fmu_resources_") as folder:
+        made = Path(folder, "resources")
+        if case == "a resource location that is a plain path":
+            made = resources
+        elif case == "a resource location that is an empty folder":
+            made.mkdir()
+        elif case == "a resource location whose slavemodule.txt is garbage":
+            shutil.copytree(resources, made)
+            (made / "slavemodule.txt").write_bytes(b"\xff\x00/../garbage\n")
+        elif case == "a resource location whose script raises":
+            shutil.copytree(resources, made)
+            (made / "raising.py").write_text("raise RuntimeError('on purpose')\n")
+            (made / "slavemodule.txt").write_text("raising")
+        else:
+            yield CREATIONS[case]
+            return
+        plain = case == "a resource location that is a plain path"
+        yield {"location": str(made).encode() if plain else made.as_uri().encode()}
+
+
+def _check_creation(library: Library, case: str) -> None:
+    host = Host(library)
+    with _location(library, case) as arguments:
+        made = host.instantiate(**arguments)
+    assert made == creations()[case], "an instance" if made else "no instance"
+    if made:
+        assert host.setup() == host.enter() == host.exit() == host.step(0.0, 0.02) == Status.OK
+        host.free()
+    else:
+        said = [message.text for message in host.messages]
+        assert len(said) == 1, f"{len(said)} messages: {said}"
+        assert "\n" not in said[0]
+    with instance(library) as after:
+        assert after.setup() == Status.OK, "no instance can be made any more"
+
+
+#: Every call, with arguments that are good on an instance.
+_CALLS: tuple[tuple[Any, ...], ...] = (
+    ("fmi2SetDebugLogging", 1, 0, None),
+    ("fmi2SetupExperiment", 0, c_double(0.0), c_double(0.0), 0, c_double(0.0)),
+    ("fmi2EnterInitializationMode",),
+    ("fmi2ExitInitializationMode",),
+    ("fmi2Terminate",),
+    ("fmi2Reset",),
+    *((f"fmi2{action}{kind}", None, 0, None)
+      for action in ("Get", "Set") for kind in ("Real", "Integer", "Boolean", "String")),
+    ("fmi2GetFMUstate", (c_double * 1)()),
+    ("fmi2SetFMUstate", None),
+    ("fmi2FreeFMUstate", (c_double * 1)()),
+    ("fmi2SerializedFMUstateSize", None, (c_double * 1)()),
+    ("fmi2SerializeFMUstate", None, (c_double * 1)(), 8),
+    ("fmi2DeSerializeFMUstate", b"{}", 2, (c_double * 1)()),
+    ("fmi2GetDirectionalDerivative", None, 0, None, 0, None, None),
+    ("fmi2SetRealInputDerivatives", None, 0, None, None),
+    ("fmi2GetRealOutputDerivatives", None, 0, None, None),
+    ("fmi2DoStep", c_double(0.0), c_double(0.02), 1),
+    ("fmi2CancelStep",),
+    *((f"fmi2Get{kind}Status", 0, (c_double * 1)())
+      for kind in ("", "Real", "Integer", "Boolean", "String")),
+)  # fmt: skip
+
+
+def _check_without_an_instance(library: Library, case: str) -> None:
+    with instance(library) as witness:
+        assert witness.setup() == Status.OK
+        before = witness.content()
+        target: int | None = None
+        memory = (c_int * 64)()
+        if case == "an instance that was freed":
+            gone = Host(library)
+            assert gone.instantiate()
+            target = gone.component
+            gone.free()
+        elif case == "a pointer to something else":
+            target = addressof(memory)
+        for name, *arguments in _CALLS:
+            status = witness.call_on(target, name, *arguments)
+            assert f"fmi2{status.name}" == without_an_instance()[case], f"{name}: {status.name}"
+        witness.library.functions.fmi2FreeInstance(c_void_p(target))
+        assert list(memory) == [0] * 64
+        assert witness.content() == before
+        assert witness.enter() == Status.OK, "the state of another instance has changed"

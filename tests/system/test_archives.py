@@ -1,0 +1,173 @@
+"""Archives that say what is not done here, hold what they must not, or are none."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.system import unpacking
+from orchestrator.system.component import read_component
+from orchestrator.system.leftovers import process_folder
+from orchestrator.system.ssp.reading import read_ssp
+
+STRUCTURE, DESCRIPTION = "SystemStructure.ssd", "modelDescription.xml"
+
+_SET = (
+    '<ssd:ParameterBindings><ssd:ParameterBinding>{}<ssd:ParameterValues><ssv:ParameterSet '
+    'xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" version="1.0" '
+    'name="a">'
+    '<ssv:Parameters><ssv:Parameter name="m11"><ssv:Real value="26" unit="{}"/></ssv:Parameter>'
+    "</ssv:Parameters></ssv:ParameterSet></ssd:ParameterValues>{}</ssd:ParameterBinding>"
+    "</ssd:ParameterBindings></ssd:Component>"
+)  # fmt: skip
+_MAPPING = (
+    '<ssd:ParameterMapping><ssm:ParameterMapping version="1.0" '
+    'xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping">'
+    '<ssm:MappingEntry source="a" target="b"/></ssm:ParameterMapping></ssd:ParameterMapping>'
+)
+
+
+def entries(archive: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(archive) as content:
+        return {name: content.read(name) for name in content.namelist()}
+
+
+def zipped(path: Path, content: dict[str, bytes]) -> Path:
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, data in content.items():
+            archive.writestr(zipfile.ZipInfo(name), data)
+    return path
+
+
+def edited(source: Path, target: Path, name: str, old: str, new: str) -> Path:
+    """A copy of an archive with one text in one of its files replaced once."""
+    content = entries(source)
+    text = content[name].decode()
+    assert old in text
+    return zipped(target, {**content, name: text.replace(old, new, 1).encode()})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ('endConnector="tau_w.u" />',
+         'endConnector="tau_w.u"><ssc:LinearTransformation factor="2"/></ssd:Connection>',
+         "transformations in connections are not supported"),
+        ("</ssd:Component>", _SET.format("", "kg", _MAPPING), "mappings of parameters"),
+        ("</ssd:Component>", _SET.format("", "t", ""), "plant.m11 is in kg, not in t"),
+        ('startTime="0.0"', 'startTime="5"', "starts later or earlier than 0 s"),
+        ('baseStepSize="0.02"', 'baseStepSize="0_1"', "baseStepSize '0_1' is no number"),
+        ('name="controller" source', 'name="plant" source', "two components are named plant"),
+        ('name="controller" source', 'name="../x" source', "write it without slashes"),
+        ("resources/AuvPlant.fmu", "../AuvPlant.fmu", "holds no '../AuvPlant.fmu'"),
+        ("resources/AuvPlant.fmu", "/etc/passwd", "holds no '/etc/passwd'"),
+        ("resources/AuvPlant.fmu", "resources", "holds no 'resources'"),
+    ],
+)  # fmt: skip
+def test_ssp_that_would_not_be_run_as_it_says_is_refused(dist, tmp_path, old, new, why):
+    archive = edited(dist / "auv.ssp", tmp_path / "edited.ssp", STRUCTURE, old, new)
+    with pytest.raises(InputError, match=re.escape(why)) as error:
+        read_ssp(archive)
+    assert "\n" not in str(error.value)
+
+
+def test_parameter_in_the_unit_of_its_port_is_taken(dist: Path, tmp_path: Path):
+    archive = edited(
+        dist / "auv.ssp", tmp_path / "edited.ssp", STRUCTURE, "</ssd:Component>",
+        _SET.format("", "kg", ""),
+    )  # fmt: skip
+    assert list(read_ssp(archive).parameters.values()) == [26.0]
+
+
+def test_entities_of_a_description_reach_no_file(dist: Path, tmp_path: Path):
+    secret = tmp_path / "secret"
+    secret.write_text("open sesame")
+    archive = edited(
+        dist / "auv.ssp", tmp_path / "edited.ssp", STRUCTURE, "?>",
+        f'?><!DOCTYPE x [<!ENTITY e SYSTEM "{secret.as_uri()}">]><!-- -->',
+    )  # fmt: skip
+    content = entries(archive)
+    text = content[STRUCTURE].decode().replace('name="auv"', 'name="&e;"', 1)
+    with pytest.raises(InputError, match="Entity 'e' not defined"):
+        read_ssp(zipped(archive, {**content, STRUCTURE: text.encode()}))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ('modelIdentifier="AuvPlant"', 'modelIdentifier="../x"', "names no library"),
+        ('name="eta.y"', 'name="eta.x"', "is not unique"),
+        ('fmiVersion="2.0"', 'fmiVersion="7"', "Unsupported FMI version"),
+    ],
+)
+def test_description_that_cannot_be_meant_is_refused(dist, tmp_path, old, new, why):
+    fmu = edited(dist / "AuvPlant.fmu", tmp_path / "edited.fmu", DESCRIPTION, old, new)
+    with pytest.raises(InputError, match=re.escape(why)):
+        read_component("plant", fmu)
+
+
+def test_all_that_is_wrong_with_a_description_is_said(dist: Path, tmp_path: Path):
+    content = entries(dist / "AuvPlant.fmu")
+    text = content[DESCRIPTION].decode().replace('causality="output"', 'causality="outptu"')
+    fmu = zipped(tmp_path / "wrong.fmu", {**content, DESCRIPTION: text.encode()})
+    with pytest.raises(InputError) as error:
+        read_component("plant", fmu)
+    said = str(error.value)
+    assert said.count("'outptu' is not an element of the set") >= 5
+    assert re.search(r"and \d+ lines more", said)
+    assert "\n" not in said
+    assert len(said) < 4000
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        (STRUCTURE, "twice"),
+        (f"./{STRUCTURE}", "twice"),
+        ("../outside", "leads out of it"),
+        ("a/../../outside", "leads out of it"),
+        ("..\\outside", "leads out of it"),
+        ("/outside", "leads out of it"),
+    ],
+)
+def test_archive_that_tools_unpack_differently_is_refused(dist, tmp_path, name, why):
+    archive = tmp_path / "odd.ssp"
+    with zipfile.ZipFile(archive, "w") as content:
+        for entry, data in entries(dist / "auv.ssp").items():
+            content.writestr(zipfile.ZipInfo(entry), data)
+        with pytest.warns() if name == STRUCTURE else pytest.MonkeyPatch.context():
+            content.writestr(zipfile.ZipInfo(name), b"x")
+    with pytest.raises(InputError, match=why):
+        read_ssp(archive)
+
+
+def test_bomb_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A megabyte of zeros, a thousand files, a long description: each beyond a bound set lower."""
+    monkeypatch.setattr(unpacking, "_MOST_BYTES", 500_000)
+    monkeypatch.setattr(unpacking, "_MOST_FILES", 100)
+    monkeypatch.setattr(unpacking, "_MOST_OF_A_DESCRIPTION", 1000)
+    many = {str(i): b"" for i in range(1000)}
+    for content, why in (
+        ({"zeros": bytes(1_000_000)}, "unpacks to more than 500,000 bytes"),
+        (many, "holds 1,000 files, more than 100"),
+        ({DESCRIPTION: bytes(2000)}, "is longer than 1,000 bytes"),
+    ):
+        with pytest.raises(InputError, match=why):
+            unpacking.unpacked(zipped(tmp_path / "bomb.fmu", content))
+
+
+def test_archive_that_cannot_be_unpacked_leaves_nothing(dist: Path, tmp_path: Path):
+    archive = zipped(tmp_path / "a.ssp", entries(dist / "auv.ssp"))
+    content = bytearray(archive.read_bytes())
+    at = content.find(b"PK\x03\x04", 1000) + 200
+    content[at] ^= 0xFF
+    archive.write_bytes(content)
+    place = process_folder()
+    before = {*place.iterdir()}
+    with pytest.raises(InputError, match="Bad CRC-32"):
+        read_ssp(archive)
+    assert {*place.iterdir()} == before

@@ -1,0 +1,413 @@
+"""Disks that are full, folders that may not be written, limits, signals, kills, clocks that jump.
+
+What was computed is kept, what was good stays good, and nothing half-written is taken for whole.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import signal
+import subprocess
+import sys
+import time
+from datetime import datetime, timedelta, tzinfo
+from itertools import count
+from pathlib import Path
+from shutil import rmtree
+
+import numpy as np
+import pytest
+
+from orchestrator import simulate
+from orchestrator.commands.main import main
+from orchestrator.commands.options import INTERRUPTED
+from orchestrator.experiments import record
+from orchestrator.experiments.bundle import current_fmus
+from orchestrator.experiments.stored import read_result
+from orchestrator.master.files import read_rows
+from orchestrator.system.leftovers import claimed
+from support.machine import (
+    called,
+    contents,
+    eventually,
+    is_over,
+    members,
+    small_disk,
+    start,
+    without_privileges,
+)
+
+
+@pytest.fixture(autouse=True)
+def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture(autouse=True)
+def temporary(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder for temporary files of child processes."""
+    folder = tmp_path_factory.mktemp("temporary")
+    current_fmus()
+    monkeypatch.setenv("TMPDIR", str(folder))
+    return folder
+
+
+def rows(folder: Path, ending: str = "csv") -> np.ndarray:
+    return np.vstack(list(read_rows(folder / f"result.{ending}")))
+
+
+def failure(folder: Path) -> str:
+    return str(json.loads((folder / "run.json").read_text())["failure"])
+
+
+RUN = ["run", "fig4", "--no-figures", "--stop-time"]
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_full_disk_ends_a_run_early_and_keeps_the_rows(workplace, capsys, ending):
+    """There is room for some thousand of a million."""
+    if ending == "parquet":
+        pytest.importorskip("pyarrow")
+    with small_disk(workplace / "disk", 14_000_000) as disk:
+        out = ["--out", str(disk / "r"), "--format", ending]
+        assert main([*RUN, "0.1", *out]) == 0
+        before = contents(disk)
+        capsys.readouterr()
+        assert main([*RUN, "20000", *out]) == 1
+        [where, why] = capsys.readouterr().err.splitlines()
+        assert where.endswith("keeps the whole result that was there before")
+        assert why.startswith("auv-fmu: fig4 stopped at t = ")
+        assert why.endswith("No space left on device")
+        after = contents(disk)
+        incomplete = disk / "r" / "incomplete"
+        assert {name: after[name] for name in after if "incomplete" not in name} == before
+        kept = rows(incomplete, ending)
+        assert len(kept) > 1000
+        assert np.array_equal(kept, simulate("fig4", stop_time=(len(kept) - 1) * 0.02).rows)
+        assert read_result(incomplete)[1].failure == why.removeprefix("auv-fmu: fig4 ")
+
+
+@pytest.mark.parametrize("size", [60_000, 150_000, 500_000, 900_000])
+def test_full_disk_at_any_stage(workplace, capsys, size):
+    """The table takes 0.2 MB, figures another 0.9 MB."""
+    with small_disk(workplace / "disk", size) as disk:
+        folder = disk / "r"
+        status = main(["run", "fig4", "--stop-time", "2", "--out", str(folder)])
+        said = capsys.readouterr().err.splitlines()
+        assert len(said) == 1
+        assert "No space left on device" in said[0]
+        if status == 2:
+            # Not even what is taken before the first row.
+            assert contents(disk) == {}
+            return
+        assert status == 1
+        assert failure(folder) in said[0]
+        whole = simulate("fig4", stop_time=2.0).rows
+        kept = rows(folder)
+        assert np.array_equal(kept, whole[: len(kept)])
+        assert len(kept) == len(whole) or size < 300_000
+        names = contents(folder).keys()
+        assert names >= {"run.json", "metrics.json", "result.csv"}
+        assert not [name for name in names if name.startswith(".") or name.endswith("g")]
+
+
+@pytest.mark.parametrize("arguments", [["build"], ["export", "fig4"], ["reference"]])
+def test_full_disk_leaves_what_was_there_and_nothing_else(workplace, capsys, arguments):
+    with small_disk(workplace / "disk", 600_000) as disk:
+        (disk / "r").mkdir()
+        (disk / "r" / "AuvPlant.fmu").write_text("earlier")
+        before = contents(disk)
+        assert main([*arguments, "--out", str(disk / "r")]) == 2
+        [line] = capsys.readouterr().err.splitlines()
+        assert "No space left on device" in line
+        assert contents(disk) == before
+
+
+def test_full_temporary_folder_is_named(workplace):
+    with small_disk(workplace / "disk", 300_000) as disk:
+        status, [line] = called(*RUN, "0.1", environment={"TMPDIR": str(disk)})
+        assert status == 2
+        assert f"cannot be unpacked into {disk}: " in line
+        assert line.endswith("No space left on device; set TMPDIR to another folder")
+        assert list(disk.iterdir()) == []
+
+
+def test_full_cache_is_named_and_left_empty(workplace):
+    with small_disk(workplace / "disk", 300_000) as disk:
+        status, said = called(*RUN, "0.1", environment={"XDG_CACHE_HOME": str(disk)})
+        assert status == 2
+        assert "No space left on device" in said[-1]
+        assert not list(disk.glob("auv-fmu/fmus/*"))
+        assert not list(disk.glob("auv-fmu/fmus/.*"))
+
+
+def test_limit_of_the_size_of_files_is_like_a_full_disk(workplace):
+    """An unpacked FMU has files of 200 kB."""
+    limit = {resource.RLIMIT_FSIZE: 1_000_000}
+    status, [line] = called(*RUN, "20000", limits=limit)
+    assert status == 1
+    assert line.startswith("auv-fmu: fig4 stopped at t = ")
+    assert line.endswith("File too large")
+    kept = rows(workplace / "results" / "fig4")
+    assert np.array_equal(kept, simulate("fig4", stop_time=(len(kept) - 1) * 0.02).rows)
+    assert len(kept) > 500
+
+
+@pytest.mark.parametrize("megabytes", [200, 235])
+def test_short_memory_is_said_and_loses_no_rows(workplace, megabytes):
+    """Python and numpy alone need 150 MB of address space, figures 300."""
+    limit = {resource.RLIMIT_AS: megabytes * 10**6}
+    status, said = called("run", "fig4", "--stop-time", "1", limits=limit)
+    assert status in (1, 2)
+    assert not [line for line in said if "Traceback" in line]
+    if status == 1 and said[-1].startswith("auv-fmu: fig4"):
+        assert len(rows(workplace / "results" / "fig4")) == 51
+        assert failure(workplace / "results" / "fig4") in said[-1]
+
+
+@pytest.mark.parametrize("descriptors", [7, 12])
+def test_few_descriptors(workplace, temporary, descriptors):
+    status, said = called(
+        "run", "fig4", "--stop-time", "0.1", limits={resource.RLIMIT_NOFILE: descriptors}
+    )
+    assert status in (0, 1, 2)
+    assert not [line for line in said if "Traceback" in line], said
+    assert status == 0 or "Too many open files" in said[-1]
+
+
+def test_folders_that_may_not_be_written(workplace):
+    sealed = workplace / "sealed"
+    assert main([*RUN, "0.1", "--out", "sealed/r"]) == 0
+    before = contents(sealed)
+    for path in (sealed, sealed / "r"):
+        path.chmod(0o500)
+    try:
+        for arguments in (
+            [*RUN, "0.1", "--out", "sealed/r"],
+            ["export", "fig4", "--out", "sealed/new"],
+            ["plot", "sealed/r", "--out", "sealed/r/plot.png"],
+        ):
+            status, [line] = called(*arguments, before=without_privileges)
+            assert status == 2
+            assert "Permission denied" in line
+            assert "; choose " in line
+        assert contents(sealed) == before
+        # To look at it needs no more than to read it.
+        status, said = called("plot", "sealed/r", before=without_privileges)
+        assert (status, said) == (0, [])
+    finally:
+        for path in (sealed, sealed / "r"):
+            path.chmod(0o700)
+
+
+def test_home_that_may_not_be_written(workplace):
+    (workplace / "home").mkdir(mode=0o500)
+    home = {"HOME": str(workplace / "home"), "XDG_CACHE_HOME": None, "XDG_CONFIG_HOME": None}
+    status, [line] = called(*RUN, "0.1", environment=home, before=without_privileges)
+    assert status == 2
+    assert line.startswith("auv-fmu: cannot keep FMUs in ")
+    assert line.endswith("set XDG_CACHE_HOME to a folder that can be written")
+
+
+def test_no_home_and_no_temporary_folder(workplace):
+    status, said = called(*RUN, "0.1", environment={"HOME": None, "TMPDIR": "/nonexistent"})
+    assert (status, said) == (0, [])
+
+
+def under_way(folder: Path) -> bool:
+    """Whether rows are on their way into a folder."""
+    return any(path.stat().st_size > 1e5 for path in folder.glob(".unfinished-*/result.csv"))
+
+
+def running() -> subprocess.Popen[str]:
+    """A run of hours that has begun to write rows."""
+    process = start("run", "fig4", "--stop-time", "200000")
+    assert eventually(lambda: under_way(Path("results/fig4"))), process.communicate()[1]
+    return process
+
+
+@pytest.mark.parametrize(
+    "signals",
+    [[signal.SIGTERM], [signal.SIGHUP], [signal.SIGINT] * 5],
+)
+def test_signals_end_a_run_and_lose_nothing(workplace, temporary, signals):
+    process = running()
+    for number in signals:
+        process.send_signal(number)
+        time.sleep(0.05)
+    error = process.communicate(timeout=60)[1]
+    assert process.returncode == 1
+    assert "Traceback" not in error
+    folder = workplace / "results" / "fig4"
+    assert "fig4 interrupted at t = " in error.splitlines()[-1]
+    assert failure(folder).startswith("interrupted at t = ")
+    assert signals[0] == signal.SIGINT or not list(folder.glob("*.png"))
+    kept = rows(folder)
+    assert np.array_equal(kept[:, 0], 0.02 * np.arange(len(kept)))
+    assert not [name for name in contents(folder) if name.startswith(".")]
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_killed_run_leaves_the_earlier_result_as_it_was(workplace):
+    assert main([*RUN, "0.1"]) == 0
+    before = contents(workplace)
+    process = running()
+    process.kill()
+    process.communicate()
+    after = contents(workplace)
+    assert {name: after[name] for name in after if ".unfinished-" not in name} == before
+    assert len(after) > len(before)
+    assert main([*RUN, "0.1"]) == 0
+    assert contents(workplace).keys() == before.keys()
+
+
+HANGING = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+
+class Hanging(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.y = 0.0
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+
+    def do_step(self, t, h):
+        self.y = t + h
+        if t > 9.99:
+            open("hangs", "w").close()
+        while t > 9.99:
+            {hang}
+        return True
+"""
+
+
+@pytest.mark.parametrize(
+    "hang", ["pass", "import ctypes; ctypes.CDLL(None).poll(None, 0, -1)"], ids=["Python", "C"]
+)
+def test_the_third_signal_ends_an_fmu_that_hangs_and_keeps_the_rows(workplace, hang):
+    Path("hanging.py").write_text(HANGING.format(hang=hang))
+    assert main(["build", "hanging.py"]) == 0
+    Path("hanging.toml").write_text('stop_time = 20.0\n[components]\nhanging = "Hanging.fmu"\n')
+    process = start("run", "hanging.toml", "--no-figures")
+    folder = workplace / "results" / "hanging"
+    assert eventually(Path("hangs").exists)
+    for _ in range(3):
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.3)
+    error = process.communicate(timeout=20)[1]
+    assert process.returncode == 1
+    assert "hanging was ended: an FMU did not return from its step" in error.splitlines()[-1]
+    assert "did not return" in failure(folder)
+    kept = rows(folder)
+    assert len(kept) == 501
+
+
+def test_the_end_of_the_terminal_means_nothing_under_nohup(workplace):
+    process = start(*RUN, "5", before=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+    while process.poll() is None:
+        process.send_signal(signal.SIGHUP)
+        time.sleep(0.1)
+    assert process.communicate()[1] == ""
+    assert process.returncode == 0
+    assert len(rows(workplace / "results" / "fig4")) == 251
+
+
+def busy(process: subprocess.Popen[str], temporary: Path) -> bool:
+    """Whether a process has children, which have begun to write temporary files."""
+    return len(members(process.pid)) > 1 and any(temporary.glob("auvfmu-*/*/*"))
+
+
+@pytest.mark.parametrize(
+    ("command", "number"),
+    [
+        ("build", signal.SIGTERM),
+        ("build", signal.SIGKILL),
+        ("report", signal.SIGHUP),
+        ("report", signal.SIGKILL),
+    ],
+)
+def test_children_end_with_their_parent(workplace, temporary, command, number):
+    """And what was good stays good, byte for byte; nothing stays but what the next one removes."""
+    out = workplace / "out"
+    out.mkdir()
+    for name in ("auv.ssp", "report.html", "run.json"):
+        (out / name).write_text("{}")
+    before = contents(out)
+    process = start(command, "--out", str(out))
+    assert eventually(lambda: busy(process, temporary))
+    process.send_signal(number)
+    error = process.communicate(timeout=60)[1]
+    assert is_over(process.pid)
+    assert process.returncode in (-number, 128 + number, INTERRUPTED)
+    assert "Traceback" not in error
+    if number == signal.SIGKILL:
+        # Any command that needs a temporary folder.
+        assert called(*RUN, "0.1", "--out", "other") == (0, [])
+        assert main(["export", "fig4", "--out", str(out)]) == 0
+        (out / "fig4.ssp").unlink()
+    after = contents(out)
+    assert {name: after[name] for name in after if not name.startswith("runs/")} == before
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_folder_that_is_moved_away_ends_the_run_early(workplace):
+    process = running()
+    Path("results/fig4").rename("moved")
+    [line] = process.communicate(timeout=60)[1].splitlines()
+    assert process.returncode == 2
+    [left] = Path("moved").glob(".unfinished-*")
+    assert line == (
+        "auv-fmu: results/fig4 was moved or deleted while it was written, and what was computed "
+        f"went with it, in {left.name}"
+    )
+    assert rows(left)[0, 0] == 0.0
+
+
+def test_a_folder_that_is_deleted_ends_the_run_early(workplace):
+    process = running()
+    while Path("results").exists():
+        rmtree("results", ignore_errors=True)
+    [line] = process.communicate(timeout=60)[1].splitlines()
+    assert process.returncode == 2
+    assert "moved or deleted while it was written" in line
+    assert not Path("results").exists()
+
+
+@pytest.mark.parametrize("command", [["run", "fig4"], ["export", "fig4"], ["build"], ["report"]])
+def test_a_folder_that_another_process_writes_into_is_left_alone(workplace, capsys, command):
+    (workplace / "r").mkdir()
+    with claimed(workplace / "r"):
+        assert main([*command, "--out", "r"]) == 2
+    assert "another run is writing into r; wait for it" in capsys.readouterr().err
+    assert contents(workplace) == {}
+
+
+@pytest.mark.parametrize("hours", [-1000, 1000])
+def test_a_clock_that_jumps_changes_no_duration(workplace, monkeypatch, capsys, hours):
+    """With the bar, which a terminal would show."""
+    jump = iter(3600 * hours * k for k in count())
+    monkeypatch.setattr(time, "time", lambda now=time.time: now() + next(jump))
+    monkeypatch.setattr(record, "datetime", jumping_datetime(hours))
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    begun = time.monotonic()
+    assert main([*RUN, "20"]) == 0
+    taken = time.monotonic() - begun
+    told = json.loads(Path("results/fig4/run.json").read_text())["seconds"]
+    assert 0.0 < told <= taken
+    assert len(rows(workplace / "results" / "fig4")) == 1001
+
+
+def jumping_datetime(hours: float) -> type[datetime]:
+    """Dates of which each is some hours further off."""
+
+    class Jumping(datetime):
+        n = 0
+
+        @classmethod
+        def now(cls, tz: tzinfo | None = None) -> datetime:
+            cls.n += 1
+            return datetime.now(tz) + timedelta(hours=hours * cls.n)
+
+    return Jumping

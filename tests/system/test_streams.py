@@ -1,0 +1,110 @@
+"""Standard streams that are closed, full or without a reader, and Ctrl-C before anything began."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+COMMAND = [sys.executable, "-m", "orchestrator"]
+RUN = ["run", "fig4", "--stop-time", "0.1", "--no-figures", "--out", "o"]
+
+
+def shell(text: str, folder: Path, *, buffered: bool) -> subprocess.CompletedProcess[str]:
+    """A line of a shell, in which `$A` is auv-fmu."""
+    environment = {
+        **os.environ,
+        "A": " ".join(COMMAND),
+        "PYTHONUNBUFFERED": "" if buffered else "1",
+    }
+    return subprocess.run(
+        ["bash", "-c", text], env=environment,
+        cwd=folder, check=False, capture_output=True, text=True,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("buffered", [True, False])
+def test_output_that_cannot_be_written_is_one_line(tmp_path: Path, buffered: bool):
+    process = shell("$A list > /dev/full", tmp_path, buffered=buffered)
+    assert process.returncode == 1
+    assert process.stderr == "auv-fmu: cannot write the output: No space left on device\n"
+
+
+def test_reader_who_has_gone_is_not_told(tmp_path: Path):
+    process = shell("set -o pipefail; $A list | true", tmp_path, buffered=True)
+    assert (process.returncode, process.stderr) == (1, "")
+
+
+def test_complaint_that_cannot_be_written_leaves_the_status(tmp_path: Path):
+    assert shell("$A run nosuch 2> /dev/full", tmp_path, buffered=True).returncode == 2
+    assert shell("$A run nosuch 2>&-", tmp_path, buffered=True).returncode == 2
+
+
+@pytest.mark.parametrize("streams", ["> /dev/full", ">&- 2>&- <&-"])
+def test_run_keeps_its_files_whatever_the_streams(tmp_path: Path, streams: str):
+    """A closed stream's number went to the next file that was opened, and got what was printed."""
+    shell(f"$A {' '.join(RUN)}", tmp_path, buffered=True)
+    whole = (tmp_path / "o/result.csv").read_bytes()
+    shell(f"rm -r o; $A {' '.join(RUN)} {streams}", tmp_path, buffered=True)
+    assert (tmp_path / "o/result.csv").read_bytes() == whole
+    assert (tmp_path / "o/run.json").is_file()
+
+
+_INTERRUPTED = """
+import builtins, os, signal, sys
+imported = builtins.__import__
+def interrupt(name, *arguments):
+    if name == sys.argv[1]:
+        os.kill(os.getpid(), signal.SIGINT)
+    return imported(name, *arguments)
+from orchestrator.commands.main import main
+builtins.__import__ = interrupt
+sys.exit(main(["list"]))
+"""
+
+
+@pytest.mark.parametrize("module", ["argparse", "numpy", "fmpy", "matplotlib", "lxml"])
+def test_ctrl_c_during_imports_is_one_line(module: str):
+    process = subprocess.run(
+        [sys.executable, "-c", _INTERRUPTED, module],
+        check=False, capture_output=True, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    if process.returncode == 0:
+        pytest.skip(f"`list` does not import {module}")
+    assert (process.returncode, process.stdout) == (130, "")
+    assert process.stderr == "auv-fmu: interrupted\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "shown"),
+    [
+        (["run", b"a\nb\x1b[31m.toml"], r"a\nb\x1b[31m.toml: no such file"),
+        (["verify", b"\xff.csv"], r"\udcff.csv: no such file"),
+        (["run", "fig4", "--set", b"controller.saturation=\xff"], r"= \udcff: not a text in UTF-8"),
+        (["run", "fig4", "--set", b"plant.m11=\xff"], r"= \udcff: not a real number"),
+        (["run", "fig4", "--set", b"pl\nant.m11=1"], r"no component 'pl\nant'"),
+        (["run", b"fig\xff4"], r"no scenario 'fig\udcff4'"),
+    ],
+)
+def test_names_of_any_bytes_are_shown_in_one_line(tmp_path: Path, arguments, shown):
+    process = subprocess.run(
+        [*COMMAND, *arguments], cwd=tmp_path, check=False, capture_output=True, text=True
+    )
+    assert process.returncode == 2
+    assert shown in process.stderr
+    assert process.stderr.count("\n") == 1
+
+
+def test_folder_of_any_name_takes_a_result(tmp_path: Path):
+    name = b"o\xff\n\x1b"
+    process = subprocess.run(
+        [*COMMAND, *RUN[:-1], name], cwd=tmp_path, check=False, capture_output=True, text=True
+    )
+    assert (process.returncode, process.stderr) == (0, "")
+    assert process.stdout.endswith("written to o\\udcff\\n\\x1b/\n")
+    assert os.path.exists(os.path.join(os.fsencode(tmp_path), name, b"run.json"))  # noqa: PTH110, PTH118

@@ -1,0 +1,70 @@
+"""What killed processes leave is told from what others still work on."""
+
+from __future__ import annotations
+
+import os
+import signal
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from orchestrator.system import leftovers
+from orchestrator.system.leftovers import claimed, process_folder, remove_left
+from support.machine import ended, eventually, forked
+
+
+def hold(path: Path) -> int:
+    """A process that works on a file until it is killed."""
+
+    def work() -> None:
+        with claimed(path):
+            path.with_suffix(".held").touch()
+            signal.pause()
+
+    pid = forked(work)
+    assert eventually(path.with_suffix(".held").exists)
+    return pid
+
+
+def test_what_another_process_holds_stays_until_it_is_killed(tmp_path: Path):
+    held, left, folder = (tmp_path / f".partial-{name}" for name in ("a", "b", "c"))
+    held.write_text("half")
+    left.write_text("half")
+    (folder / "deep").mkdir(parents=True)
+    pid = hold(held)
+    remove_left(tmp_path, ".partial-[abc]")
+    assert held.exists()
+    assert not left.exists()
+    assert not folder.exists()
+    with pytest.raises(BlockingIOError), claimed(held):
+        pass
+    os.kill(pid, signal.SIGKILL)
+    ended(pid)
+    remove_left(tmp_path, ".partial-[abc]")
+    assert not held.exists()
+
+
+def test_a_link_leads_nowhere(tmp_path: Path):
+    """A temporary folder is everybody's."""
+    precious = tmp_path / "precious"
+    precious.mkdir()
+    (precious / "file").write_text("mine")
+    (tmp_path / "auvfmu-planted").symlink_to(precious)
+    remove_left(tmp_path, "auvfmu-*")
+    assert (precious / "file").read_text() == "mine"
+
+
+def test_temporary_folders_of_killed_processes_go_with_the_next(tmp_path: Path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+
+    def work() -> None:
+        leftovers._process_folder.cache_clear()
+        (process_folder() / "unpacked").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    assert ended(forked(work)) == -signal.SIGKILL
+    [first] = tmp_path.iterdir()
+    assert ended(forked(work)) == -signal.SIGKILL
+    [second] = tmp_path.iterdir()
+    assert second != first
