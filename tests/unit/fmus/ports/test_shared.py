@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from runpy import run_module
+from runpy import run_path
 
 from auv_fmu.vehicle import Vehicle
+from fmus.ports import vehicle
 from fmus.ports.controllers import command
 from fmus.ports.port import Port, inputs
 
@@ -18,7 +19,7 @@ UNITS = {
 
 
 def test_parameters_of_equation_2_are_declared_with_their_units_and_bounds():
-    declared = run_module("fmus.ports.vehicle", run_name="fmus.ports.vehicle")["VEHICLE"]
+    declared = run_path(vehicle.__file__, run_name=vehicle.__name__)["VEHICLE"]
     ports = {port.name: port for port in declared.ports}
     assert {name: port.unit for name, port in ports.items()} == UNITS
     assert declared.of({name: port.start for name, port in ports.items()}) == Vehicle()
