@@ -72,9 +72,10 @@ def with_empty_steps(system: System, steps: int) -> float:
 def master_alone(system: System, steps: int) -> float:
     """Seconds of the steps when no FMI function is called in them."""
 
-    def nothing(*_: object) -> None: ...
+    def nothing(*_: object) -> int:
+        return 0
 
-    calls = Member([nothing], nothing, [nothing])
+    calls = Member([nothing], nothing, [nothing], lambda *_: RuntimeError())
     with patch("orchestrator.master.schedule._member", lambda _: calls):
         return loop_time(system, steps)
 

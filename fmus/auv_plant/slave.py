@@ -8,8 +8,9 @@ from typing import Any, NamedTuple, TypedDict
 
 from auv_fmu import plant
 from auv_fmu.actuators import limit_all
+from auv_fmu.attitude import rotation_from_quaternion
 from auv_fmu.plant import PlantState
-from auv_fmu.types import Vector3, Vector6
+from auv_fmu.types import Rotation, Vector3, Vector6
 from fmus.auv_plant.ports import PARAMETERS, PORTS, Parameters
 from fmus.ports.groups import slices
 from fmus.ports.port import Refusal
@@ -56,21 +57,31 @@ class AuvPlant(Component[PlantState, Inputs, Outputs, Parameters]):
             if not tau_min < tau_max:
                 raise Refusal(f"tau_min.{k} = {tau_min:g} must be below tau_max.{k} = {tau_max:g}")
 
+    #: The state that was seen last and its attitude, which the next step needs again.
+    _moved: PlantState | None = None
+    _rotation: Rotation
+
     def begin(self, inputs: Inputs, t: float) -> tuple[PlantState, Outputs]:
         chosen = self.parameters
         self._random = plant.white_noise(chosen.noise.seed)
         x, y, z, phi, theta, psi = chosen.eta0
         state = plant.initial_state((x, y, z), (phi, theta, psi), chosen.nu0)
-        return state, _seen(chosen, state, _limited(chosen, inputs.tau))
+        rotation = rotation_from_quaternion(state.quaternion)
+        return state, _seen(chosen, state, rotation, _limited(chosen, inputs.tau))
 
     def advance(
         self, state: PlantState, inputs: Inputs, t: float, h: float, n: int
     ) -> tuple[PlantState, Outputs]:
         chosen = self.parameters
         tau = _limited(chosen, inputs.tau)
+        rotation = (
+            self._rotation if state is self._moved else rotation_from_quaternion(state.quaternion)
+        )
         for _ in range(n):
-            state = plant.step(chosen.vehicle, chosen.roll, state, tau, inputs.tau_w, h)
-        return state, _seen(chosen, state, tau)
+            state = plant.step(chosen.vehicle, chosen.roll, state, rotation, tau, inputs.tau_w, h)
+            rotation = rotation_from_quaternion(state.quaternion)
+        self._moved, self._rotation = state, rotation
+        return state, _seen(chosen, state, rotation, tau)
 
     def sample(self, values: list[float]) -> Vector3:
         gauss = self._random.gauss
@@ -83,7 +94,8 @@ class AuvPlant(Component[PlantState, Inputs, Outputs, Parameters]):
         if not isclose(hypot(*state.quaternion), 1.0, rel_tol=_ROUNDING):
             raise Refusal("its quaternion is not of length one")
         u, q, r = outputs[_TAU_APPLIED]
-        seen = self._pack(_seen(parameters, state, _limited(parameters, (u, q, r))))
+        rotation = rotation_from_quaternion(state.quaternion)
+        seen = self._pack(_seen(parameters, state, rotation, _limited(parameters, (u, q, r))))
         most = _MOST_DEVIATIONS * parameters.noise.std
         seen[_Y] = [b + min(max(a - b, -most), most) for a, b in zip(outputs[_Y], seen[_Y])]
         if not nearly_equal(seen, outputs):
@@ -108,8 +120,8 @@ def _limited(chosen: Parameters, tau: Vector3) -> Vector3:
     return limit_all(tau, chosen.limits.tau_min, chosen.limits.tau_max)
 
 
-def _seen(chosen: Parameters, state: PlantState, tau: Vector3) -> Outputs:
-    euler, y, dy = plant.outputs(state, chosen.ell)
+def _seen(chosen: Parameters, state: PlantState, rotation: Rotation, tau: Vector3) -> Outputs:
+    euler, y, dy = plant.outputs(state, rotation, chosen.ell)
     return {
         "eta": (*state.position, *euler),
         "nu": state.nu,

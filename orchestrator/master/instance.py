@@ -46,15 +46,19 @@ class Instance(Protocol):
 
     In every step the calls of `set_inputs`, then `do_step` with time and step size, then those of
     `get_outputs` are made; those of `get_outputs` once all components of a stage have been stepped.
+    Each returns FMI's status: `failed` is for one that is worse than a warning.
     """
 
     name: str
-    set_inputs: list[Callable[[], Any]]
-    get_outputs: list[Callable[[], Any]]
+    set_inputs: list[Callable[[], int]]
+    get_outputs: list[Callable[[], int]]
 
     @property
-    def do_step(self) -> Callable[[float, float, int], Any]:
+    def do_step(self) -> Callable[[float, float, int], int]:
         """FMI's doStep, to be called with time, step size and one."""
+
+    def failed(self, status: int, function: str) -> ComponentFailed:
+        """What to raise after a call that has ended with a status."""
 
     def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
         """Say where its values are: a view of the row, with the inputs first, and its parts."""

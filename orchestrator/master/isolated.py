@@ -113,8 +113,8 @@ class IsolatedInstance:
 
         """
         self.name = component.name
-        self.set_inputs: list[Callable[[], Any]] = []
-        self.get_outputs: list[Callable[[], Any]] = [self._take_outputs]
+        self.set_inputs: list[Callable[[], int]] = []
+        self.get_outputs: list[Callable[[], int]] = [self._take_outputs]
         self._status, self._log = status, log
         self._timeout, self._interrupts = timeout, interrupts
         self._doing, self._hangs = "start", False
@@ -161,7 +161,11 @@ class IsolatedInstance:
             raise self._nonsense()
         return values
 
-    def do_step(self, t: float, h: float, _: int) -> None:
+    def failed(self, status: int, function: str) -> ComponentFailed:
+        """What to raise after a call that has ended with a status; its own calls raise at once."""
+        return ComponentFailed(f"{self.name}: {function} ended with status {status}")
+
+    def do_step(self, t: float, h: float, _: int) -> int:
         """Have a step begun, whose end the first of `get_outputs` waits for."""
         outgoing = self._channel.outgoing
         outgoing[0] = t
@@ -169,6 +173,7 @@ class IsolatedInstance:
         outgoing[2:] = self._inputs
         self._doing = "doStep"
         self._send()
+        return 0
 
     def terminate(self) -> None:
         """Let the FMU end what it has begun, free it, and end its process."""
@@ -195,9 +200,10 @@ class IsolatedInstance:
         if not self._hangs:
             self._status(min(self._timeout, _FAREWELL))
 
-    def _take_outputs(self) -> None:
+    def _take_outputs(self) -> int:
         self._receive()
         self._outputs[:] = self._channel.incoming
+        return 0
 
     def _ask(self, call: str, *arguments: Any) -> Any:
         self._doing = call

@@ -108,8 +108,8 @@ class LoadedInstance:
 
         """
         self.name = component.name
-        self.set_inputs: list[Callable[[], Any]] = []
-        self.get_outputs: list[Callable[[], Any]] = []
+        self.set_inputs: list[Callable[[], int]] = []
+        self.get_outputs: list[Callable[[], int]] = []
         self._variables = component.variables
         self._library = library
         self._listener = listener
@@ -139,14 +139,8 @@ class LoadedInstance:
             types: of its arguments; None: they come as values of ctypes.
 
         """
-
-        def checked(status: int, called: Any, _: Any) -> int:
-            if status > fmi2Warning:
-                raise self._failed(FMICallException(function=called.__name__, status=status))
-            return status
-
         called = self._fmu.dll[f"fmi2{name}"]
-        called.argtypes, called.restype, called.errcheck = types, fmi2Status, checked
+        called.argtypes, called.restype = types, fmi2Status
         return partial(called, fmi2Component(self._fmu.component))
 
     def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
@@ -173,7 +167,8 @@ class LoadedInstance:
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
         for call in (*self.set_inputs, *self.get_outputs):
-            call()
+            if (status := call()) > fmi2Warning:
+                raise self.failed(status, "exchanging values")
 
     def parameters(self) -> dict[str, Any]:
         """Values of all parameters, as the FMU reports them."""
@@ -216,6 +211,10 @@ class LoadedInstance:
             return getattr(self._fmu, method)(*arguments, **named)
         except FMICallException as error:
             raise self._failed(error) from error
+
+    def failed(self, status: int, function: str) -> ComponentFailed:
+        """What to raise after a call that has ended with a status."""
+        return self._failed(FMICallException(function=function, status=status))
 
     def _failed(self, error: FMICallException) -> ComponentFailed:
         fatal = error.status == fmi2Fatal

@@ -12,7 +12,7 @@ outputs of a component are read as soon as it was stepped.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,9 +25,10 @@ from orchestrator.system.structure import Connection, System
 class Member(NamedTuple):
     """The calls that step one component."""
 
-    set_inputs: list[Callable[[], Any]]
-    do_step: Callable[[float, float, int], Any]
-    get_outputs: list[Callable[[], Any]]
+    set_inputs: list[Callable[[], int]]
+    do_step: Callable[[float, float, int], int]
+    get_outputs: list[Callable[[], int]]
+    failed: Callable[[int, str], Exception]
 
 
 class Stage(NamedTuple):
@@ -73,4 +74,4 @@ def schedule(
 
 
 def _member(instance: Instance) -> Member:
-    return Member(instance.set_inputs, instance.do_step, instance.get_outputs)
+    return Member(instance.set_inputs, instance.do_step, instance.get_outputs, instance.failed)

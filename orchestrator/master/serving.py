@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
+from fmpy.fmi2 import fmi2Warning
 
 from orchestrator.errors import InputError, reason
 from orchestrator.master.channel import Channel, sizes
@@ -75,11 +76,11 @@ class _Served:
     def _step(self) -> None:
         t, h = self._channel.incoming[:2]
         instance = self._instance
-        for call in instance.set_inputs:
-            call()
-        instance.do_step(t, h, 1)
-        for call in instance.get_outputs:
-            call()
+        calls: tuple[Callable[[], int], ...]
+        calls = (*instance.set_inputs, partial(instance.do_step, t, h, 1), *instance.get_outputs)
+        for call in calls:
+            if (status := call()) > fmi2Warning:
+                raise instance.failed(status, "fmi2DoStep")
 
     def _answered(self, call: Callable[[], Any]) -> bool:
         note: dict[str, Any] = {}

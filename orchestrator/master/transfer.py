@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from ctypes import c_size_t
 from functools import partial
-from typing import Any
 
 import numpy as np
 from fmpy.fmi2 import fmi2Boolean, fmi2Integer, fmi2Real, fmi2ValueReference
@@ -42,31 +41,32 @@ class Block:
             self._values = (c_type * n)()
             self._integers = np.frombuffer(self._values, dtype=np.intc)
 
-    def setter(self, function: Callable[[str], Callable[..., Any]]) -> Callable[[], Any]:
+    def setter(self, function: Callable[[str], Callable[..., int]]) -> Callable[[], int]:
         """A call that hands the values to the FMU, one of whose functions have these names."""
         call = self._call(function, "Set")
         if self._kind == "Real":
             return call
 
-        def set_converted() -> None:
+        def set_converted() -> int:
             self._integers[:] = self._row
-            call()
+            return call()
 
         return set_converted
 
-    def getter(self, function: Callable[[str], Callable[..., Any]]) -> Callable[[], Any]:
+    def getter(self, function: Callable[[str], Callable[..., int]]) -> Callable[[], int]:
         """A call that takes the values from the FMU."""
         call = self._call(function, "Get")
         if self._kind == "Real":
             return call
 
-        def get_converted() -> None:
-            call()
+        def get_converted() -> int:
+            status = call()
             self._row[:] = self._integers
+            return status
 
         return get_converted
 
     def _call(
-        self, function: Callable[[str], Callable[..., Any]], action: str
-    ) -> Callable[[], Any]:
+        self, function: Callable[[str], Callable[..., int]], action: str
+    ) -> Callable[[], int]:
         return partial(function(f"{action}{self._kind}"), self._references, self._n, self._values)

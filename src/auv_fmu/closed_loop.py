@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from auv_fmu import motion_planner, output_feedback, plant
 from auv_fmu.actuators import Limits, limit_all
+from auv_fmu.attitude import rotation_from_quaternion
 from auv_fmu.disturbance import Disturbance, disturbance
 from auv_fmu.euler import STEP
 from auv_fmu.motion_planner import ETA_D0, TAU_D, PlannerState, Reference
@@ -73,7 +74,8 @@ def closed_loop(steps: int, setting: Setting = PAPER) -> Iterator[Instant]:
     state = plant.initial_state(setting.eta_0[:3], setting.eta_0[3:], setting.nu_0)
     planned = motion_planner.initial_state(setting.eta_d0)
     for k in range(steps + 1):
-        seen = plant.outputs(state, gains.ell)
+        rotation = rotation_from_quaternion(state.quaternion)
+        seen = plant.outputs(state, rotation, gains.ell)
         y = plant.measure(seen.y, (gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)), std)
         moving = motion_planner.motion(vehicle, planned, tau_d)
         reference = motion_planner.reference(planned, moving, gains.ell)
@@ -88,5 +90,5 @@ def closed_loop(steps: int, setting: Setting = PAPER) -> Iterator[Instant]:
             k * h, state, seen, planned, reference, measurement, control, signals, tau, tau_w
         )
         control = output_feedback.step(control, signals, h)
-        state = plant.step(vehicle, roll, state, tau, tau_w, h)
+        state = plant.step(vehicle, roll, state, rotation, tau, tau_w, h)
         planned = motion_planner.step(planned, moving, h)

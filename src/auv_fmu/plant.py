@@ -17,7 +17,6 @@ from auv_fmu.attitude import (
     quaternion_from_euler,
     quaternion_rates,
     rotate,
-    rotation_from_quaternion,
 )
 from auv_fmu.control_point import control_point, control_point_velocity
 from auv_fmu.types import Rotation, Vector3, Vector4, Vector6
@@ -111,20 +110,26 @@ def accelerations_6dof(
 
 
 def step(
-    vehicle: Vehicle, roll: RollAxis, state: PlantState, tau: Vector3, tau_w: Vector6, h: float
+    vehicle: Vehicle,
+    roll: RollAxis,
+    state: PlantState,
+    rotation: Rotation,
+    tau: Vector3,
+    tau_w: Vector6,
+    h: float,
 ) -> PlantState:
     """One Euler step of the vehicle under held inputs.
 
     Args:
         vehicle, roll: parameters.
         state: at the beginning of the step.
+        rotation: body to earth, of its quaternion; its outputs need it too.
         tau: applied (tau_u, tau_q, tau_r), after the limits of (3) [N, N.m].
         tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
         h: step [s].
 
     """
     (x, y, z), quaternion, nu = state
-    rotation = rotation_from_quaternion(quaternion)
     u, v, w, p, q, r = nu
     du, dv, dw, dp, dq, dr = accelerations_6dof(vehicle, roll, nu, rotation, tau, tau_w)
     dx, dy, dz = rotate(rotation, (u, v, w))
@@ -137,16 +142,16 @@ def step(
     )
 
 
-def outputs(state: PlantState, ell: float) -> PlantOutputs:
+def outputs(state: PlantState, rotation: Rotation, ell: float) -> PlantOutputs:
     """Euler angles, control point (9) and its velocity (10).
 
     Args:
         state: of the vehicle.
+        rotation: body to earth, of its quaternion.
         ell: distance of the control point [m].
 
     """
-    position, quaternion, nu = state
-    rotation = rotation_from_quaternion(quaternion)
+    position, _, nu = state
     return PlantOutputs(
         euler_from_rotation(rotation),
         control_point(position, rotation, ell),

@@ -14,6 +14,7 @@ from math import hypot, isclose, isfinite
 from typing import Any
 
 from auv_fmu import motion_planner, plant
+from auv_fmu.attitude import rotation_from_quaternion
 from auv_fmu.motion_planner import PlannerState
 from auv_fmu.plant import PlantState
 from fmus.motion_planner.ports import PARAMETERS
@@ -177,7 +178,7 @@ def _plant(said: dict[str, Any]) -> Iterator[str]:
     yield from _generator(said["hidden"])
     parameters, outputs = said["parameters"], said["outputs"]
     state = PlantState(position, quaternion, nu)
-    euler, y, dy = plant.outputs(state, parameters["ell"])
+    euler, y, dy = plant.outputs(state, rotation_from_quaternion(quaternion), parameters["ell"])
     eta, found_nu, found_y, found_dy, tau = (outputs[i:j] for i, j in pairwise(_PLANT_OUTPUTS))
     if not _near([*eta, *found_nu, *found_dy], [*position, *euler, *nu, *dy]):
         yield "outputs that are not those of the state"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from auv_fmu.attitude import rotation_from_euler
+from auv_fmu.attitude import rotation_from_euler, rotation_from_quaternion
 from auv_fmu.control_point import (
     actuated_velocity,
     actuator_command,
@@ -87,9 +87,11 @@ def test_velocity_is_the_derivative_of_the_position_of_a_rolling_vehicle():
     """(10) with the full rotation against a central difference of (9) along a motion."""
     nu, h = (0.8, -0.3, 0.2, 0.7, -0.5, 0.9), 1e-5
     state = initial_state((1.0, 2.0, 3.0), (0.9, -0.6, 2.0), nu)
-    after, before = (
-        outputs(step(Vehicle(), RollAxis(), state, (0.0,) * 3, (0.0,) * 6, dt), 0.35).y
-        for dt in (h, -h)
-    )
-    difference = np.subtract(after, before) / (2 * h)
-    np.testing.assert_allclose(outputs(state, 0.35).dy, difference, atol=1e-8)
+    rotation = rotation_from_quaternion(state.quaternion)
+
+    def moved_y(dt):
+        moved = step(Vehicle(), RollAxis(), state, rotation, (0.0,) * 3, (0.0,) * 6, dt)
+        return outputs(moved, rotation_from_quaternion(moved.quaternion), 0.35).y
+
+    difference = np.subtract(moved_y(h), moved_y(-h)) / (2 * h)
+    np.testing.assert_allclose(outputs(state, rotation, 0.35).dy, difference, atol=1e-8)
