@@ -22,8 +22,10 @@ settings.register_profile(
     phases=[Phase.explicit, Phase.generate],
 )
 
-# Where a shell has started the tests in the background, it has them ignore Ctrl-C.
+# Where a shell has started the tests in the background, or nohup has, they ignore signals, and so
+# does all that they start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 @pytest.fixture(scope="session", autouse=True)

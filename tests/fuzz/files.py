@@ -315,6 +315,7 @@ def prepared() -> Iterator[dict[str, Kind]]:
     with tempfile.TemporaryDirectory(prefix="mutated-files-") as folder:
         # Temporary files go into a folder of their own, so that writing beside it is seen.
         tempfile.tempdir, sys.dont_write_bytecode = folder, True
+        _unpacked.cache_clear()
         _process_folder.cache_clear()
         try:
             runs = {order: simulate("fig4", stop_time=RECORDED, order=order) for order in ORDERS}

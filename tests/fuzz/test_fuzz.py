@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -148,21 +146,17 @@ def test_seed_gives_the_same_sequence_again(planner: Fuzzer):
     assert planner.sequence(7) != planner.sequence(8)
 
 
-def doing(task: str) -> Callable[[str], str]:
-    assert task == "harm"
-    return _do
-
-
-def _do(task: str) -> str:
-    if task == "crash":
-        os.abort()
-    if task == "hang":
-        time.sleep(60.0)
-    return task
+#: What a process does with the tasks of the next test. As text: a process of its own cannot import
+#: what stands in a test.
+HARM = """lambda task: (
+    __import__("os").abort() if task == "crash"
+    else __import__("time").sleep(60.0) if task == "hang"
+    else task
+)"""
 
 
 def test_process_that_crashes_or_hangs_is_told_and_replaced():
-    with Worker(doing, "harm") as worker:
+    with Worker[str, str](eval, HARM) as worker:
         assert worker.ask("crash", 30.0) == Lost("SIGABRT")
         assert worker.ask("fine", 30.0) == "fine"
         hung = worker.ask("hang", 0.5)
