@@ -77,9 +77,10 @@ class AuvPlant(Component[PlantState, Inputs, Outputs, Parameters]):
         rotation = (
             self._rotation if state is self._moved else rotation_from_quaternion(state.quaternion)
         )
-        for _ in range(n):
+        while n:
             state = plant.step(chosen.vehicle, chosen.roll, state, rotation, tau, inputs.tau_w, h)
             rotation = rotation_from_quaternion(state.quaternion)
+            n -= 1
         self._moved, self._rotation = state, rotation
         return state, _seen(chosen, state, rotation, tau)
 

@@ -40,9 +40,10 @@ class MotionPlanner(Component[PlannerState, Nothing, Outputs, Parameters]):
         self, state: PlannerState, inputs: Nothing, t: float, h: float, n: int
     ) -> tuple[PlannerState, Outputs]:
         moving = self._moving if state is self._moved else _motion(self.parameters, state)
-        for _ in range(n - 1):
+        while n > 1:
             state = motion_planner.step(state, moving, h)
             moving = _motion(self.parameters, state)
+            n -= 1
         return self._planned(motion_planner.step(state, moving, h))
 
     def check_state(

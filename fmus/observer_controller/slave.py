@@ -56,9 +56,10 @@ class ObserverController(Component[ControllerState, Measurement, Outputs, Gains]
         signals = output_feedback.evaluate(gains, credible, inputs)
         outputs = _seen(credible, signals)
         state = output_feedback.step(credible, signals, h)
-        for _ in range(n - 1):
+        while n > 1:
             signals = output_feedback.evaluate(gains, state, inputs)
             state = output_feedback.step(state, signals, h)
+            n -= 1
         return state, outputs
 
 

@@ -50,9 +50,10 @@ class PdController(Component[PdState, PdMeasurement, Outputs, PdGains]):
         signals = pd.evaluate(self.parameters, theta_hat, inputs)
         outputs = _seen(theta_hat, signals)
         theta_hat = pd.step(theta_hat, signals, h)
-        for _ in range(n - 1):
+        while n > 1:
             signals = pd.evaluate(self.parameters, theta_hat, inputs)
             theta_hat = pd.step(theta_hat, signals, h)
+            n -= 1
         return PdState(theta_hat), outputs
 
 

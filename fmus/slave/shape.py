@@ -35,7 +35,9 @@ def measuring(kind: type) -> Callable[[Any], float]:
         return name
 
     scope: dict[str, Any] = {"hypot": hypot, "norm": _norm}
-    text = f"def function(state):\n {target(kind)} = state\n return hypot({', '.join(floats)})"
+    pattern = target(kind)
+    norm = f"hypot({', '.join(floats)})" if floats else "0.0"
+    text = f"def function(state):\n {pattern} = state\n return {norm}"
     exec(text, scope)
     function: Callable[[Any], float] = scope["function"]
     return function

@@ -59,12 +59,20 @@ class Block:
         if self._kind == "Real":
             return call
 
-        def get_converted() -> int:
+        row, values = self._row, self._values
+
+        def get_one() -> int:
             status = call()
-            self._row[:] = self._integers
+            row[0] = values[0]
             return status
 
-        return get_converted
+        def get_converted() -> int:
+            status = call()
+            row[:] = self._integers
+            return status
+
+        # Most components have one such output, and an array of one costs twice as much.
+        return get_one if len(row) == 1 else get_converted
 
     def _call(
         self, function: Callable[[str], Callable[..., int]], action: str
