@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from support.calls import Call
-from support.raw import Description
+from support.raw import Description, Variable
 from support.status_table import ERROR, MODES, SOUND, Cell, rows
 
 _WHILE_REFUSED = ("fmi2DoStep", "anything, while a refusal is not mended")
@@ -27,7 +27,8 @@ class Model:
         in_error: whether it is in the state error.
         fault: whether something was refused since the beginning.
         blocks: what was refused and is not mended: value references, and functions.
-        wild: whether it was told values that the equations may overflow with.
+        wild: whether it was told values that the equations may overflow with, or that may not go
+            with others.
         time: where the next step begins [s].
 
     """
@@ -93,8 +94,9 @@ class Model:
         elif call.function.startswith("fmi2Set") and "items" in call.arguments:
             for item in call.arguments["items"]:
                 if item.good:
-                    self.blocks -= {self._port_of(call, item.reference)}
-                    self.wild = self.wild or not _is_tame(item.value)
+                    name = self._port_of(call, item.reference)
+                    self.blocks -= {name}
+                    self.wild = self.wild or not _is_tame(self.description.find(name), item.value)
 
 
 def slot_of(call: Call) -> str:
@@ -120,7 +122,10 @@ def keep(saved: dict[str, Model], call: Call, known: Model) -> None:
         del saved[slot_of(call)]
 
 
-def _is_tame(value: object) -> bool:
-    if not isinstance(value, float) or value == 0.0:
+def _is_tame(port: Variable, value: object) -> bool:
+    """Whether no run can overflow with a value, and no other parameter can speak against it."""
+    if not isinstance(value, float):
         return True
-    return SMALLEST_TAME <= abs(value) <= LARGEST_TAME
+    if value in (port.minimum, port.maximum):
+        return False
+    return value == 0.0 or SMALLEST_TAME <= abs(value) <= LARGEST_TAME
