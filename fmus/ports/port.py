@@ -73,6 +73,8 @@ class Port:
                 raise Refusal(f"{self.name} = {value!r}: use one of {', '.join(self.choices)}")
         elif not -_LARGEST <= value <= _LARGEST:
             raise Refusal(f"{self.name} = {value!r:.20}: must be finite")
+        elif self.kind == "Integer" and not -(2**31) <= value < 2**31:
+            raise Refusal(f"{self.name} = {value!r:.20}: must fit into 32 bits")
         elif self.minimum is not None and value < self.minimum:
             raise Refusal(f"{self.name} = {value:g}: must be at least {self.minimum:g}")
         elif self.maximum is not None and value > self.maximum:

@@ -58,6 +58,7 @@ SPOILED = {
     "parameter of another type": ("parameters", with_parameter("m11", "25")),
     "truth value for a number": ("parameters", with_parameter("m11", True)),
     "number for an integer": ("parameters", with_parameter("noise.seed", 1.5)),
+    "integer of more than 32 bits": ("parameters", with_parameter("noise.seed", 3733856209)),
     "list for a parameter": ("parameters", with_parameter("m11", [25.0])),
     "parameter too many": ("parameters", with_parameter("m99", 1.0)),
     "parameters missing": ("parameters", lambda saved: {"m11": 50.0}),
