@@ -76,7 +76,7 @@ def master_alone(system: System, steps: int) -> float:
         return 0
 
     calls = Member([nothing], nothing, [nothing], lambda *_: RuntimeError())
-    with patch("orchestrator.master.schedule._member", lambda _: calls):
+    with patch("orchestrator.master.schedule.member", lambda _: calls):
         return loop_time(system, steps)
 
 

@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from fmpy.fmi2 import fmi2Warning
 
 from orchestrator.master.instance import Instance
 from orchestrator.master.row import Row
@@ -68,10 +69,25 @@ def schedule(
         late = len(plan) > 1 and has_feedthrough(system, connection)
         gathered[stage_of[connection.target.component] if late else 0].append(connection)
     return [
-        Stage(*row.places(connections), [_member(instances[name]) for name in names])
+        Stage(*row.places(connections), [member(instances[name]) for name in names])
         for names, connections in zip(plan, gathered, strict=True)
     ]
 
 
-def _member(instance: Instance) -> Member:
+def member(instance: Instance) -> Member:
+    """The calls of an instance that is tied to a row."""
     return Member(instance.set_inputs, instance.do_step, instance.get_outputs, instance.failed)
+
+
+def step(members: Sequence[Member], t: float, h: float) -> None:
+    """Step the components of a stage, which may run side by side until their outputs are asked."""
+    for set_inputs, do_step, _, failed in members:
+        for call in set_inputs:
+            if (status := call()) > fmi2Warning:
+                raise failed(status, "setting inputs")
+        if (status := do_step(t, h, 1)) > fmi2Warning:
+            raise failed(status, "fmi2DoStep")
+    for _, _, get_outputs, failed in members:
+        for call in get_outputs:
+            if (status := call()) > fmi2Warning:
+                raise failed(status, "getting outputs")

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
-from fmpy.fmi2 import fmi2Warning
 
 from orchestrator.errors import InputError, reason
 from orchestrator.master.channel import Channel, sizes
@@ -18,6 +17,7 @@ from orchestrator.master.instance import ComponentFailed
 from orchestrator.master.loaded import LoadedInstance, loaded
 from orchestrator.master.log import Letters
 from orchestrator.master.row import Row
+from orchestrator.master.schedule import member, step
 from orchestrator.system.component import Component
 from orchestrator.system.structure import System
 
@@ -58,6 +58,7 @@ class _Served:
         self._instance, self._channel, self._letters = instance, channel, letters
         system = System(component.name, {component.name: component}, ())
         values = Row(system, {component.name: instance}).values
+        self._member = member(instance)
         n = len(channel.incoming) - 2
         self._inputs, self._outputs = values[:n], values[n:]
 
@@ -75,12 +76,7 @@ class _Served:
 
     def _step(self) -> None:
         t, h = self._channel.incoming[:2]
-        instance = self._instance
-        calls: tuple[Callable[[], int], ...]
-        calls = (*instance.set_inputs, partial(instance.do_step, t, h, 1), *instance.get_outputs)
-        for call in calls:
-            if (status := call()) > fmi2Warning:
-                raise instance.failed(status, "fmi2DoStep")
+        step([self._member], t, h)
 
     def _answered(self, call: Callable[[], Any]) -> bool:
         note: dict[str, Any] = {}

@@ -7,7 +7,6 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 
 import numpy as np
-from fmpy.fmi2 import fmi2Warning
 
 from orchestrator.errors import InputError, StartError, reason
 from orchestrator.master.experiment import Experiment
@@ -18,7 +17,7 @@ from orchestrator.master.loaded import all_loaded
 from orchestrator.master.log import Log
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import Member, Stage, schedule, stages
+from orchestrator.master.schedule import Stage, schedule, stages, step
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 
@@ -165,7 +164,7 @@ def _advance(
         for t, h, end in experiment.steps():
             for targets, sources, members in plan:
                 values[targets] = values[sources]
-                _step(members, t, h)
+                step(members, t, h)
             if is_not_finite():
                 break
             blocks.append(end, values)
@@ -181,20 +180,6 @@ def _advance(
         failure = f"stopped at t = {end:.12g} s: {not_finite}"
     blocks.hand_over()
     return failure
-
-
-def _step(members: Sequence[Member], t: float, h: float) -> None:
-    """Step the components of a stage, which may run side by side until their outputs are asked."""
-    for set_inputs, do_step, _, failed in members:
-        for call in set_inputs:
-            if (status := call()) > fmi2Warning:
-                raise failed(status, "setting inputs")
-        if (status := do_step(t, h, 1)) > fmi2Warning:
-            raise failed(status, "fmi2DoStep")
-    for _, _, get_outputs, failed in members:
-        for call in get_outputs:
-            if (status := call()) > fmi2Warning:
-                raise failed(status, "getting outputs")
 
 
 @contextmanager

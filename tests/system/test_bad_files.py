@@ -36,11 +36,10 @@ GOOD = {
 
 
 @pytest.fixture
-def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "file.csv").write_text("time,plant.eta.x\n0,2\n0.02,2\n")
-    yield tmp_path
-    left = {path.name for path in tmp_path.iterdir()}
+def workplace(workplace: Path) -> Iterator[Path]:
+    (workplace / "file.csv").write_text("time,plant.eta.x\n0,2\n0.02,2\n")
+    yield workplace
+    left = {path.name for path in workplace.iterdir()}
     assert not left & {"results", "exports", "plot.png"}
 
 

@@ -18,13 +18,6 @@ from orchestrator.experiments.scenario import FOLDER as SCENARIOS
 from orchestrator.experiments.scenario import names
 
 
-@pytest.fixture
-def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder as the current one."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 def files(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 

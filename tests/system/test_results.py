@@ -16,11 +16,7 @@ from orchestrator.commands.main import main
 from orchestrator.experiments.stored import read_result
 from orchestrator.master.files import read_columns, read_rows
 
-
-@pytest.fixture(autouse=True)
-def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("workplace")
 
 
 def rows(path: str) -> np.ndarray:
