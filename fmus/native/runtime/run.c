@@ -18,16 +18,19 @@ static const double LARGEST_STATE = 1e100;
 /* More internal steps than this in one communication step are taken for a mistake. */
 static const double MOST_INTERNAL_STEPS = 1e6;
 
+/* A run as it is after instantiation. */
+static run new_run(void) {
+    run it = {.parameters.h_max = NO_LIMIT};
+    for (int i = 0; i < N_PORTS; i++) {
+        if (ports[i].causality == PARAMETER) put_parameter(&it.parameters, &ports[i], ports[i].start);
+    }
+    return it;
+}
+
 /* Makes everything what it is after instantiation. */
 static void renew(instance *it) {
-    run fresh = {.parameters.h_max = NO_LIMIT};
-    for (int i = 0; i < N_PORTS; i++) {
-        if (ports[i].causality == PARAMETER) {
-            put_parameter(&fresh.parameters, &ports[i], ports[i].start);
-        }
-    }
     release_run(&it->run);
-    it->run = fresh;
+    it->run = new_run();
     it->stale = 0;
     it->in_error = 0;
     it->n_said = 0;

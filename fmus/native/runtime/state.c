@@ -333,7 +333,7 @@ static int can_be_restored(const saved *state, run *it, message *why) {
 }
 
 static int restore(instance *it, const saved *state, message *why) {
-    run wanted = {0};
+    run wanted = new_run();
     if (!can_be_restored(state, &wanted, why) ||
         (wanted.begun && !adopt(it, &wanted.parameters, why))) {
         release_run(&wanted);
