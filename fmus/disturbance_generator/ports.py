@@ -7,6 +7,8 @@ from fmus.ports.groups import ParameterSet
 from fmus.ports.port import TIME, Port, inputs, outputs, parameter
 from fmus.ports.quantities import NU, TAU_W
 
+DESCRIPTION = "Disturbance by friction, waves and ocean currents in six degrees of freedom"
+
 _WAVES = Disturbance()
 _INPUTS = inputs("nu", NU, "Velocity in the body frame")
 

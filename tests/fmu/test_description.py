@@ -6,6 +6,7 @@ import tomllib
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import attrs
@@ -19,7 +20,6 @@ from lxml import etree
 from fmus.packaging.discovery import components, package_folder
 from fmus.ports.description_fmi2 import fmi2_description
 from fmus.ports.description_fmi3 import fmi3_build_description, fmi3_description
-from fmus.ports.port import Port
 from fmus.ports.terminals import terminals_and_icons
 
 GUID = "{00000000-0000-0000-0000-000000000000}"
@@ -38,17 +38,14 @@ SAID = (
 ITS_OWN = {"instantiationToken", "generationTool", "buildConfigurations"}
 
 
-def ports_of(name: str) -> tuple[Port, ...]:
-    return import_module(components()[name].replace(".slave", ".ports")).PORTS
+def declared(name: str) -> ModuleType:
+    """The ports of a component, and what it is."""
+    return import_module(components()[name].replace(".slave", ".ports"))
 
 
 def everything(description: ModelDescription) -> dict[str, Any]:
     """All that a host reads, without what depends on the layout of the file."""
     return attrs.asdict(description, filter=lambda field, _: field.name != "sourceline")
-
-
-def description_of(name: str) -> str:
-    return getattr(import_module(components()[name]), name).description
 
 
 @pytest.fixture(scope="module", params=components())
@@ -60,7 +57,7 @@ def python(request, dist: Path) -> ModelDescription:
 def fmi2(python: ModelDescription, tmp_path_factory) -> Path:
     """A folder with what the native kind says of itself in FMI 2.0."""
     name, path = python.modelName, tmp_path_factory.mktemp("fmi2")
-    content = fmi2_description(name, description_of(name), GUID, ports_of(name))
+    content = fmi2_description(name, declared(name).DESCRIPTION, GUID, declared(name).PORTS)
     (path / "modelDescription.xml").write_bytes(content)
     return path
 
@@ -69,13 +66,13 @@ def fmi2(python: ModelDescription, tmp_path_factory) -> Path:
 def fmi3(python: ModelDescription, tmp_path_factory) -> Path:
     """A folder with what the native kind says of itself in FMI 3.0."""
     name, path = python.modelName, tmp_path_factory.mktemp("fmi3")
-    content = fmi3_description(name, description_of(name), GUID, ports_of(name))
+    content = fmi3_description(name, declared(name).DESCRIPTION, GUID, declared(name).PORTS)
     (path / "modelDescription.xml").write_bytes(content)
     (path / "sources").mkdir()
     (path / "sources" / "buildDescription.xml").write_bytes(fmi3_build_description(name))
     (path / "terminalsAndIcons").mkdir()
     terminals = path / "terminalsAndIcons" / "terminalsAndIcons.xml"
-    terminals.write_bytes(terminals_and_icons(ports_of(name)))
+    terminals.write_bytes(terminals_and_icons(declared(name).PORTS))
     return path
 
 
@@ -85,7 +82,7 @@ def test_description_of_fmi2_is_valid(fmi2: Path):
 
 def test_both_kinds_say_the_same(python: ModelDescription, fmi2: Path):
     one, other = everything(python), everything(read_model_description(str(fmi2)))
-    assert len(one["modelVariables"]) == len(ports_of(python.modelName)) + 1
+    assert len(one["modelVariables"]) == len(declared(python.modelName).PORTS) + 1
     for variable, twin in zip(one["modelVariables"], other["modelVariables"], strict=True):
         assert variable == twin
     assert other.keys() == one.keys()
@@ -159,7 +156,7 @@ def test_only_the_disturbance_depends_on_the_time(fmi3: Path):
 
 def terminals(name: str) -> dict[str, tuple[str, dict[str, str]]]:
     """The rule of each terminal of a component, and the variables of its members."""
-    root = etree.fromstring(terminals_and_icons(ports_of(name)))
+    root = etree.fromstring(terminals_and_icons(declared(name).PORTS))
     etree.XMLSchema(file=str(SCHEMA)).assertValid(root)
     return {
         terminal.get("name"): (
@@ -204,6 +201,6 @@ def test_connecting_terminals_by_name_wires_the_closed_loop():
     assert fed == {
         (component, port.name)
         for component, name in components_of.items()
-        for port in ports_of(name)
+        for port in declared(name).PORTS
         if port.causality == "input"
     }
