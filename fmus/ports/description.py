@@ -9,6 +9,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from auv_fmu import __version__
 from auv_fmu.euler import STEP
 from fmus.ports.port import Port, Value
+from fmus.ports.units import UNITS
 
 #: About every component, by the names of the attributes.
 ABOUT = {"author": "auv-fmu", "license": "MIT", "version": __version__}
@@ -30,12 +31,16 @@ CAPABILITIES = {
 _LOGGED = ("Warning", "Discard", "Error", "Fatal")
 
 
-class Dependency(NamedTuple):
-    """What an output depends on, in value references."""
+#: How a variable gets its value at the start time; the standard forbids to say so of others.
+_INITIAL = {"output": "calculated", "parameter": "exact"}
 
-    output: int
-    inputs: list[int]  #: that it depends on directly, in every step
-    initial: list[int]  #: that its value at the start time depends on
+
+class Dependency(NamedTuple):
+    """What an output depends on, all by value references."""
+
+    reference: int  #: of the output
+    direct: list[int]  #: what its value depends on without a state between
+    initial: list[int]  #: what its value at the start time depends on
 
 
 def literal(value: Value) -> str:
@@ -48,8 +53,8 @@ def literal(value: Value) -> str:
 def text(root: Element) -> bytes:
     """A document, whose bytes depend on nothing but its elements."""
     indent(root)
-    declared: bytes = tostring(root, encoding="UTF-8", xml_declaration=True)
-    return declared + b"\n"
+    content: bytes = tostring(root, encoding="utf-8")
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + content + b"\n"
 
 
 def variable_attributes(reference: int, port: Port) -> dict[str, str]:
@@ -61,9 +66,8 @@ def variable_attributes(reference: int, port: Port) -> dict[str, str]:
         "causality": port.causality,
         "variability": port.variability,
     }
-    # The standard forbids `initial` on inputs.
-    if port.causality != "input":
-        attributes["initial"] = "calculated" if port.causality == "output" else "exact"
+    if port.causality in _INITIAL:
+        attributes["initial"] = _INITIAL[port.causality]
     return attributes
 
 
@@ -78,16 +82,26 @@ def units_of(ports: Sequence[Port]) -> list[str]:
     return sorted({port.unit for port in ports if port.unit})
 
 
+def unit_definitions(units: Sequence[str]) -> Element:
+    """Units by the base units that they are made of."""
+    definitions = Element("UnitDefinitions")
+    for unit in units:
+        base = {name: str(exponent) for name, exponent in UNITS[unit].exponents.items()}
+        SubElement(SubElement(definitions, "Unit", name=unit), "BaseUnit", base)
+    return definitions
+
+
 def dependencies(ports: Sequence[Port]) -> Iterator[Dependency]:
     """What each output depends on: its direct feedthrough, and at the start the parameters too."""
     reference = {port.name: i for i, port in enumerate(ports)}
     parameters = [reference[port.name] for port in ports if port.causality == "parameter"]
     for port in ports:
         if port.causality == "output":
-            inputs = [reference[name] for name in port.feedthrough]
+            # FMI 2.0 has no variable for the time.
+            direct = [reference[name] for name in port.feedthrough if name in reference]
             # fault is false at the start whatever is set, unless that is refused.
-            initial = [*inputs, *parameters] if port.kind == "Real" else []
-            yield Dependency(reference[port.name], inputs, initial)
+            initial = [*direct, *parameters] if port.kind == "Real" else []
+            yield Dependency(reference[port.name], direct, initial)
 
 
 def log_categories(fmi: str) -> Element:

@@ -19,6 +19,7 @@ from fmus.ports.description import (
     literal,
     log_categories,
     text,
+    unit_definitions,
     units_of,
     variable_attributes,
 )
@@ -83,7 +84,7 @@ def complete(root: Element, ports: Sequence[Port]) -> Element:
     variables[:] = [_variable(reference, port) for reference, port in enumerate(ports)]
     structure[:] = _structure(ports)
     units = units_of(ports)
-    root.insert(1, _unit_definitions(units))
+    root.insert(1, unit_definitions(units))
     root.insert(2, _type_definitions(units))
     return root
 
@@ -100,14 +101,6 @@ def _variable(reference: int, port: Port) -> Element:
     return variable
 
 
-def _unit_definitions(units: Sequence[str]) -> Element:
-    definitions = Element("UnitDefinitions")
-    for unit in units:
-        base = {name: str(exponent) for name, exponent in UNITS[unit].exponents.items()}
-        SubElement(SubElement(definitions, "Unit", name=unit), "BaseUnit", base)
-    return definitions
-
-
 def _type_definitions(units: Sequence[str]) -> Element:
     definitions = Element("TypeDefinitions")
     for unit in units:
@@ -120,13 +113,13 @@ def _type_definitions(units: Sequence[str]) -> Element:
 def _structure(ports: Sequence[Port]) -> tuple[Element, Element]:
     """Outputs with their direct feedthrough; InitialUnknowns with the parameters as well."""
     outputs, initial_unknowns = Element("Outputs"), Element("InitialUnknowns")
-    for output, inputs, initial in dependencies(ports):
-        for parent, known in ((outputs, inputs), (initial_unknowns, initial)):
+    for output in dependencies(ports):
+        for parent, known in ((outputs, output.direct), (initial_unknowns, output.initial)):
             SubElement(
                 parent,
                 "Unknown",
                 # FMI 2.0 counts variables from one.
-                index=str(output + 1),
+                index=str(output.reference + 1),
                 dependencies=" ".join(str(reference + 1) for reference in known),
                 dependenciesKind=" ".join(["dependent"] * len(known)),
             )
