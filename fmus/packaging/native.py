@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import NamedTuple
 
 from auv_fmu import __version__
 from fmus import native
@@ -15,12 +16,47 @@ from fmus.packaging.compilers import Compiler, library
 from fmus.packaging.kinds import NATIVE
 from fmus.packaging.platforms import Platform
 from fmus.packaging.sealing import digest_of, guid_of, write_archive
-from fmus.ports import description_fmi2
+from fmus.ports import description_fmi2, description_fmi3
 from fmus.ports.port import Port
+from fmus.ports.terminals import terminals_and_icons
 
-#: Of each version of FMI: what writes the description, and the file that is compiled.
-_VERSIONS: Mapping[str, tuple[Callable[[str, str, str, Sequence[Port]], bytes], str]] = {
-    "2": (description_fmi2.fmi2_description, description_fmi2.SOURCE),
+Ports = Sequence[Port]
+
+_PICTURES = Path(__file__).parent
+
+
+def _fmi2_files(name: str, ports: Ports) -> dict[str, bytes]:
+    return {"model.png": documentation.ICON.read_bytes()}
+
+
+def _fmi3_files(name: str, ports: Ports) -> dict[str, bytes]:
+    folder = "terminalsAndIcons"
+    return {
+        "sources/buildDescription.xml": description_fmi3.fmi3_build_description(name),
+        f"{folder}/terminalsAndIcons.xml": terminals_and_icons(ports),
+        f"{folder}/icon.png": documentation.ICON.read_bytes(),
+        f"{folder}/terminal.png": (_PICTURES / "terminal.png").read_bytes(),
+    }
+
+
+class Version(NamedTuple):
+    """A version of FMI.
+
+    Attributes:
+        describe: writes modelDescription.xml.
+        main: the one of the sources that is compiled.
+        files: that an FMU of this version has besides, from its name and ports.
+
+    """
+
+    describe: Callable[[str, str, str, Ports], bytes]
+    main: str
+    files: Callable[[str, Ports], dict[str, bytes]]
+
+
+_VERSIONS = {
+    "2": Version(description_fmi2.fmi2_description, description_fmi2.SOURCE, _fmi2_files),
+    "3": Version(description_fmi3.fmi3_description, description_fmi3.SOURCE, _fmi3_files),
 }
 
 _IDENTITY = """\
@@ -57,11 +93,16 @@ def fmu_entries(
     """
     package = module.rpartition(".")[0]
     declared = import_module(f"{package}.ports")
-    describe, main = _VERSIONS[fmi]
-    sources = {name: content.encode() for name, content in native.sources(package).items()}
+    version = _VERSIONS[fmi]
+    others = {other.main for other in _VERSIONS.values()} - {version.main}
+    sources = {
+        name: content.encode()
+        for name, content in native.sources(package).items()
+        if name not in others
+    }
 
     def description(guid: str) -> bytes:
-        return describe(component, declared.DESCRIPTION, guid, declared.PORTS)
+        return version.describe(component, declared.DESCRIPTION, guid, declared.PORTS)
 
     guid = guid_of(digest_of({**sources, "modelDescription.xml": description("")}))
     identity = _IDENTITY.format(name=component, guid=guid, version=__version__)
@@ -69,13 +110,13 @@ def fmu_entries(
     page = documentation.html(component, NATIVE, fmi)
     return {
         "modelDescription.xml": description(guid),
-        "model.png": documentation.ICON.read_bytes(),
+        **version.files(component, declared.PORTS),
         "documentation/index.html": page.encode(),
         "documentation/licenses/license.txt": documentation.licences(NATIVE).encode(),
         **{f"sources/{name}": content for name, content in sources.items()},
         **{
             f"binaries/{platform.name}/{component}{platform.ending}": library(
-                compiler, platform, component, sources, main
+                compiler, platform, component, sources, version.main
             )
             for platform in platforms
         },
