@@ -17,12 +17,47 @@ from fmus.packaging.kinds import NATIVE
 from fmus.packaging.platforms import Platform
 from fmus.packaging.sealing import digest_of, guid_of, write_archive
 from fmus.ports import description_fmi2, description_fmi3
-from fmus.ports.description_fmi2 import fmi2_description
-from fmus.ports.description_fmi3 import fmi3_build_description, fmi3_description
 from fmus.ports.port import Port
 from fmus.ports.terminals import terminals_and_icons
 
-_TERMINAL = Path(__file__).with_name("terminal.png")
+Ports = Sequence[Port]
+
+_PICTURES = Path(__file__).parent
+
+
+def _fmi2_files(name: str, ports: Ports) -> dict[str, bytes]:
+    return {"model.png": documentation.ICON.read_bytes()}
+
+
+def _fmi3_files(name: str, ports: Ports) -> dict[str, bytes]:
+    folder = "terminalsAndIcons"
+    return {
+        "sources/buildDescription.xml": description_fmi3.fmi3_build_description(name),
+        f"{folder}/terminalsAndIcons.xml": terminals_and_icons(ports),
+        f"{folder}/icon.png": documentation.ICON.read_bytes(),
+        f"{folder}/terminal.png": (_PICTURES / "terminal.png").read_bytes(),
+    }
+
+
+class Version(NamedTuple):
+    """A version of FMI.
+
+    Attributes:
+        describe: writes modelDescription.xml.
+        main: the one of the sources that is compiled.
+        files: that an FMU of this version has besides, from its name and ports.
+
+    """
+
+    describe: Callable[[str, str, str, Ports], bytes]
+    main: str
+    files: Callable[[str, Ports], dict[str, bytes]]
+
+
+_VERSIONS = {
+    "2": Version(description_fmi2.fmi2_description, description_fmi2.SOURCE, _fmi2_files),
+    "3": Version(description_fmi3.fmi3_description, description_fmi3.SOURCE, _fmi3_files),
+}
 
 _IDENTITY = """\
 /* Which FMU this is. */
@@ -36,40 +71,6 @@ _IDENTITY = """\
 
 #endif
 """
-
-
-class _Version(NamedTuple):
-    """What differs between the versions of FMI.
-
-    Attributes:
-        main: the source that is compiled and includes the others.
-        description: writes modelDescription.xml from name, one line, GUID and ports.
-        others: gives files that this version alone has, from name and ports.
-
-    """
-
-    main: str
-    description: Callable[[str, str, str, Sequence[Port]], bytes]
-    others: Callable[[str, Sequence[Port]], dict[str, bytes]]
-
-
-def _fmi2_files(name: str, ports: Sequence[Port]) -> dict[str, bytes]:
-    return {"model.png": documentation.ICON.read_bytes()}
-
-
-def _fmi3_files(name: str, ports: Sequence[Port]) -> dict[str, bytes]:
-    return {
-        "sources/buildDescription.xml": fmi3_build_description(name),
-        "terminalsAndIcons/terminalsAndIcons.xml": terminals_and_icons(ports),
-        "terminalsAndIcons/icon.png": documentation.ICON.read_bytes(),
-        "terminalsAndIcons/terminal.png": _TERMINAL.read_bytes(),
-    }
-
-
-_VERSIONS = {
-    "2": _Version(description_fmi2.SOURCE, fmi2_description, _fmi2_files),
-    "3": _Version(description_fmi3.SOURCE, fmi3_description, _fmi3_files),
-}
 
 
 def fmu_entries(
@@ -93,24 +94,25 @@ def fmu_entries(
     package = module.rpartition(".")[0]
     declared = import_module(f"{package}.ports")
     version = _VERSIONS[fmi]
-    foreign = {other.main for other in _VERSIONS.values()} - {version.main}
+    others = {other.main for other in _VERSIONS.values()} - {version.main}
     sources = {
         name: content.encode()
         for name, content in native.sources(package).items()
-        if name not in foreign
+        if name not in others
     }
 
     def description(guid: str) -> bytes:
-        return version.description(component, declared.DESCRIPTION, guid, declared.PORTS)
+        return version.describe(component, declared.DESCRIPTION, guid, declared.PORTS)
 
     guid = guid_of(digest_of({**sources, "modelDescription.xml": description("")}))
     identity = _IDENTITY.format(name=component, guid=guid, version=__version__)
     sources["identity.h"] = identity.encode()
+    page = documentation.html(component, NATIVE, fmi)
     return {
         "modelDescription.xml": description(guid),
-        "documentation/index.html": documentation.html(component, NATIVE, fmi).encode(),
+        **version.files(component, declared.PORTS),
+        "documentation/index.html": page.encode(),
         "documentation/licenses/license.txt": documentation.licences(NATIVE).encode(),
-        **version.others(component, declared.PORTS),
         **{f"sources/{name}": content for name, content in sources.items()},
         **{
             f"binaries/{platform.name}/{component}{platform.ending}": library(
