@@ -175,6 +175,7 @@ class _Translation:
             c_name(function.__module__, function.__name__), dict(self._locals), returned
         )
         names = [n for n in ast.walk(self._tree) if isinstance(n, ast.Name)]
+        self._names = {name.id for name in names}
         self._assigned = Counter(n.id for n in names if isinstance(n.ctx, ast.Store))
         self._scopes = [set(self._locals)]
 
@@ -255,13 +256,19 @@ class _Translation:
                     yield from self._assignment(one, other)
         else:
             code = self._expression(value)
-            names = [n.id for n in ast.walk(target) if isinstance(n, ast.Name) and n.id != "_"]
             if not _is_path(value):
-                name = "_and_".join(names) if len(names) > 1 else f"{names[0]}_and_more"
+                name = self._name_of_all(target, value)
                 yield self._stored([(name, code)])
                 code = Code(name, code.shape)
             for alike in _alike(list(self._taken_apart(target, code))):
                 yield self._stored(alike)
+
+    def _name_of_all(self, target: ast.expr, value: ast.expr) -> str:
+        """A name for what is taken apart: that of the function it comes from."""
+        name = ast.unparse(value.func).rsplit(".")[-1] if isinstance(value, ast.Call) else "all"
+        first = next(n.id for n in ast.walk(target) if isinstance(n, ast.Name) and n.id != "_")
+        taken = name in self._locals or name in self._names
+        return f"{name}_{first}" if taken else name.lstrip("_")
 
     def _taken_apart(self, target: ast.expr, code: Code) -> Iterator[tuple[str, Code]]:
         if isinstance(target, ast.Name):
@@ -327,11 +334,12 @@ class _Translation:
         return method(node, wanted)
 
     def _constant(self, node: ast.Constant, wanted: Shape | None) -> Code:
-        if isinstance(node.value, str):
-            return Code(f'"{node.value}"', TEXT)
-        if type(node.value) is float or wanted == DOUBLE:
-            return Code(repr(float(node.value)), DOUBLE)
-        return Code(str(int(node.value)), INTEGER)
+        value: Any = node.value
+        if isinstance(value, str):
+            return Code(f'"{value}"', TEXT)
+        if type(value) is float or wanted == DOUBLE:
+            return Code(repr(float(value)), DOUBLE)
+        return Code(str(int(value)), INTEGER)
 
     def _name(self, node: ast.Name, wanted: Shape | None) -> Code:
         if node.id in self._locals:
@@ -342,7 +350,7 @@ class _Translation:
         name = node.id if isinstance(node, ast.Name) else ast.unparse(node).rsplit(".")[-1]
         value = self._known(node)
         # A constant bears the name of the module that it stands in, wherever it was imported.
-        home = _home(self._globals["__name__"], name, value)
+        home = _home(self._globals["__name__"], name)
         try:
             return self._program.constant(c_name(home, name), value)
         except Untranslatable as error:
@@ -370,8 +378,7 @@ class _Translation:
             if DOUBLE not in (left.shape, right.shape):
                 raise self._fail(node, "a division of whole numbers")
             if isinstance(node.right, ast.Constant) and node.right.value:
-                divisor = repr(float(node.right.value))
-                return Code(f"{left.within(_PRODUCT)} / {divisor}", DOUBLE, _PRODUCT)
+                return Code(f"{left.within(_PRODUCT)} / {right.text}", DOUBLE, _PRODUCT)
             self._made.raises = True
             return Code(f"DIV({left.text}, {right.text})", DOUBLE)
         sign, binding = _BINARY[type(node.op)]
@@ -493,13 +500,13 @@ class _Translation:
         return Code(function.call([code.text for code in codes]), function.returns or INTEGER)
 
 
-def _home(module: str, name: str, value: Any) -> str:
+def _home(module: str, name: str) -> str:
     """The module that a constant was defined in, seen from one that uses it."""
     tree = ast.parse(inspect.getsource(sys.modules[module]))
     for node in tree.body:
-        if isinstance(node, ast.ImportFrom) and node.module:
-            if name in (alias.name for alias in node.names):
-                return _home(node.module, name, value)
+        names = [alias.name for alias in node.names] if isinstance(node, ast.ImportFrom) else []
+        if name in names:
+            return _home(str(node.module), name)  # type: ignore[attr-defined]
     return module
 
 

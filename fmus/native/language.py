@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 #: Functions of `math` that equations may use.
 MATHEMATICS = frozenset(
@@ -28,7 +28,7 @@ OUTSIDE = {
 _PACKAGES = frozenset(("auv_fmu", "fmus"))
 
 _BASES = frozenset(("NamedTuple", "TypedDict", "ArithmeticError"))
-_OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.USub, ast.Not, ast.And, ast.Or)
+_OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.USub, ast.Not)
 _COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
 _CONSTANTS = (float, int, bool)
 _MODULE_LEVEL = (ast.Import, ast.ImportFrom, ast.Assign, ast.AnnAssign)
@@ -118,8 +118,7 @@ def _block(statements: list[ast.stmt]) -> _Found:
             yield from _target(node.targets[0])
             yield from _expression(node.value)
         elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
-            yield from _operator(node.op, node.lineno)
-            yield from _expression(node.value)
+            yield from _expression(ast.BinOp(node.target, node.op, node.value, lineno=node.lineno))
         elif isinstance(node, (ast.If, ast.While)) and not (
             isinstance(node, ast.While) and node.orelse
         ):
@@ -155,47 +154,51 @@ def _raised(node: ast.Raise) -> _Found:
         yield node.lineno, "a raise without a text"
 
 
+#: What expressions consist of.
+_PARTS: dict[type[ast.expr], Callable[[Any], Sequence[ast.expr]]] = {
+    ast.Constant: lambda node: (),
+    ast.Name: lambda node: (),
+    ast.BinOp: lambda node: (node.left, node.right),
+    ast.UnaryOp: lambda node: (node.operand,),
+    ast.BoolOp: lambda node: node.values,
+    ast.Compare: lambda node: (node.left, *node.comparators),
+    ast.IfExp: lambda node: (node.test, node.body, node.orelse),
+    ast.Tuple: lambda node: node.elts,
+    ast.Dict: lambda node: node.values,
+    ast.Attribute: lambda node: (node.value,),
+    ast.Starred: lambda node: (node.value,),
+    ast.Subscript: lambda node: (node.value,),
+    ast.Call: lambda node: (node.func, *node.args),
+}
+
+
 def _expression(node: ast.expr) -> _Found:
-    parts: list[ast.expr] = []
-    if isinstance(node, ast.Constant):
-        if type(node.value) not in (*_CONSTANTS, str):
-            yield node.lineno, f"the constant {node.value!r}"
-    elif isinstance(node, (ast.BinOp, ast.UnaryOp)):
-        yield from _operator(node.op, node.lineno)
-        parts = [node.operand] if isinstance(node, ast.UnaryOp) else [node.left, node.right]
-    elif isinstance(node, ast.BoolOp):
-        parts = node.values
-    elif isinstance(node, ast.Compare):
-        if not all(isinstance(operator, _COMPARISONS) for operator in node.ops):
-            yield node.lineno, "a comparison other than of size"
-        parts = [node.left, *node.comparators]
-    elif isinstance(node, ast.IfExp):
-        parts = [node.test, node.body, node.orelse]
-    elif isinstance(node, ast.Tuple):
-        parts = node.elts
-    elif isinstance(node, (ast.Attribute, ast.Starred)):
-        parts = [node.value]
-    elif isinstance(node, ast.Subscript):
-        if not isinstance(node.slice, ast.Constant):
-            yield node.lineno, "a subscript that is not a constant"
-        parts = [node.value]
-    elif isinstance(node, ast.Dict):
-        if not all(isinstance(key, ast.Constant) for key in node.keys):
-            yield node.lineno, "a dict whose keys are not constants"
-        parts = node.values
-    elif isinstance(node, ast.Call):
-        if node.keywords:
-            yield node.lineno, "a call with names of arguments"
-        parts = [node.func, *node.args]
-    elif not isinstance(node, ast.Name):
+    if type(node) not in _PARTS:
         yield node.lineno, _kind(node)
-    for part in parts:
+        return
+    wrong = _wrong(node)
+    if wrong:
+        yield node.lineno, wrong
+    for part in _PARTS[type(node)](node):
         yield from _expression(part)
 
 
-def _operator(operator: ast.AST, line: int) -> _Found:
-    if not isinstance(operator, _OPERATORS):
-        yield line, f"the operator {_kind(operator)}"
+def _wrong(node: ast.expr) -> str | None:
+    """What is wrong with an expression, apart from its parts."""
+    wrong = None
+    if isinstance(node, ast.Constant) and type(node.value) not in (*_CONSTANTS, str):
+        wrong = f"the constant {node.value!r}"
+    elif isinstance(node, (ast.BinOp, ast.UnaryOp)) and not isinstance(node.op, _OPERATORS):
+        wrong = f"the operator {_kind(node.op)}"
+    elif isinstance(node, ast.Compare) and not all(isinstance(o, _COMPARISONS) for o in node.ops):
+        wrong = "a comparison other than of size"
+    elif isinstance(node, ast.Subscript) and not isinstance(node.slice, ast.Constant):
+        wrong = "a subscript that is not a constant"
+    elif isinstance(node, ast.Dict) and not all(isinstance(k, ast.Constant) for k in node.keys):
+        wrong = "a dict whose keys are not constants"
+    elif isinstance(node, ast.Call) and node.keywords:
+        wrong = "a call with names of arguments"
+    return wrong
 
 
 def _is_text(node: ast.stmt) -> bool:

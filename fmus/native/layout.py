@@ -1,4 +1,4 @@
-"""Lines of C that a reader can take in: long ones are broken at braces, or else at spaces."""
+"""Lines of C that a reader can take in: long ones are broken at brackets, or else at spaces."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ def _lines(text: str, indent: str) -> list[str]:
         return [indent + text]
     start, end = _widest(text)
     # Inside of a short bracket there is nothing to gain.
-    if end - start < len(text) // 2:
+    if end - start < len(text) // 2 or "{" not in text[start:end]:
         return _wrapped(text, indent)
     # Two of them around the same are opened as one.
     while text[start + 1] == "{" and _closing(text, start + 1) == end - 1:
         start, end = start + 1, end - 1
-    inner = [
-        line
-        for item in _split(text[start + 1 : end])
-        for line in _lines(f"{item},", indent + INDENT)
-    ]
-    return [indent + text[: start + 1], *inner, indent + text[end:]]
+    *items, last = _split(text[start + 1 : end])
+    behind = [f"{last},", text[end:]] if text[start] == "{" else [f"{last}{text[end:]}"]
+    lines = [indent + text[: start + 1]]
+    for item in (*(f"{item}," for item in items), behind[0]):
+        lines += _lines(item, indent + INDENT)
+    return lines + [indent + closing for closing in behind[1:]]
 
 
 def _wrapped(text: str, indent: str) -> list[str]:
@@ -65,13 +65,12 @@ def _closing(text: str, start: int) -> int:
 
 
 def _widest(text: str) -> tuple[int, int]:
-    """The outermost pair of braces that holds the most."""
+    """The outermost pair of brackets that holds the most."""
     spans, i = [(0, 0)], 0
     while i < len(text):
         if text[i] in "({":
-            end = _closing(text, i)
-            spans += [(i, end)] if text[i] == "{" else []
-            i = end
+            spans.append((i, _closing(text, i)))
+            i = spans[-1][1]
         i += 1
     return max(spans, key=lambda span: span[1] - span[0])
 

@@ -101,26 +101,22 @@ def inner(shape: Shape) -> Iterator[Structure]:
 
 def declaration(shape: Structure) -> str:
     """The definition of a structure, with the comments of a class."""
-    if shape.is_array:
-        return f"typedef struct {{\n    {shape.parts[0][1].name} v[{len(shape.parts)}];\n}} {shape.name};"
     about = _comments(shape.made)
-    members = [
-        f"    {part.name} {suffix[1:]};"
-        + (f" /* {about[suffix[1:]]} */" if suffix[1:] in about else "")
-        for suffix, part in shape.parts
-    ]
-    lines = members or ["    char nothing; /* C knows no empty structures */"]
+    members = [f"{part.name} {suffix[1:]};{about.get(suffix, '')}" for suffix, part in shape.parts]
+    if shape.is_array:
+        members = [f"{shape.parts[0][1].name} v[{len(members)}];"]
+    lines = [f"    {line}" for line in members or ["char nothing; /* C has no empty structure */"]]
     text = inspect.cleandoc(shape.made.__doc__).splitlines()[0] if shape.made else ""
     head = f"/* {plain(text)} */\n" if text else ""
     return head + "\n".join(["typedef struct {", *lines, f"}} {shape.name};"])
 
 
 def _comments(made: Any) -> dict[str, str]:
-    """What `#:` says of the fields of a class."""
+    """What `#:` says of the fields of a class, as comments."""
     if made is None:
         return {}
     found = re.findall(r"^    (\w+):.*#: (.*)$", inspect.getsource(made), re.MULTILINE)
-    return {name: plain(text) for name, text in found}
+    return {f".{name}": f" /* {plain(text)} */" for name, text in found}
 
 
 def plain(text: str) -> str:

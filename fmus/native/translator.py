@@ -26,7 +26,7 @@ _HEAD = """\
 #include "arithmetic.h"
 """
 
-#: Arguments of the functions that the component calls, as they come from it.
+#: What stands for the arguments of a behaviour's functions in them.
 _GIVEN = {
     "parameters": "*parameters",
     "inputs": "*inputs",

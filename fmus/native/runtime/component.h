@@ -43,8 +43,14 @@ typedef struct {
 
 /* The version */
 
-/* What it calls the types of values: "Real" or "Float64", ... */
-static string kind_name(kind kind);
+/* What it calls things. */
+typedef struct {
+    string kinds[STRING + 1]; /* types of values */
+    string token;             /* what tells an FMU from others */
+    string terminate;         /* the function that ends a run */
+} names;
+
+static const names version;
 
 /* Calls the logger, which is not NULL. */
 static void deliver(const logger *host, string instance_name, int status, string category,
@@ -55,7 +61,7 @@ static void deliver(const logger *host, string instance_name, int status, string
 /* A handle of a new instance; NULL, with a message that says why, if anything is wrong.
  *
  * wrong: what is, with arguments that the version alone knows; NULL: nothing.
- * token: the FMU's GUID, with braces or without; NULL and "" go with any FMU. */
+ * token: the FMU's, with braces or without; NULL and "" go with any FMU. */
 static void *instantiate(string function, string wrong, string name, string token, logger host,
                          int logging);
 
