@@ -22,6 +22,9 @@ from orchestrator.system.values import Value
 
 SOURCE = Path(__file__).with_name("host.c")
 
+#: What the host reads and writes.
+PLAN, TABLE = "plan.txt", "table.csv"
+
 #: C compilers, the first of which is taken that there is.
 _COMPILERS = ("cc", "gcc", "clang")
 
@@ -113,13 +116,13 @@ def _fmu(component: Component, library: Path, values: dict[str, Value]) -> Itera
 
 
 def run(
-    program: Sequence[str | Path], folder: Path, what: str, names: Sequence[str]
+    command: Sequence[str | Path], folder: Path, what: str, names: Sequence[str]
 ) -> tuple[np.ndarray, float]:
     """Run the host.
 
     Args:
-        program: the command that starts it.
-        folder: for the plan and the table.
+        command: that starts it.
+        folder: where it is started, for :data:`PLAN` and :data:`TABLE`.
         what: the plan.
         names: of the columns that are wanted.
 
@@ -130,14 +133,14 @@ def run(
         InputError: it fails.
 
     """
-    given, table = folder / "plan.txt", folder / "table.csv"
-    given.write_text(what, encoding="utf-8")
+    (folder / PLAN).write_text(what, encoding="utf-8")
     process = subprocess.run(
-        [*program, given, table], capture_output=True, text=True, errors="replace", check=False
-    )
+        [*command, PLAN, TABLE],
+        cwd=folder, capture_output=True, text=True, errors="replace", check=False,
+    )  # fmt: skip
     if process.returncode != 0:
         raise InputError(last_line(process.stderr, f"exit status {process.returncode}"))
-    with table.open(encoding="utf-8") as lines:
+    with (folder / TABLE).open(encoding="utf-8") as lines:
         header = lines.readline().strip().split(",")
         rows = np.loadtxt(lines, delimiter=",", ndmin=2)
     return rows[:, [header.index(name) for name in names]], float(process.stdout)
