@@ -27,9 +27,9 @@ from typing import Any, NamedTuple
 from fuzz.generator import generated
 from fuzz.mutants import Taken, Trials, reached
 from fuzz.player import Calls, Difference, Players, pairs, play
-from fuzz.sanitizers import sanitize, sanitizers
 from fuzz.twins import twins
 from support.raw import Description, Host, Library
+from support.sanitizers import sanitize, sanitizers
 from support.worker import Lost, Worker
 
 KINDS = ("sequences", "states")

@@ -1,4 +1,4 @@
-"""FMUs in C, compiled once more so that they end where memory or arithmetic is misused."""
+"""FMUs and hosts in C, compiled so that they end where memory, arithmetic or threads are misused."""
 
 from __future__ import annotations
 
@@ -10,19 +10,32 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from unittest.mock import patch
 
-COMPILER = shutil.which("gcc")
+GCC = shutil.which("gcc")
 
-_FLAGS = (
-    "-std=c99", "-g", "-O1", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off",
-    "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
-)  # fmt: skip
+MEMORY, THREADS = "address,undefined", "thread"
+
+#: Where the tests' hosts are.
+_HOSTS = Path(__file__).parents[1] / "fmu"
 
 
-def sanitize(folder: Path) -> None:
+def _compile(folder: Path, target: Path, what: str, *options: str | Path) -> None:
+    flags = ["-g", "-O1", "-fno-omit-frame-pointer", f"-fsanitize={what}", "-fno-sanitize-recover"]
+    command = [str(GCC), *flags, "-o", target, *options, "-pthread", "-ldl", "-lm"]
+    subprocess.run(command, cwd=folder, check=True)
+
+
+def sanitize(folder: Path, what: str = MEMORY) -> Path:
     """Compile the sources of an unpacked FMU into the place of its library."""
     [library] = folder.glob("binaries/linux64/*.so")
-    command = [str(COMPILER), *_FLAGS, "-o", library, "fmi2.c", "-lm", "-pthread"]
-    subprocess.run(command, cwd=folder / "sources", check=True)
+    kind = ("-std=c99", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
+    _compile(folder / "sources", library, what, *kind, "fmi2.c")
+    return library
+
+
+def sanitized_host(name: str, folder: Path, what: str = MEMORY) -> Path:
+    """One of the tests' hosts."""
+    _compile(folder, folder / name, what, _HOSTS / f"{name}.c")
+    return folder / name
 
 
 class Reports:
@@ -32,8 +45,8 @@ class Reports:
         self._folder = folder
 
     def environment(self) -> dict[str, str]:
-        """Of a process that loads such FMUs."""
-        command = [str(COMPILER), "-print-file-name=libasan.so"]
+        """Of a process that loads such FMUs without being compiled so."""
+        command = [str(GCC), "-print-file-name=libasan.so"]
         runtime = subprocess.run(command, check=True, capture_output=True, text=True).stdout
         log = f"log_path={self._folder / 'report'}"
         return {
