@@ -1,4 +1,4 @@
-"""FMUs and hosts in C, compiled so that they end where memory, arithmetic or threads are misused."""
+"""FMUs and hosts in C that end where memory, arithmetic or threads are misused."""
 
 from __future__ import annotations
 
