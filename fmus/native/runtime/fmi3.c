@@ -33,7 +33,7 @@ static const names version = {
 typedef uint8_t boolean;
 
 /* The variable for the time comes after all others. */
-enum { TIME = MODEL_PORTS };
+enum { TIME = N_PORTS };
 
 /* Messages */
 
@@ -53,13 +53,14 @@ static void deliver(const logger *host, string instance_name, int status, string
 
 /* Turns the named categories on or off, and leaves the others as they are; no names: all of them. */
 static void switch_categories(call *this, int on, size_t n, const string names[]) {
-    string chosen[N_CATEGORIES];
+    enum { ALL = sizeof CATEGORIES / sizeof *CATEGORIES };
+    string chosen[ALL];
     size_t n_chosen = 0;
-    for (size_t i = 0; i < N_CATEGORIES; i++) {
+    for (size_t i = 0; i < ALL; i++) {
         int named = n == 0;
-        for (size_t k = 0; k < n && !named; k++) named = strcmp(names[k], categories[i]) == 0;
-        if (named ? on : wanted(&this->instance->host, FMI_OK, categories[i])) {
-            chosen[n_chosen++] = categories[i];
+        for (size_t k = 0; k < n && !named; k++) named = strcmp(names[k], CATEGORIES[i]) == 0;
+        if (named ? on : wanted(&this->instance->host, FMI_OK, CATEGORIES[i])) {
+            chosen[n_chosen++] = CATEGORIES[i];
         }
     }
     choose_messages(this, n_chosen > 0, n_chosen, chosen);
