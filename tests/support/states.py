@@ -21,6 +21,9 @@ CHECKSUM = "checksum"
 #: What tells of refusals, not of the run.
 REFUSALS = ("fault", "refused")
 
+#: What differs between states of the two kinds of an FMU that are one.
+OF_THE_KIND = ("identity", CHECKSUM)
+
 Json = Any
 
 
