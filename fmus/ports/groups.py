@@ -9,12 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
-from typing import Any, Generic, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Generic, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from fmus.ports.port import Port, Value
 from fmus.ports.quantities import group_name
 
 T = TypeVar("T")
+
+
+class Nothing(NamedTuple):
+    """State of a component without memory; inputs of one without inputs."""
 
 
 def slices(ports: Sequence[Port]) -> dict[str, slice]:

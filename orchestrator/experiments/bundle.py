@@ -81,7 +81,7 @@ def build(folder: Path, loader: str | None = None) -> list[Path]:
 def loader_of(folder: Path) -> str:
     """Which loader the FMUs in a folder were built with."""
     content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-    return str(content["loader"])
+    return str(content["settings"]["loader"])
 
 
 def run_fmus(module: str, folder: Path, *options: str) -> list[Path]:

@@ -106,5 +106,11 @@ def normalised(quaternion: Vector4) -> Vector4:
 
     """
     a, b, c, d = quaternion
-    norm = sqrt(a * a + b * b + c * c + d * d)
+    norm = length(quaternion)
     return a / norm, b / norm, c / norm, d / norm
+
+
+def length(quaternion: Vector4) -> float:
+    """The norm of a quaternion, one if it is a rotation."""
+    a, b, c, d = quaternion
+    return sqrt(a * a + b * b + c * c + d * d)
