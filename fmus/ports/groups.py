@@ -135,6 +135,15 @@ class ParameterSet(Generic[T]):
         """All parameters, in the order of their declaration."""
         return tuple(port for field in self._fields.values() for port in _ports(field))
 
+    @property
+    def paths(self) -> dict[str, tuple[str | int, ...]]:
+        """Where each parameter lies in the set, by its name: fields, and places in tuples."""
+        return {
+            port.name: (name, *path)
+            for name, field in self._fields.items()
+            for port, path in _paths(field)
+        }
+
     def of(self, values: Mapping[str, Value]) -> T:
         """The parameter set with these values of its ports, by name."""
         return self._made(**{name: _taken(field, values) for name, field in self._fields.items()})
@@ -145,6 +154,16 @@ def _ports(field: Field) -> Iterator[Port]:
         yield field
     else:
         yield from field.ports if isinstance(field, ParameterSet) else field
+
+
+def _paths(field: Field) -> Iterator[tuple[Port, tuple[str | int, ...]]]:
+    if isinstance(field, Port):
+        yield field, ()
+    elif isinstance(field, tuple):
+        yield from ((port, (i,)) for i, port in enumerate(field))
+    else:
+        paths = field.paths
+        yield from ((port, paths[port.name]) for port in field.ports)
 
 
 def _taken(field: Field, values: Mapping[str, Value]) -> object:

@@ -125,7 +125,7 @@ static void get_state(call *this, void **state);
 static void set_state(call *this, void *state);
 static void free_state(call *this, void **state);
 static void size_of_state(call *this, void *state, size_t *size);
-static void serialise_state(call *this, void *state, char bytes[], size_t size);
-static void deserialise_state(call *this, const char bytes[], size_t size, void **state);
+static void serialise_state(call *this, void *state, unsigned char bytes[], size_t size);
+static void deserialise_state(call *this, const unsigned char bytes[], size_t size, void **state);
 
 #endif

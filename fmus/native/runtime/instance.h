@@ -4,11 +4,11 @@
  * text.c       texts of messages, with numbers as Python writes them
  * messages.c   what the host is told
  * handles.c    tells what is alive from what is not
- * guard.c      making and freeing instances, and what every call begins and ends with
  * noise.c      Python's random numbers
  * store.c      values of ports, and what may be done with them
  * run.c        modes and steps
  * state.c      the state as bytes, and what is checked before one is taken
+ * guard.c      making and freeing instances, and what every call begins and ends with
  *
  * A function that can fail writes a reason into `why`, and gives 0.
  */

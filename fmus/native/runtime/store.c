@@ -7,6 +7,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Lets parameters act from the next step, if they fit together. */
+static int adopt(instance *it, const parameter_values *values, message *why);
+
+/* Computes state and outputs at the start time, if a value they depend on has changed. */
+static void refresh(instance *it);
+
 /* Refusals */
 
 static refusal **find_refusal(run *it, string what) {

@@ -130,8 +130,8 @@ static void append_quoted(message *it, string text) {
 }
 
 /* Writes a text: %s is a text; %q a text in quotes; %g a number in short; %r a number exactly; %f a
- * number without a fraction; %u a reference. */
-static void compose(message *it, string format, ...) {
+ * number without a fraction; %u a reference. Gives 0, with which a function fails. */
+static int compose(message *it, string format, ...) {
     va_list arguments;
     va_start(arguments, format);
     clear(it);
@@ -158,4 +158,5 @@ static void compose(message *it, string format, ...) {
         }
     }
     va_end(arguments);
+    return 0;
 }
