@@ -18,9 +18,8 @@ from xml.etree.ElementTree import Element
 
 from pythonfmu import DefaultExperiment
 
-from auv_fmu import __version__
-from auv_fmu.euler import STEP
-from fmus.ports.description import complete
+from fmus.ports.description import ABOUT, EXPERIMENT
+from fmus.ports.description_fmi2 import complete
 from fmus.ports.groups import ParameterSet, packing, slices, unpacking
 from fmus.ports.port import H_MAX, Refusal, Value
 from fmus.slave.callbacks import (
@@ -69,10 +68,8 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
     :meth:`begin` and :meth:`advance`. These may raise: what they raise becomes a refusal.
     """
 
-    author = "auv-fmu"
-    license = "MIT"
-    version = __version__
-    default_experiment = DefaultExperiment(0.0, 100.0, STEP)
+    author, license, version = ABOUT["author"], ABOUT["license"], ABOUT["version"]
+    default_experiment = DefaultExperiment(*EXPERIMENT)
 
     #: What the parameters mean to the equations; `h_max` is not among them.
     parameter_set: ParameterSet[Parameters]
