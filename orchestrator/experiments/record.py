@@ -71,6 +71,7 @@ def write_record(
             "step": experiment.step,
             "order": experiment.order,
         },
+        "loop": header.loop,
         "fmus": {
             component.name: {"file": component.fmu.name, "sha256": digest_of(component.fmu)}
             for component in prepared.system.components.values()
@@ -110,4 +111,5 @@ def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
         columns,
         Experiment(experiment["stop_time"], experiment["step"], experiment["order"]),
         {port_name(name): value for name, value in record["parameters"].items()},
+        record.get("loop", "python"),
     )
