@@ -114,7 +114,8 @@ def _initialise(
         instance.enter_initialization(system.parameters_of(name), experiment.stop_time)
     values = row.values
     targets, sources = row.places(system.connections)
-    for _ in range(len(instances) + 1):
+    # Through a chain of all, once more for what its end feeds, and once to see it at rest.
+    for _ in range(len(instances) + 2):
         before = values.copy()
         values[targets] = values[sources]
         _exchange(instances, row)

@@ -18,7 +18,7 @@
 enum { FMI2_WARNING = 1 };
 
 /* Partial sums that processors add side by side. */
-enum { LANES = 8 };
+enum { LANES = 4 };
 
 typedef unsigned reference;
 
