@@ -78,7 +78,7 @@ def test_each_function_has_its_docstring_above_it(package):
     ("text", "why"),
     [
         ("def begin(parameters: A) -> A:\n    return begin(parameters)\n", "begin calls itself"),
-        ("def begin(t: int, h: int) -> A:\n    return A(t / h)\n", "10: a division of whole numbers"),
+        ("def begin(t: int, h: int) -> A:\n    return A(t / h)\n", "a division of whole numbers"),
         ("def begin(parameters: A) -> A:\n    return A(parameters.y)\n", "10: y is no field here"),
         ("def begin(parameters: A) -> A:\n    return A(1.0, 2.0)\n", "10: 2 values for 1 fields"),
         ("def begin(state: A) -> A:\n    x, y = state\n    return A(x)\n", "2 names for 1 values"),
