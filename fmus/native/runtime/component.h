@@ -93,8 +93,8 @@ static string wrong_strings(size_t n, const uint32_t *references, const string *
 static void choose_messages(call *this, int logging, size_t n, const string categories[]);
 static void tell(instance *it, int status, string text);
 
-/* Modes. What comes in the wrong mode is refused. */
-static void set_experiment(call *this, double start, int has_stop, double stop);
+/* Modes. What comes in the wrong mode is refused. An experiment that is refused gives 0. */
+static int set_experiment(call *this, double start, int has_stop, double stop);
 static void enter_initialisation(call *this);
 static void exit_initialisation(call *this);
 static void terminate(call *this);
@@ -115,10 +115,6 @@ static void refuse_reference(instance *it, string kind, uint32_t reference);
 
 /* Steps: FMI_OK or FMI_DISCARD. */
 static int take_step(instance *it, double time, double step);
-
-/* The end of the last step that was taken, NaN before the first; whether one was refused. */
-static double last_successful_time(const instance *it);
-static int wants_to_terminate(const instance *it);
 
 /* States: each looks at its arguments first. A handle that is not NULL is used again. */
 static void get_state(call *this, void **state);

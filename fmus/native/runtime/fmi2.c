@@ -165,7 +165,7 @@ NOT_SUPPORTED(fmi2GetStringStatus, ALWAYS, wrong_place_of(v), FMI_DISCARD,
 
 ANSWER(fmi2GetRealStatus, ALWAYS, wrong_place_of(v), (void *c, int kind, double *v), {
     if (kind == LAST_SUCCESSFUL_TIME) {
-        *v = last_successful_time(this.instance);
+        *v = this.instance->last_successful_time;
     } else {
         this.status = FMI_DISCARD;
         tell(this.instance, FMI_DISCARD, "Invalid status inquiry for fmi2GetRealStatus");
@@ -174,7 +174,7 @@ ANSWER(fmi2GetRealStatus, ALWAYS, wrong_place_of(v), (void *c, int kind, double 
 
 ANSWER(fmi2GetBooleanStatus, ALWAYS, wrong_place_of(v), (void *c, int kind, int *v), {
     if (kind == HAS_TERMINATED) {
-        *v = wants_to_terminate(this.instance);
+        *v = this.instance->wants_to_terminate;
     } else {
         this.status = not_supported(&this, FMI_DISCARD);
     }

@@ -1,26 +1,24 @@
-/* The functions of FMI 3.0. The only file to compile: it includes all others.
+/* The functions of FMI 3.0, and the one file to compile: it includes all others.
+ *
+ * Where FMI3_FUNCTION_PREFIX is defined, as the standard has it, it stands before the names of the
+ * functions, so that several FMUs can be linked into one program.
  *
  * What co-simulation without events, clocks, arrays and derivatives does not need is not supported,
  * and answered with fmi3Error.
  */
 #include "component.h"
 
-/* Its own names of what the component has names for. */
-
-static string kind_name(kind kind) {
-    static const string names[] = {"Float64", "Int32", "Boolean", "String"};
-    return names[kind];
-}
-
-static string token_name(void) { return "instantiation token"; }
+static const names version = {
+    .kinds = {"Float64", "Int32", "Boolean", "String"},
+    .token = "instantiation token",
+    .terminate = "fmi3Terminate",
+};
 
 #include "component.c"
 
-/* Functions are called by these names alone, or with a prefix where several components are linked
- * into one program. */
 #if defined(FMI3_FUNCTION_PREFIX) && !defined(FMI3_OVERRIDE_FUNCTION_PREFIX)
-#define JOINED(prefix, name) prefix##name
-#define PREFIXED(prefix, name) JOINED(prefix, name)
+#define PASTE(prefix, name) prefix##name
+#define PREFIXED(prefix, name) PASTE(prefix, name)
 #define FMI3(name) PREFIXED(FMI3_FUNCTION_PREFIX, name)
 #else
 #define FMI3(name) name
@@ -34,10 +32,8 @@ static string token_name(void) { return "instantiation token"; }
 /* fmi3Boolean and fmi3Clock. A host may have put any byte there, which a bool must not hold. */
 typedef uint8_t boolean;
 
-typedef uint32_t reference;
-
 /* The variable for the time comes after all others. */
-enum { TIME = MODEL_PORTS };
+enum { TIME = N_PORTS };
 
 /* Messages */
 
@@ -55,9 +51,24 @@ static void deliver(const logger *host, string instance_name, int status, string
     ((log_message)host->function)(host->environment, status, category, doubled);
 }
 
+/* Turns the named categories on or off, and leaves the others as they are; no names: all of them. */
+static void switch_categories(call *this, int on, size_t n, const string names[]) {
+    enum { ALL = sizeof CATEGORIES / sizeof *CATEGORIES };
+    string chosen[ALL];
+    size_t n_chosen = 0;
+    for (size_t i = 0; i < ALL; i++) {
+        int named = n == 0;
+        for (size_t k = 0; k < n && !named; k++) named = strcmp(names[k], CATEGORIES[i]) == 0;
+        if (named ? on : wanted(&this->instance->host, FMI_OK, CATEGORIES[i])) {
+            chosen[n_chosen++] = CATEGORIES[i];
+        }
+    }
+    choose_messages(this, n_chosen > 0, n_chosen, chosen);
+}
+
 EXPORT int FMI3(fmi3SetDebugLogging)(void *handle, boolean on, size_t n, const string names[]) {
     call this = begin(handle, "fmi3SetDebugLogging", ALWAYS);
-    if (GOES_ON(this, NULL)) choose_messages(&this, on != 0, n, names);
+    if (GOES_ON(this, wrong_texts(n, names))) switch_categories(&this, on, n, names);
     return end(&this);
 }
 
@@ -67,7 +78,7 @@ EXPORT string FMI3(fmi3GetVersion)(void) { return "3.0"; }
 
 EXPORT void *FMI3(fmi3InstantiateCoSimulation)(
     string name, string token, string resources, boolean visible, boolean logging,
-    boolean event_mode_used, boolean early_return_allowed, const reference intermediate[],
+    boolean event_mode_used, boolean early_return_allowed, const uint32_t intermediate[],
     size_t n_intermediate, void *environment, log_message log, void (*update)(void)) {
     return instantiate("fmi3InstantiateCoSimulation",
                        event_mode_used ? "this FMU has no event mode" : NULL, name, token,
@@ -133,13 +144,13 @@ EXPORT int FMI3(fmi3DoStep)(void *handle, double time, double step, boolean no_s
 
 /* Values. All variables are scalars: there are as many values as references. */
 
-static string wrong_numbers(size_t n, const reference r[], const void *values, size_t n_values) {
+static string wrong_numbers(size_t n, const uint32_t r[], const void *values, size_t n_values) {
     return n == n_values ? wrong_values(n, r, values) : "not as many values as references";
 }
 
 /* For each reference one value, or what `refuse` leaves behind. */
 #define GET(name, type, get)                                                                     \
-    EXPORT int FMI3(name)(void *handle, const reference r[], size_t n, type v[], size_t n_v) {   \
+    EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, type v[], size_t n_v) {   \
         call this = begin(handle, #name, ALWAYS);                                                \
         if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {                                        \
             for (size_t i = 0; i < n; i++) v[i] = get(this.instance, r[i]);                      \
@@ -148,7 +159,7 @@ static string wrong_numbers(size_t n, const reference r[], const void *values, s
     }
 
 #define SET(name, type, wrong, set)                                                              \
-    EXPORT int FMI3(name)(void *handle, const reference r[], size_t n, const type v[],           \
+    EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, const type v[],           \
                           size_t n_v) {                                                          \
         call this = begin(handle, #name, NOT_AFTER_ERROR);                                       \
         if (GOES_ON(this, wrong_numbers(n, r, v, n_v)) && GOES_ON(this, wrong)) {                \
@@ -164,7 +175,7 @@ SET(fmi3SetInt32, int32_t, NULL, set_integer)
 SET(fmi3SetBoolean, boolean, NULL, set_boolean)
 SET(fmi3SetString, string, wrong_strings(n, r, v), set_string)
 
-EXPORT int FMI3(fmi3GetFloat64)(void *handle, const reference r[], size_t n, double v[],
+EXPORT int FMI3(fmi3GetFloat64)(void *handle, const uint32_t r[], size_t n, double v[],
                                 size_t n_v) {
     call this = begin(handle, "fmi3GetFloat64", ALWAYS);
     if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {
@@ -180,7 +191,7 @@ EXPORT int FMI3(fmi3GetFloat64)(void *handle, const reference r[], size_t n, dou
     return end(&this);
 }
 
-EXPORT int FMI3(fmi3SetFloat64)(void *handle, const reference r[], size_t n, const double v[],
+EXPORT int FMI3(fmi3SetFloat64)(void *handle, const uint32_t r[], size_t n, const double v[],
                                 size_t n_v) {
     call this = begin(handle, "fmi3SetFloat64", NOT_AFTER_ERROR);
     if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) set_reals(this.instance, r, n, v);
@@ -190,11 +201,11 @@ EXPORT int FMI3(fmi3SetFloat64)(void *handle, const reference r[], size_t n, con
 /* Types that no variable has: every reference is a wrong one, for which 0 is given. */
 
 #define NO_VARIABLE(kind, type)                                                                  \
-    static type get_##kind(instance *it, reference r) {                                          \
+    static type get_##kind(instance *it, uint32_t r) {                                          \
         refuse_reference(it, #kind, r);                                                          \
         return 0;                                                                                \
     }                                                                                            \
-    static void set_##kind(instance *it, reference r, type value) {                              \
+    static void set_##kind(instance *it, uint32_t r, type value) {                              \
         refuse_reference(it, #kind, r);                                                          \
     }                                                                                            \
     GET(fmi3Get##kind, type, get_##kind)                                                         \
@@ -209,7 +220,7 @@ NO_VARIABLE(UInt32, uint32_t)
 NO_VARIABLE(Int64, int64_t)
 NO_VARIABLE(UInt64, uint64_t)
 
-EXPORT int FMI3(fmi3GetBinary)(void *handle, const reference r[], size_t n, size_t sizes[],
+EXPORT int FMI3(fmi3GetBinary)(void *handle, const uint32_t r[], size_t n, size_t sizes[],
                                const uint8_t *v[], size_t n_v) {
     call this = begin(handle, "fmi3GetBinary", ALWAYS);
     if (GOES_ON(this, wrong_numbers(n, r, v, n_v)) && GOES_ON(this, wrong_values(n, r, sizes))) {
@@ -222,7 +233,7 @@ EXPORT int FMI3(fmi3GetBinary)(void *handle, const reference r[], size_t n, size
     return end(&this);
 }
 
-EXPORT int FMI3(fmi3SetBinary)(void *handle, const reference r[], size_t n, const size_t sizes[],
+EXPORT int FMI3(fmi3SetBinary)(void *handle, const uint32_t r[], size_t n, const size_t sizes[],
                                const uint8_t *const v[], size_t n_v) {
     call this = begin(handle, "fmi3SetBinary", NOT_AFTER_ERROR);
     if (GOES_ON(this, wrong_numbers(n, r, v, n_v)) && GOES_ON(this, wrong_values(n, r, sizes))) {
@@ -231,7 +242,7 @@ EXPORT int FMI3(fmi3SetBinary)(void *handle, const reference r[], size_t n, cons
     return end(&this);
 }
 
-EXPORT int FMI3(fmi3GetClock)(void *handle, const reference r[], size_t n, boolean v[]) {
+EXPORT int FMI3(fmi3GetClock)(void *handle, const uint32_t r[], size_t n, boolean v[]) {
     call this = begin(handle, "fmi3GetClock", ALWAYS);
     if (GOES_ON(this, wrong_values(n, r, v))) {
         for (size_t i = 0; i < n; i++) {
@@ -242,7 +253,7 @@ EXPORT int FMI3(fmi3GetClock)(void *handle, const reference r[], size_t n, boole
     return end(&this);
 }
 
-EXPORT int FMI3(fmi3SetClock)(void *handle, const reference r[], size_t n, const boolean v[]) {
+EXPORT int FMI3(fmi3SetClock)(void *handle, const uint32_t r[], size_t n, const boolean v[]) {
     call this = begin(handle, "fmi3SetClock", NOT_AFTER_ERROR);
     if (GOES_ON(this, wrong_values(n, r, v))) {
         for (size_t i = 0; i < n; i++) refuse_reference(this.instance, "Clock", r[i]);
@@ -265,10 +276,10 @@ STATE_FUNCTION(fmi3FreeFMUState, (void *handle, void **state), free_state(&this,
 STATE_FUNCTION(fmi3SerializedFMUStateSize, (void *handle, void *state, size_t *size),
                size_of_state(&this, state, size))
 STATE_FUNCTION(fmi3SerializeFMUState, (void *handle, void *state, uint8_t bytes[], size_t size),
-               serialise_state(&this, state, (char *)bytes, size))
+               serialise_state(&this, state, bytes, size))
 STATE_FUNCTION(fmi3DeserializeFMUState,
                (void *handle, const uint8_t bytes[], size_t size, void **state),
-               deserialise_state(&this, (const char *)bytes, size, state))
+               deserialise_state(&this, bytes, size, state))
 
 /* What is not supported */
 
@@ -276,8 +287,8 @@ static int unsupported(void *handle, string function) {
     call this = begin(handle, function, NOT_AFTER_ERROR);
     if (GOES_ON(this, NULL)) {
         message why;
-        compose(&why, "%s: not supported", function);
-        say(this.instance, &why, FMI_ERROR, NULL);
+        compose(&why, "FMI function not supported: %s", function);
+        tell(this.instance, FMI_ERROR, why.text);
         this.status = FMI_ERROR;
     }
     return end(&this);
@@ -296,31 +307,31 @@ UNSUPPORTED_MODE(fmi3ExitConfigurationMode)
 UNSUPPORTED_MODE(fmi3EvaluateDiscreteStates)
 UNSUPPORTED(fmi3UpdateDiscreteStates, boolean *needed, boolean *terminate, boolean *nominals,
             boolean *values, boolean *defined, double *next)
-UNSUPPORTED(fmi3GetNumberOfVariableDependencies, reference variable, size_t *n)
-UNSUPPORTED(fmi3GetVariableDependencies, reference variable, size_t elements[],
-            reference independents[], size_t independent_elements[], int kinds[], size_t n)
-UNSUPPORTED(fmi3GetOutputDerivatives, const reference r[], size_t n, const int32_t orders[],
+UNSUPPORTED(fmi3GetNumberOfVariableDependencies, uint32_t variable, size_t *n)
+UNSUPPORTED(fmi3GetVariableDependencies, uint32_t variable, size_t elements[],
+            uint32_t independents[], size_t independent_elements[], int kinds[], size_t n)
+UNSUPPORTED(fmi3GetOutputDerivatives, const uint32_t r[], size_t n, const int32_t orders[],
             double v[], size_t n_v)
-UNSUPPORTED(fmi3GetDirectionalDerivative, const reference unknowns[], size_t n_unknowns,
-            const reference knowns[], size_t n_knowns, const double seed[], size_t n_seed,
+UNSUPPORTED(fmi3GetDirectionalDerivative, const uint32_t unknowns[], size_t n_unknowns,
+            const uint32_t knowns[], size_t n_knowns, const double seed[], size_t n_seed,
             double sensitivity[], size_t n_sensitivity)
-UNSUPPORTED(fmi3GetAdjointDerivative, const reference unknowns[], size_t n_unknowns,
-            const reference knowns[], size_t n_knowns, const double seed[], size_t n_seed,
+UNSUPPORTED(fmi3GetAdjointDerivative, const uint32_t unknowns[], size_t n_unknowns,
+            const uint32_t knowns[], size_t n_knowns, const double seed[], size_t n_seed,
             double sensitivity[], size_t n_sensitivity)
-UNSUPPORTED(fmi3GetIntervalDecimal, const reference r[], size_t n, double intervals[],
+UNSUPPORTED(fmi3GetIntervalDecimal, const uint32_t r[], size_t n, double intervals[],
             int qualifiers[])
-UNSUPPORTED(fmi3GetIntervalFraction, const reference r[], size_t n, uint64_t counters[],
+UNSUPPORTED(fmi3GetIntervalFraction, const uint32_t r[], size_t n, uint64_t counters[],
             uint64_t resolutions[], int qualifiers[])
-UNSUPPORTED(fmi3GetShiftDecimal, const reference r[], size_t n, double shifts[])
-UNSUPPORTED(fmi3GetShiftFraction, const reference r[], size_t n, uint64_t counters[],
+UNSUPPORTED(fmi3GetShiftDecimal, const uint32_t r[], size_t n, double shifts[])
+UNSUPPORTED(fmi3GetShiftFraction, const uint32_t r[], size_t n, uint64_t counters[],
             uint64_t resolutions[])
-UNSUPPORTED(fmi3SetIntervalDecimal, const reference r[], size_t n, const double intervals[])
-UNSUPPORTED(fmi3SetIntervalFraction, const reference r[], size_t n, const uint64_t counters[],
+UNSUPPORTED(fmi3SetIntervalDecimal, const uint32_t r[], size_t n, const double intervals[])
+UNSUPPORTED(fmi3SetIntervalFraction, const uint32_t r[], size_t n, const uint64_t counters[],
             const uint64_t resolutions[])
-UNSUPPORTED(fmi3SetShiftDecimal, const reference r[], size_t n, const double shifts[])
-UNSUPPORTED(fmi3SetShiftFraction, const reference r[], size_t n, const uint64_t counters[],
+UNSUPPORTED(fmi3SetShiftDecimal, const uint32_t r[], size_t n, const double shifts[])
+UNSUPPORTED(fmi3SetShiftFraction, const uint32_t r[], size_t n, const uint64_t counters[],
             const uint64_t resolutions[])
-UNSUPPORTED(fmi3ActivateModelPartition, reference clock, double time)
+UNSUPPORTED(fmi3ActivateModelPartition, uint32_t clock, double time)
 UNSUPPORTED(fmi3CompletedIntegratorStep, boolean no_set, boolean *event, boolean *terminate)
 UNSUPPORTED(fmi3SetTime, double time)
 UNSUPPORTED(fmi3SetContinuousStates, const double states[], size_t n)

@@ -115,7 +115,7 @@ typedef struct {
 /* Everything that the rest of a run depends on. */
 typedef struct {
     mode mode;
-    double start_time;
+    double start_time, time; /* where it has begun, and where it is */
     parameter_values parameters; /* as they were set */
     input_values inputs;
     int begun;         /* whether there is a state */

@@ -3,6 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* By the statuses of messages. */
+static const string CATEGORIES[] = {"logAll", "logStatusWarning", "logStatusDiscard",
+                                    "logStatusError", "logStatusFatal"};
+
 static char *copied(string text) {
     char *copy = malloc(strlen(text) + 1);
     return copy == NULL ? NULL : strcpy(copy, text);
@@ -49,9 +53,7 @@ static int wanted(const listener *it, int status, string category) {
 }
 
 static void tell_listener(const listener *it, int status, string text) {
-    static const string categories[] = {"logAll", "logStatusWarning", "logStatusDiscard",
-                                        "logStatusError", "logStatusFatal"};
-    string category = categories[status];
+    string category = CATEGORIES[status];
     if (!wanted(it, status, category)) return;
     if (it->host.function == NULL) {
         fprintf(stderr, "%s: %s: %s\n", it->name, category, text);

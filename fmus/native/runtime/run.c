@@ -18,16 +18,19 @@ static const double LARGEST_STATE = 1e100;
 /* More internal steps than this in one communication step are taken for a mistake. */
 static const double MOST_INTERNAL_STEPS = 1e6;
 
+/* A run as it is after instantiation. */
+static run new_run(void) {
+    run it = {.parameters.h_max = NO_LIMIT};
+    for (int i = 0; i < N_PORTS; i++) {
+        if (ports[i].causality == PARAMETER) put_parameter(&it.parameters, &ports[i], ports[i].start);
+    }
+    return it;
+}
+
 /* Makes everything what it is after instantiation. */
 static void renew(instance *it) {
-    run fresh = {.parameters.h_max = NO_LIMIT};
-    for (int i = 0; i < N_PORTS; i++) {
-        if (ports[i].causality == PARAMETER) {
-            put_parameter(&fresh.parameters, &ports[i], ports[i].start);
-        }
-    }
     release_run(&it->run);
-    it->run = fresh;
+    it->run = new_run();
     it->stale = 0;
     it->in_error = 0;
     it->n_said = 0;
@@ -117,20 +120,21 @@ static int follows(call *this, mode mode) {
     return 0;
 }
 
-static void set_experiment(call *this, double start, int has_stop, double stop) {
+static int set_experiment(call *this, double start, int has_stop, double stop) {
     instance *it = this->instance;
     message why;
     int good = 0;
-    if (!follows(this, INSTANTIATED)) return;
+    if (!follows(this, INSTANTIATED)) return 0;
     if (!isfinite(start)) {
         compose(&why, "start time %r: must be finite", start);
     } else if (has_stop && !(stop >= start)) {
         compose(&why, "stop time %r: must not be before %r", stop, start);
     } else {
-        it->run.start_time = start;
+        it->run.start_time = it->run.time = start;
         good = 1;
     }
     settle(it, this->function, "experiment", good, &why);
+    return good;
 }
 
 static void enter_initialisation(call *this) {
@@ -207,7 +211,9 @@ static int advance(instance *it, double time, double step, message *why) {
     }
     model_advance(parameters, &next->state.groups, inputs, time, step / n, n,
                   &next->outputs.groups, &error);
-    return accept(it, &error, why);
+    if (!accept(it, &error, why)) return 0;
+    run->time = time + step;
+    return 1;
 }
 
 static int take_step(instance *it, double time, double step) {
@@ -220,7 +226,3 @@ static int take_step(instance *it, double time, double step) {
     report(it, &said, why.text);
     return FMI_DISCARD;
 }
-
-static double last_successful_time(const instance *it) { return it->last_successful_time; }
-
-static int wants_to_terminate(const instance *it) { return it->wants_to_terminate; }

@@ -3,7 +3,7 @@
  * It is held in memory as the bytes that it is serialised to. All numbers are little-endian; Reals are
  * IEEE 754 doubles, all others have four bytes:
  *
- *     MAGIC, identity, mode, start time,
+ *     MAGIC, identity, mode, start time, time,
  *     parameters and inputs in the order of their ports, outputs,
  *     whether there is a state, and if so: the numbers of the state, and of the noise the words of
  *     the generator, the place of the next, whether there is a next number, and it;
@@ -85,6 +85,7 @@ static void put_run(writer *to, const run *it) {
     put_text(to, IDENTITY);
     put_word(to, it->mode);
     put_real(to, it->start_time);
+    put_real(to, it->time);
     for (int i = 0; i < N_PORTS; i++) {
         if (ports[i].causality != PARAMETER) continue;
         double number = parameter(&it->parameters, &ports[i]);
@@ -263,7 +264,13 @@ static int take_run(reader *from, run *it, message *why) {
     if (number > TERMINATED) return compose(why, "no mode is %u", number);
     it->mode = (mode)number;
     it->start_time = take_real(from);
-    if (!isfinite(it->start_time)) return compose(why, "a value is not finite");
+    it->time = take_real(from);
+    if (!isfinite(it->start_time) || isnan(it->time)) {
+        return compose(why, "a value is not finite");
+    }
+    if (it->mode < STEPPING && it->time != it->start_time) {
+        return compose(why, "it has another time than that of its start");
+    }
     for (int i = 0; i < N_PORTS; i++) {
         if (ports[i].causality == PARAMETER &&
             !take_parameter(from, &it->parameters, &ports[i], why)) {
@@ -333,7 +340,7 @@ static int can_be_restored(const saved *state, run *it, message *why) {
 }
 
 static int restore(instance *it, const saved *state, message *why) {
-    run wanted = {0};
+    run wanted = new_run();
     if (!can_be_restored(state, &wanted, why) ||
         (wanted.begun && !adopt(it, &wanted.parameters, why))) {
         release_run(&wanted);
