@@ -94,8 +94,12 @@ def fmu_entries(
     package = module.rpartition(".")[0]
     declared = import_module(f"{package}.ports")
     version = _VERSIONS[fmi]
-    written = native.sources(package, int(fmi))
-    sources = {name: content.encode() for name, content in written.items()}
+    others = {other.main for other in _VERSIONS.values()} - {version.main}
+    sources = {
+        name: content.encode()
+        for name, content in native.sources(package).items()
+        if name not in others
+    }
 
     def description(guid: str) -> bytes:
         return version.describe(component, declared.DESCRIPTION, guid, declared.PORTS)
