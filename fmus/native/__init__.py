@@ -20,12 +20,13 @@ from pathlib import Path
 
 from fmus.native.tables import tables
 from fmus.native.translator import translated
+from fmus.ports import description_fmi2, description_fmi3
 
 #: What is the same for all components.
 RUNTIME = Path(__file__).parent / "runtime"
 
 #: The file to compile, by the version of FMI: it includes all others.
-VERSIONS = {2: "fmi2.c", 3: "fmi3.c"}
+VERSIONS = {2: description_fmi2.SOURCE, 3: description_fmi3.SOURCE}
 
 
 def sources(package: str, fmi: int = 2) -> dict[str, str]:

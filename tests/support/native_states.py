@@ -95,12 +95,13 @@ def _read(source: _Reader) -> NativeState | None:
         return None
     identity = source.text()
     layout = _layout(identity.split()[0])
-    mode, start_time = source.word(), source.real()
+    mode, start_time, time = source.word(), source.real(), source.real()
     parameters = {port.name: _parameter(source, port) for port in layout.parameters}
     said = NativeState(
         identity=identity,
         mode=MODES[mode],
         start_time=start_time,
+        time=time,
         parameters=dict(sorted(parameters.items())),
         inputs=source.reals(layout.inputs),
         outputs=source.reals(layout.outputs),
@@ -153,7 +154,7 @@ def _written(said: NativeState) -> bytes:
         _text(MAGIC),
         _text(identity),
         _words(MODES.index(said["mode"])),
-        _reals(said["start_time"]),
+        _reals(said["start_time"], said["time"]),
     ]
     for port in layout.parameters:
         value = said["parameters"][port.name]

@@ -24,7 +24,7 @@ from support.native_states import CHECKSUM, NativeState, Unwritable
 REFUSALS = ("fault", "refused")
 
 #: What differs between states of the two kinds of an FMU that are one.
-OF_THE_KIND = ("identity", CHECKSUM)
+OF_THE_KIND = ("identity", "time", CHECKSUM)
 
 Json = Any
 
