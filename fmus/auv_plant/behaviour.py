@@ -6,14 +6,14 @@ from typing import NamedTuple, TypedDict
 
 from auv_fmu import plant
 from auv_fmu.actuators import limit, limit_all
-from auv_fmu.attitude import length, rotation_from_quaternion
+from auv_fmu.attitude import rotation_from_quaternion
 from auv_fmu.plant import PlantState
 from auv_fmu.types import Rotation, Vector3, Vector6
 from fmus.auv_plant.ports import Parameters
 from fmus.ports.port import Refusal
 
-#: Share of its length by which a normalised quaternion is off.
-_ROUNDING = 1e-12
+#: By how much the square of the length of a normalised quaternion is off.
+_ROUNDING = 2e-12
 
 #: More standard deviations than any number of Random.gauss is off: sqrt(-2 log(2^-53)) is 8.6.
 _MOST_DEVIATIONS = 9.0
@@ -88,7 +88,8 @@ def measured(parameters: Parameters, y: Vector3, n: Vector3) -> Vector3:
 
 def expected(parameters: Parameters, state: PlantState, outputs: Outputs) -> Outputs:
     """The outputs that belong to a state and to what else some outputs show."""
-    if not abs(length(state.quaternion) - 1.0) <= _ROUNDING:
+    a, b, c, d = state.quaternion
+    if not abs(a * a + b * b + c * c + d * d - 1.0) <= _ROUNDING:
         raise Refusal("its quaternion is not of length one")
     rotation = rotation_from_quaternion(state.quaternion)
     tau = _limited(parameters, outputs["tau_applied"])

@@ -51,8 +51,8 @@ class AuvPlant(Component[PlantState, Inputs, Outputs, Parameters]):
         gauss = self._random.gauss
         n = gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)
         x, y, z = values[_Y]
-        values[_Y] = noisy = behaviour.measured(self.parameters, (x, y, z), n)
-        return noisy
+        values[_Y] = measured = plant.measure((x, y, z), n, self.parameters.noise.std)
+        return measured
 
     def expected(
         self, parameters: Parameters, state: PlantState, outputs: Outputs

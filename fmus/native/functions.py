@@ -310,7 +310,7 @@ class _Translation:
                 code = self._expression(part.value)
                 how = "".join(ast.literal_eval(x) for x in getattr(part.format_spec, "values", ()))
                 form += "%s" if code.shape == TEXT else f"%{how}"
-                arguments.append(code.text)
+                arguments.append(f"shown({code.text})" if code.shape == DOUBLE else code.text)
             else:
                 form += str(ast.literal_eval(part)).replace("%", "%%")
         quoted = '"' + form.replace("\\", "\\\\").replace('"', '\\"') + '"'

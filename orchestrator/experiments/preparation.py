@@ -14,6 +14,7 @@ from orchestrator.experiments.scenario import Scenario, read_scenario
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.isolated import Isolation
+from orchestrator.master.loop import LOOPS
 from orchestrator.system.component import RUNNABLE, WRITABLE
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.reading import read_ssp
@@ -33,6 +34,7 @@ class Request:
         parameters: values that win over the scenario's.
         kind: of the bundle's FMUs, one of :data:`orchestrator.experiments.bundle.KINDS`.
         isolation: of the FMUs in processes of their own; None: they run in this one.
+        loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
 
     """
 
@@ -42,16 +44,18 @@ class Request:
     parameters: Mapping[PortName, object] = field(default_factory=dict)
     isolation: Isolation | None = None
     kind: str = PYTHON
+    loop: str = LOOPS[0]
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A system that is ready to be run, the scenario that it comes from, and where its FMUs run."""
+    """A system that is ready to be run, the scenario that it comes from, and how it is stepped."""
 
     scenario: Scenario
     system: System
     experiment: Experiment
     isolation: Isolation | None = None
+    loop: str = LOOPS[0]
 
 
 def load(name: str | Path, kind: str = PYTHON) -> System:
@@ -122,7 +126,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     if step is None:
         step = DEFAULT_STEP
     experiment = Experiment(stop_time, step, request.order)
-    return Prepared(scenario, system, experiment, request.isolation)
+    return Prepared(scenario, system, experiment, request.isolation, request.loop)
 
 
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:

@@ -73,6 +73,7 @@ def write_record(
             "step": experiment.step,
             "order": experiment.order,
         },
+        "loop": header.loop,
         "fmus": {
             component.name: {
                 "file": component.fmu.name,
@@ -116,4 +117,5 @@ def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
         columns,
         Experiment(experiment["stop_time"], experiment["step"], experiment["order"]),
         {port_name(name): value for name, value in record["parameters"].items()},
+        record.get("loop", "python"),
     )

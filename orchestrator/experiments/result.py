@@ -28,6 +28,7 @@ from orchestrator.experiments.scenario import Scenario
 from orchestrator.master.experiment import ORDERS
 from orchestrator.master.files import FORMATS
 from orchestrator.master.isolated import isolation_of
+from orchestrator.master.loop import LOOPS
 from orchestrator.master.observer import Observer
 from orchestrator.master.progress import Progress
 from orchestrator.master.simulation import simulate as run
@@ -175,6 +176,7 @@ def simulate(
     progress: bool = False,
     isolate: bool = False,
     step_timeout: float | None = None,
+    loop: str = LOOPS[0],
 ) -> Result:
     """Run a scenario, an SSP or a system.
 
@@ -193,6 +195,8 @@ def simulate(
         isolate: run each FMU in a process of its own, whose end, whatever it does, is no more than
             a failure of the run.
         step_timeout: how long an isolated FMU may take for one call [s]; None: 60.
+        loop: what makes the steps: `python`, `compiled`, or `auto`, the compiled loop where it is
+            to be had; the rows are the same.
 
     Returns:
         The rows that were computed: all of them, or those before a failure, which
@@ -214,10 +218,11 @@ def simulate(
         port_name(str(name)): value for name, value in (parameters or {}).items()
     }
     isolation = isolation_of(isolate, step_timeout)
-    prepared = prepare(scenario, system, Request(stop_time, step, order, changes, isolation, kind))
+    request = Request(stop_time, step, order, changes, isolation, kind, loop)
+    prepared = prepare(scenario, system, request)
     result = Result(prepared)
     observers: list[Observer] = [result, *([Progress(scenario.name)] * progress)]
-    ending = run(prepared.system, prepared.experiment, observers, prepared.isolation)
+    ending = run(prepared.system, prepared.experiment, observers, prepared.isolation, prepared.loop)
     for number in ending.signals:
         # Held back while the FMUs computed; now it does what it does elsewhere.
         signal.raise_signal(number)

@@ -106,11 +106,5 @@ def normalised(quaternion: Vector4) -> Vector4:
 
     """
     a, b, c, d = quaternion
-    norm = length(quaternion)
+    norm = sqrt(a * a + b * b + c * c + d * d)
     return a / norm, b / norm, c / norm, d / norm
-
-
-def length(quaternion: Vector4) -> float:
-    """The norm of a quaternion, one if it is a rotation."""
-    a, b, c, d = quaternion
-    return sqrt(a * a + b * b + c * c + d * d)

@@ -16,7 +16,7 @@ from auv_fmu.control_point import ELL, actuator_command
 from auv_fmu.euler import advance, advance_4
 from auv_fmu.saturation import TANH, Saturation, saturation
 from auv_fmu.types import Vector3, Vector4
-from auv_fmu.vectors import difference, norm
+from auv_fmu.vectors import difference, distance, norm
 
 
 class Gains(NamedTuple):
@@ -84,7 +84,7 @@ def credible(gains: Gains, state: ControllerState, y: Vector3) -> bool:
 
     """
     gate = gains.innovation_gate
-    return not gate or norm(difference(y, state.y_hat)) <= gate
+    return not gate or distance(y, state.y_hat) <= gate
 
 
 def restarted(gains: Gains, state: ControllerState, y: Vector3) -> ControllerState:

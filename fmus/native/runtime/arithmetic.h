@@ -7,6 +7,15 @@
 #ifndef ARITHMETIC_H
 #define ARITHMETIC_H
 
+/* Each operation is rounded by itself, as Python does it, whatever flags an importer compiles with. */
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__) && defined(__FP_FAST_FMA)
+#pragma GCC optimize("fp-contract=off")
+#elif defined(_MSC_VER)
+#pragma fp_contract(off)
+#endif
+
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -27,6 +36,9 @@ static void raise_error(Error *error, const char *format, ...) {
     vsnprintf(error->why, sizeof error->why, format, arguments);
     va_end(arguments);
 }
+
+/* A number for a text: Python's NaN has no sign. */
+static inline double shown(double x) { return isnan(x) ? fabs(x) : x; }
 
 static void raise_domain_error(Error *error) { raise_error(error, "ValueError: math domain error"); }
 

@@ -268,6 +268,9 @@ static int take_run(reader *from, run *it, message *why) {
     if (!isfinite(it->start_time) || isnan(it->time)) {
         return compose(why, "a value is not finite");
     }
+    if (it->mode < STEPPING && it->time != it->start_time) {
+        return compose(why, "it has another time than that of its start");
+    }
     for (int i = 0; i < N_PORTS; i++) {
         if (ports[i].causality == PARAMETER &&
             !take_parameter(from, &it->parameters, &ports[i], why)) {
