@@ -77,6 +77,14 @@ BUILD = """
   <BuildConfiguration modelIdentifier="It">
     <SourceFileSet language="C99"><SourceFile name="fmi3.c"/></SourceFileSet>
   </BuildConfiguration>
+  <BuildConfiguration modelIdentifier="It" platform="x86_64-linux">
+    <SourceFileSet language="C99"><SourceFile name="fmi3.c"/></SourceFileSet>
+    <Library name="m" external="true"/>
+  </BuildConfiguration>
+  <BuildConfiguration modelIdentifier="It" platform="aarch64-linux">
+    <SourceFileSet language="C99"><SourceFile name="fmi3.c"/></SourceFileSet>
+    <Library name="m" external="true"/>
+  </BuildConfiguration>
 </fmiBuildDescription>
 """
 
