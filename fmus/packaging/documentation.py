@@ -16,7 +16,11 @@ from string import Template
 from markdown_it import MarkdownIt
 
 from fmus.packaging.discovery import components, folder_of
+from fmus.packaging.kinds import NATIVE, PYTHON
 from fmus.ports.port import FAULT, Port
+
+#: The picture of every component.
+ICON = Path(__file__).with_name("icon.png")
 
 _HTML = Path(__file__).with_name("page.html")
 
@@ -26,7 +30,7 @@ _REFUSALS = """\
 A value out of its range or not finite, a value reference that is not there or of another type, an
 output or a fixed parameter set during the run, a call out of order, a state that no run can have
 led to: such a call changes nothing, is logged with status fmi2Discard, and raises `fault`.
-PythonFMU answers it with fmi2OK, so the steps tell: **every fmi2DoStep after it ends with
+{answer} with fmi2OK, so the steps tell: **every fmi2DoStep after it ends with
 fmi2Discard and changes nothing until it is mended**, a value by a good value of the same variable,
 anything by fmi2Reset or by restoring a state.
 
@@ -35,6 +39,20 @@ not be finite, ends with fmi2Discard and leaves everything as it was, noise incl
 step is taken. `fault` stays true until fmi2Reset or until a state without it is restored.
 
 The whole table of calls, states and bad arguments is `docs/status.md` of the project."""
+
+#: Why a refused call is not answered with another status.
+_ANSWERS = {
+    PYTHON: "PythonFMU answers it",
+    NATIVE: "Like its twin in Python, this FMU answers it",
+}
+
+_NATIVE = """\
+## What it is made of
+
+This FMU holds libraries and needs nothing but the C library of its platform, no Python. They were
+compiled from the C sources in its folder `sources`, which any importer can compile for another
+platform: one file that includes all others. The equations in them were translated from the Python
+text that the FMU's twin runs, so both give the same numbers."""
 
 _EXAMPLE = """\
 ## Example
@@ -54,12 +72,14 @@ A step longer than `h_max`, where there is such a parameter, is split evenly wit
 `fault` true, and there is no text. Add `debug_logging=True` to read the reason.**"""
 
 
-def page(name: str) -> str:
+def page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
     """The page of a component in Markdown: what it is, its ports, what it refuses, an example."""
     module = components()[name]
     text = (folder_of(module) / "page.md").read_text(encoding="utf-8").strip()
     ports: Sequence[Port] = (*import_module(module.replace(".slave", ".ports")).PORTS, FAULT)
-    parts = (text, *_tables(ports), _REFUSALS, _EXAMPLE.format(name=name))
+    refusals = _REFUSALS.format(answer=_ANSWERS[kind]).replace("fmi2", f"fmi{fmi}")
+    made_of = (_NATIVE,) if kind == NATIVE else ()
+    parts = (text, *made_of, *_tables(ports), refusals, _EXAMPLE.format(name=name))
     return "\n\n".join(parts) + "\n"
 
 
@@ -104,21 +124,24 @@ def _range(port: Port) -> str:
     return " ".join(filter(None, (lower, upper)))
 
 
-def html(name: str) -> str:
+def html(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
     """The page of a component as one HTML file."""
-    body = MarkdownIt("commonmark").enable("table").render(page(name))
+    body = MarkdownIt("commonmark").enable("table").render(page(name, kind, fmi))
     body = body.replace("<table>", '<div class="table"><table>')
     body = body.replace("</table>", "</table></div>")
     return Template(_HTML.read_text(encoding="utf-8")).substitute(title=name, body=body)
 
 
-def licences() -> str:
-    """Licence of the bundle, and of PythonFMU, parts of which every FMU contains."""
-    texts = [
-        distribution(package).read_text("licenses/LICENSE") or ""
+def licences(kind: str) -> str:
+    """Licence of the bundle, and of PythonFMU, if parts of it are in the FMU."""
+    texts = {
+        package: distribution(package).read_text("licenses/LICENSE") or ""
         for package in ("auv-fmu", "pythonfmu")
-    ]
-    return f"auv-fmu\n\n{texts[0]}\n\nPythonFMU, contained in resources and binaries\n\n{texts[1]}"
+    }
+    ours = f"auv-fmu\n\n{texts['auv-fmu']}"
+    if kind == NATIVE:
+        return ours
+    return f"{ours}\n\nPythonFMU, contained in resources and binaries\n\n{texts['pythonfmu']}"
 
 
 def main() -> None:

@@ -27,6 +27,7 @@ from orchestrator.experiments.run import Files, run_into
 from orchestrator.master.files import FORMATS
 from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.isolated import STEP_TIMEOUT, isolation_of
+from orchestrator.master.loop import LOOPS
 
 
 def add_to(commands: Any) -> None:
@@ -66,13 +67,20 @@ def add_to(commands: Any) -> None:
         help="how long an isolated FMU may take for one call [s]; "
         f"default: {STEP_TIMEOUT:g}; needs --isolate",
     )
+    run.add_argument(
+        "--loop",
+        choices=LOOPS,
+        default=LOOPS[0],
+        help="what makes the steps: Python, or a loop in C; the rows are the same; default: auto, "
+        "the compiled one where it is to be had",
+    )
     run.set_defaults(action=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
     isolation = isolation_of(options.isolate, options.step_timeout)
-    wanted = replace(request(options), isolation=isolation)
-    runs = with_companion(prepare(*loaded(options.scenario), wanted), wanted)
+    wanted = replace(request(options), isolation=isolation, loop=options.loop)
+    runs = with_companion(prepare(*loaded(options.scenario, options.kind), wanted), wanted)
     folder = options.out or Path("results", runs[0].scenario.name)
     files = Files(options.interval, options.columns, options.format, options.figures)
     # Until all is said: who stops a run several times wants to know, too, where its rows are.

@@ -133,7 +133,11 @@ def run_into(
 
                 with interrupts.insistence(give_up):
                     ending = simulate(
-                        prepared.system, prepared.experiment, run.observers, prepared.isolation
+                        prepared.system,
+                        prepared.experiment,
+                        run.observers,
+                        prepared.isolation,
+                        prepared.loop,
                     )
                 done.append(run.ended(ending))
                 for caution in cautions_after(done[-1].seen):

@@ -15,6 +15,10 @@ module                  what it holds
 :mod:`.row`             the row of all values
 :mod:`.transfer`        the FMI calls that move them
 :mod:`.schedule`        which components are stepped when, and on whose outputs
+:mod:`.loop`            the steps in Python, one by one, and which loop makes them
+:mod:`.stepper`         the steps compiled, some hundred in one call of stepper.c
+:mod:`.layout`          what stepper.c works on
+:mod:`.library`         stepper.c as a library, kept in the user's cache folder
 :mod:`.observer`        what observers are told, and the blocks in which they are told it
 :mod:`.progress`        a bar
 :mod:`.selection`       which rows and columns are kept

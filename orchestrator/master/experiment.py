@@ -81,6 +81,10 @@ class Experiment:
         """How many rows a complete run has: one at the start, and one a step."""
         return 1 + self.full_steps + self.has_short_step
 
+    def time(self, k: int) -> float:
+        """The time after k steps [s]."""
+        return k * self.step if k <= self.full_steps else self.stop_time
+
     def steps(self) -> Iterator[tuple[float, float, float]]:
         """Beginning, length and end of every step [s]: t_k = k h, never accumulated."""
         step = self.step

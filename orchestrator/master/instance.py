@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from orchestrator.master import layout
 from orchestrator.system.values import Value
 
 
@@ -52,6 +53,10 @@ class Instance(Protocol):
     name: str
     set_inputs: list[Callable[[], int]]
     get_outputs: list[Callable[[], int]]
+
+    @property
+    def pointers(self) -> Callable[[], layout.Member] | None:
+        """The same calls for the compiled loop; None: they are no functions in this process."""
 
     @property
     def do_step(self) -> Callable[[float, float, int], int]:

@@ -92,6 +92,8 @@ class IsolatedInstance:
     A step is one message there, with the inputs, and one back, with the outputs.
     """
 
+    pointers = None
+
     def __init__(
         self,
         component: Component,

@@ -35,6 +35,7 @@ from fmpy.logging import addLoggerProxy
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from orchestrator.errors import InputError, reason
+from orchestrator.master import layout
 from orchestrator.master.instance import ComponentFailed, Instance, Part
 from orchestrator.master.log import Listener
 from orchestrator.master.transfer import Block
@@ -110,6 +111,8 @@ class LoadedInstance:
         self.name = component.name
         self.set_inputs: list[Callable[[], int]] = []
         self.get_outputs: list[Callable[[], int]] = []
+        self._inputs: list[Block] = []
+        self._outputs: list[Block] = []
         self._variables = component.variables
         self._library = library
         self._listener = listener
@@ -146,11 +149,33 @@ class LoadedInstance:
     def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
         """Say where its values are."""
         for part in parts:
-            block = Block(part.kind, part.references, values[part.place])
+            block = Block(*part[:3], values[part.place])
+            function = self.function(block.function)
             if part.causality == "input":
-                self.set_inputs.append(block.setter(self.function))
+                self._inputs.append(block)
+                self.set_inputs.append(block.setter(function))
             else:
-                self.get_outputs.append(block.getter(self.function))
+                self._outputs.append(block)
+                self.get_outputs.append(block.getter(function))
+
+    def pointers(self) -> layout.Member:
+        """The same calls for the compiled loop."""
+        inputs, outputs = (
+            [block.move(self._address(block.function)) for block in blocks]
+            for blocks in (self._inputs, self._outputs)
+        )
+        return layout.Member(
+            self._fmu.component,
+            self._address("DoStep"),
+            (layout.Move * len(inputs))(*inputs),
+            (layout.Move * len(outputs))(*outputs),
+            len(inputs),
+            len(outputs),
+        )
+
+    def _address(self, name: str) -> int | None:
+        """Of one of the FMU's functions, without fmi2."""
+        return ctypes.cast(self._fmu.dll[f"fmi2{name}"], ctypes.c_void_p).value
 
     def enter_initialization(self, values: Mapping[str, Value], stop_time: float) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""

@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from orchestrator.errors import reason
+from orchestrator.master import layout
 from orchestrator.master.experiment import Experiment
 from orchestrator.system.names import PortName
 
@@ -29,12 +30,14 @@ class Header:
         columns: `component.port` of every value in a row, behind the time.
         experiment: that is run.
         parameters: of all components, as the FMUs reported them after initialisation.
+        loop: which one makes the steps, `python` or `compiled`: the rows are the same.
 
     """
 
     columns: tuple[str, ...]
     experiment: Experiment
     parameters: Mapping[PortName, Any] = field(default_factory=dict)
+    loop: str = field(default="python", compare=False)
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,12 @@ class Observer(Protocol):
 
 
 class Blocks:
-    """Hands rows to observers, some hundred at a time."""
+    """Hands rows to observers, some hundred at a time.
+
+    Attributes:
+        block: the rows that observers do not know yet, as the compiled loop fills them.
+
+    """
 
     def __init__(self, width: int, observers: Sequence[Observer]) -> None:
         """Make room for one block.
@@ -83,17 +91,20 @@ class Blocks:
         """
         self._rows = np.empty((_ROWS, 1 + width))
         self._times, self._values = self._rows[:, 0], self._rows[:, 1:]
-        self._n = 0
+        self.block = layout.Block(self._rows.ctypes.data, _ROWS)
         self._due = monotonic() + _PATIENCE
         self._observers = observers
 
     def append(self, t: float, values: np.ndarray) -> None:
-        """Take a row."""
-        n = self._n
+        """Take a row, for which there is room once somebody has looked at the one before."""
+        n = self.block.n
         self._times[n] = t
         self._values[n] = values
-        self._n = n + 1
-        if self._n == _ROWS or monotonic() > self._due:
+        self.block.n = n + 1
+
+    def look(self) -> None:
+        """Tell the observers of rows, if there is no room for more or they have waited enough."""
+        if self.block.n == _ROWS or monotonic() > self._due:
             self.hand_over()
 
     def hand_over(self) -> None:
@@ -104,9 +115,9 @@ class Blocks:
 
         """
         failures: list[Exception] = []
-        if self._n:
+        if n := self.block.n:
             # Counted as told before they are told: an observer that fails is not told twice.
-            rows, self._n = self._rows[: self._n], 0
+            rows, self.block.n = self._rows[:n], 0
             for observer in self._observers:
                 try:
                     observer.take(rows)

@@ -17,10 +17,14 @@ from typing import NamedTuple
 import numpy as np
 from fmpy.fmi2 import fmi2Warning
 
+from orchestrator.master import layout
 from orchestrator.master.instance import Instance
 from orchestrator.master.row import Row
 from orchestrator.system.graph import feedthrough_stages, has_feedthrough
 from orchestrator.system.structure import Connection, System
+
+#: What a component is asked for in every step, one after the other.
+CALLS = SET_INPUTS, DO_STEP, GET_OUTPUTS = "setting inputs", "fmi2DoStep", "getting outputs"
 
 
 class Member(NamedTuple):
@@ -30,6 +34,7 @@ class Member(NamedTuple):
     do_step: Callable[[float, float, int], int]
     get_outputs: list[Callable[[], int]]
     failed: Callable[[int, str], Exception]
+    pointers: Callable[[], layout.Member] | None = None
 
 
 class Stage(NamedTuple):
@@ -76,18 +81,24 @@ def schedule(
 
 def member(instance: Instance) -> Member:
     """The calls of an instance that is tied to a row."""
-    return Member(instance.set_inputs, instance.do_step, instance.get_outputs, instance.failed)
+    return Member(
+        instance.set_inputs,
+        instance.do_step,
+        instance.get_outputs,
+        instance.failed,
+        instance.pointers,
+    )
 
 
 def step(members: Sequence[Member], t: float, h: float) -> None:
     """Step the components of a stage, which may run side by side until their outputs are asked."""
-    for set_inputs, do_step, _, failed in members:
+    for set_inputs, do_step, _, failed, _ in members:
         for call in set_inputs:
             if (status := call()) > fmi2Warning:
-                raise failed(status, "setting inputs")
+                raise failed(status, SET_INPUTS)
         if (status := do_step(t, h, 1)) > fmi2Warning:
-            raise failed(status, "fmi2DoStep")
-    for _, _, get_outputs, failed in members:
+            raise failed(status, DO_STEP)
+    for _, _, get_outputs, failed, _ in members:
         for call in get_outputs:
             if (status := call()) > fmi2Warning:
-                raise failed(status, "getting outputs")
+                raise failed(status, GET_OUTPUTS)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from functools import partial
 
 import numpy as np
 
@@ -15,9 +14,10 @@ from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.isolated import Isolation, isolated
 from orchestrator.master.loaded import all_loaded
 from orchestrator.master.log import Log
+from orchestrator.master.loop import LOOPS, chosen
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import Stage, schedule, stages, step
+from orchestrator.master.schedule import schedule, stages
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 
@@ -27,6 +27,7 @@ def simulate(
     experiment: Experiment,
     observers: Sequence[Observer] = (),
     isolation: Isolation | None = None,
+    loop: str = LOOPS[0],
 ) -> Ending:
     """Run a system from t = 0.
 
@@ -35,12 +36,13 @@ def simulate(
         experiment: until when, in which steps and which order.
         observers: take the rows.
         isolation: run each FMU in a process of its own; None: all in this one.
+        loop: one of :data:`.loop.LOOPS`.
 
     Returns:
         How the run has ended: after a failure the observers have the rows before it.
 
     Raises:
-        InputError: system or parameters are not usable; nothing was stepped.
+        InputError: system, parameters or loop are not usable; nothing was stepped.
         KeyboardInterrupt: somebody wants it to stop, and an FMU does not come to its first step.
 
     """
@@ -57,11 +59,15 @@ def simulate(
             )
             row = Row(system, instances)
             _initialise(system, instances, row, experiment, log)
-            header = Header(tuple(map(str, row.columns)), experiment, _parameters(instances))
-        steps = schedule(system, plan, instances, row)
+            parameters = _parameters(instances)
+        scheduled = schedule(system, plan, instances, row)
+        taken = chosen(loop, experiment, scheduled)
+        header = Header(tuple(map(str, row.columns)), experiment, parameters, taken.name)
         with _told(header, observers) as tell:
             blocks = Blocks(len(row.values), observers)
             interrupts.hand_over = blocks.hand_over
+            blocks.append(0.0, row.values)
+            steps = taken.steps(experiment, scheduled, row.values, blocks)
             order = [name for names in plan for name in names]
             try:
                 failure = _advance(experiment, steps, row, order, blocks, interrupts)
@@ -108,7 +114,8 @@ def _initialise(
         instance.enter_initialization(system.parameters_of(name), experiment.stop_time)
     values = row.values
     targets, sources = row.places(system.connections)
-    for _ in range(len(instances) + 1):
+    # Through a chain of all, once more for what its end feeds, and once to see it at rest.
+    for _ in range(len(instances) + 2):
         before = values.copy()
         values[targets] = values[sources]
         _exchange(instances, row)
@@ -148,36 +155,27 @@ def _terminate(instances: Mapping[str, Instance]) -> None:
 
 def _advance(
     experiment: Experiment,
-    plan: Sequence[Stage],
+    steps: Iterator[int],
     row: Row,
     order: Sequence[str],
     blocks: Blocks,
     interrupts: Interrupts,
 ) -> str | None:
     """Step to the end, or to the first failure, and say what it was."""
-    values, failure = row.values, None
-    # Times zero, what is finite is zero and what is not is nan: the cheapest way to see it.
-    is_not_finite = partial(np.vdot, values, np.zeros_like(values))
-    t = end = 0.0
-    blocks.append(t, values)
+    k, failure = 0, None
     try:
-        for t, h, end in experiment.steps():
-            for targets, sources, members in plan:
-                values[targets] = values[sources]
-                step(members, t, h)
-            if is_not_finite():
-                break
-            blocks.append(end, values)
+        for k in steps:
+            blocks.look()
             if interrupts.signals:
-                failure = f"interrupted at t = {end:.12g} s"
+                failure = f"interrupted at t = {experiment.time(k):.12g} s"
                 break
     except ComponentFailed as error:
-        failure = f"stopped at t = {t:.12g} s: {error}"
+        failure = f"stopped at t = {experiment.time(k):.12g} s: {error}"
     except KeyboardInterrupt:
-        failure = f"interrupted at t = {t:.12g} s"
+        failure = f"interrupted at t = {experiment.time(k):.12g} s"
     # Also where another component has refused it in the same step.
     if not_finite := row.not_finite(order):
-        failure = f"stopped at t = {end:.12g} s: {not_finite}"
+        failure = f"stopped at t = {experiment.time(k + 1):.12g} s: {not_finite}"
     blocks.hand_over()
     return failure
 

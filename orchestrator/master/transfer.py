@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from ctypes import c_size_t
+from ctypes import addressof, c_size_t
 from functools import partial
 
 import numpy as np
 from fmpy.fmi2 import fmi2Boolean, fmi2Integer, fmi2Real, fmi2ValueReference
+
+from orchestrator.master import layout
 
 #: Kinds of values that can be connected and recorded, with FMI's functions and types for them.
 KINDS = {
@@ -19,18 +21,27 @@ KINDS = {
 
 
 class Block:
-    """Values of one kind, side by side in the row of all values, moved by one FMI call."""
+    """Values of one kind, side by side in the row of all values, moved by one FMI call.
 
-    def __init__(self, kind: str, references: Sequence[int], row: np.ndarray) -> None:
+    Attributes:
+        function: the one of FMI that moves them, without fmi2.
+
+    """
+
+    def __init__(
+        self, causality: str, kind: str, references: Sequence[int], row: np.ndarray
+    ) -> None:
         """Prepare the arrays that every call uses.
 
         Args:
+            causality: `input` or `output`.
             kind: one of :data:`KINDS`.
             references: value references.
             row: the part of the row of all values where the values are, a view.
 
         """
         self._kind, c_type = KINDS[kind]
+        self.function = f"{'Set' if causality == 'input' else 'Get'}{self._kind}"
         self._row = row
         n = len(references)
         self._n = c_size_t(n)
@@ -41,9 +52,9 @@ class Block:
             self._values = (c_type * n)()
             self._integers = np.frombuffer(self._values, dtype=np.intc)
 
-    def setter(self, function: Callable[[str], Callable[..., int]]) -> Callable[[], int]:
-        """A call that hands the values to the FMU, one of whose functions have these names."""
-        call = self._call(function, "Set")
+    def setter(self, function: Callable[..., int]) -> Callable[[], int]:
+        """A call that hands the values to an FMU, by its function of this block."""
+        call = self._call(function)
         if self._kind == "Real":
             return call
 
@@ -53,9 +64,9 @@ class Block:
 
         return set_converted
 
-    def getter(self, function: Callable[[str], Callable[..., int]]) -> Callable[[], int]:
-        """A call that takes the values from the FMU."""
-        call = self._call(function, "Get")
+    def getter(self, function: Callable[..., int]) -> Callable[[], int]:
+        """A call that takes the values from an FMU, by its function of this block."""
+        call = self._call(function)
         if self._kind == "Real":
             return call
 
@@ -74,7 +85,11 @@ class Block:
         # Most components have one such output, and an array of one costs twice as much.
         return get_one if len(row) == 1 else get_converted
 
-    def _call(
-        self, function: Callable[[str], Callable[..., int]], action: str
-    ) -> Callable[[], int]:
-        return partial(function(f"{action}{self._kind}"), self._references, self._n, self._values)
+    def move(self, address: int | None) -> layout.Move:
+        """The same for the compiled loop, by the address of the FMU's function of this block."""
+        integers = None if self._kind == "Real" else addressof(self._values)
+        references, row = addressof(self._references), self._row.ctypes.data
+        return layout.Move(address, references, self._n, row, integers)
+
+    def _call(self, function: Callable[..., int]) -> Callable[[], int]:
+        return partial(function, self._references, self._n, self._values)

@@ -25,8 +25,12 @@ _PREFIX = "auvfmu-"
 
 
 @contextmanager
-def claimed(path: Path) -> Iterator[None]:
+def claimed(path: Path, wait: bool = False) -> Iterator[None]:
     """Keep other processes from a file or folder.
+
+    Args:
+        path: of the file or folder.
+        wait: for another process that has it.
 
     Raises:
         BlockingIOError: another process has it.
@@ -38,13 +42,13 @@ def claimed(path: Path) -> Iterator[None]:
         return
     descriptor = os.open(path, os.O_RDONLY)
     try:
-        _lock(descriptor)
+        _lock(descriptor, wait)
         yield
     finally:
         os.close(descriptor)
 
 
-def _lock(descriptor: int) -> bool:
+def _lock(descriptor: int, wait: bool = False) -> bool:
     """Lock a file; whether that can be known, which not every file system can tell.
 
     Raises:
@@ -52,7 +56,7 @@ def _lock(descriptor: int) -> bool:
 
     """
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
     except BlockingIOError:
         raise
     except OSError:

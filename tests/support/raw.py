@@ -135,6 +135,7 @@ class Message(NamedTuple):
     """What an FMU has logged."""
 
     status: Status
+    category: str
     text: str
 
 
@@ -167,8 +168,9 @@ class Host:
         self._fault = self.description.find("fault")
         self._outputs = _Arrays("Real", self.description.of("output", "Real"))
 
-    def _log(self, _environment: int, _name: bytes, status: int, _category: bytes, text: bytes):
-        self.messages.append(Message(Status(status), (text or b"").decode("utf-8", "replace")))
+    def _log(self, _environment: int, _name: bytes, status: int, category: bytes, text: bytes):
+        texts = (word.decode("utf-8", "replace") for word in (category or b"", text or b""))
+        self.messages.append(Message(Status(status), *texts))
 
     def instantiate(
         self,

@@ -119,3 +119,21 @@ def without_the_loader() -> dict[tuple[str, str], str]:
     """What becomes of calls on FMUs without the native loader, by function and case."""
     rows = _sections()["Without the native loader"].rows
     return {(function, case): answer for function, case, answer in rows}
+
+
+def _tables_of_fmi3() -> list[Section]:
+    return [section for section in sections(PAGE) if section.heading == "FMI 3.0"]
+
+
+@cache
+def names_in_fmi3() -> dict[str, str]:
+    """The functions of FMI 3.0 that answer as functions of FMI 2.0 do, by the names of these."""
+    names, _ = _tables_of_fmi3()
+    return dict(names.rows)
+
+
+@cache
+def fmi3_rows() -> dict[tuple[str, str], str]:
+    """What FMI 3.0 alone has: the answers, by function and case."""
+    _, own = _tables_of_fmi3()
+    return {(function, case): answer for function, case, answer in own.rows}

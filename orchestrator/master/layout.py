@@ -1,0 +1,73 @@
+"""What the compiled loop works on, laid out as stepper.c declares it."""
+
+from __future__ import annotations
+
+from ctypes import POINTER, Structure, c_double, c_int, c_size_t, c_void_p
+
+
+class Move(Structure):
+    """Values of one kind that are neighbours in the row, and FMI's function that moves them."""
+
+    _fields_ = (
+        ("call", c_void_p),
+        ("references", c_void_p),
+        ("n", c_size_t),
+        ("values", c_void_p),
+        ("integers", c_void_p),
+    )
+
+
+class Member(Structure):
+    """A component: how it is stepped, and how its inputs and outputs are moved."""
+
+    _fields_ = (
+        ("component", c_void_p),
+        ("do_step", c_void_p),
+        ("inputs", POINTER(Move)),
+        ("outputs", POINTER(Move)),
+        ("n_inputs", c_size_t),
+        ("n_outputs", c_size_t),
+    )
+
+
+class Stage(Structure):
+    """Inputs to gather, and the components to step then."""
+
+    _fields_ = (
+        ("targets", c_void_p),
+        ("sources", c_void_p),
+        ("members", POINTER(Member)),
+        ("n_connections", c_size_t),
+        ("n_members", c_size_t),
+    )
+
+
+class Run(Structure):
+    """What the steps of a run are made of."""
+
+    _fields_ = (
+        ("stages", POINTER(Stage)),
+        ("values", c_void_p),
+        ("n_stages", c_size_t),
+        ("n_values", c_size_t),
+        ("step", c_double),
+        ("stop_time", c_double),
+        ("full_steps", c_size_t),
+        ("steps", c_size_t),
+    )
+
+
+class Block(Structure):
+    """Rows, each with the time in front: where they are, how many there may be, and are."""
+
+    _fields_ = (("rows", c_void_p), ("most", c_size_t), ("n", c_size_t))
+
+
+class Failure(Structure):
+    """The first call with a status that is worse than a warning."""
+
+    _fields_ = (("stage", c_size_t), ("member", c_size_t), ("call", c_int), ("status", c_int))
+
+
+#: Why Python has to look.
+DUE, FAILED, NOT_FINITE = range(3)

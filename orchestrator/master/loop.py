@@ -1,0 +1,109 @@
+"""How the steps of a run are made: one after the other in Python, or many in one compiled call.
+
+Both make the same calls of FMI in the same order, and the same rows bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from ctypes import CDLL
+from functools import partial
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from orchestrator.errors import InputError
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.library import kept, made
+from orchestrator.master.observer import Blocks
+from orchestrator.master.schedule import Stage, step
+from orchestrator.master.stepper import stepped
+
+#: Loops that can be asked for; the first is the default.
+LOOPS = ("auto", "python", "compiled")
+
+#: So many steps take longer than to compile the loop for them.
+_MANY_STEPS = 10_000
+
+
+class Steps(Protocol):
+    """Makes the steps of a run, and is an iterator over the moments at which Python may look."""
+
+    def __call__(
+        self, experiment: Experiment, stages: Sequence[Stage], values: np.ndarray, blocks: Blocks
+    ) -> Iterator[int]:
+        """Make the steps; it ends before a row that is not finite.
+
+        Args:
+            experiment: which steps.
+            stages: of each.
+            values: the row of all values.
+            blocks: take a row after each step.
+
+        Yields:
+            How many steps have been made.
+
+        Raises:
+            ComponentFailed: by the step behind them.
+
+        """
+
+
+class Loop(NamedTuple):
+    """A loop, and its name in records."""
+
+    name: str
+    steps: Steps
+
+
+def chosen(wanted: str, experiment: Experiment, stages: Sequence[Stage]) -> Loop:
+    """The loop for a run.
+
+    Args:
+        wanted: one of :data:`LOOPS`.
+        experiment, stages: of the run.
+
+    Raises:
+        InputError: there is no such loop, or the compiled one cannot be had.
+
+    """
+    if wanted not in LOOPS:
+        raise InputError(f"loop {wanted!r}: use one of {', '.join(LOOPS)}")
+    if wanted == "python":
+        return _PYTHON
+    isolated = any(member.pointers is None for stage in stages for member in stage.members)
+    if wanted == "compiled":
+        if isolated:
+            raise InputError("the compiled loop steps no isolated FMUs: leave one of the two out")
+        return _compiled(kept() or made())
+    if not isolated:
+        if library := kept():
+            return _compiled(library)
+        if experiment.rows > _MANY_STEPS:
+            with suppress(InputError):
+                return _compiled(made(in_no_time=True))
+    return _PYTHON
+
+
+def interpreted(
+    experiment: Experiment, stages: Sequence[Stage], values: np.ndarray, blocks: Blocks
+) -> Iterator[int]:
+    """Make the steps in Python, and look after each."""
+    # Times zero, what is finite is zero and what is not is nan: the cheapest way to see it.
+    is_not_finite = partial(np.vdot, values, np.zeros_like(values))
+    for k, (t, h, end) in enumerate(experiment.steps(), start=1):
+        for targets, sources, members in stages:
+            values[targets] = values[sources]
+            step(members, t, h)
+        if is_not_finite():
+            return
+        blocks.append(end, values)
+        yield k
+
+
+_PYTHON = Loop("python", interpreted)
+
+
+def _compiled(library: CDLL) -> Loop:
+    return Loop("compiled", partial(stepped, library))

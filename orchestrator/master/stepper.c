@@ -1,0 +1,178 @@
+/* The loop of a run, compiled: stepper.py calls it, and loop.py says the same in Python.
+ *
+ * It makes one step after the other through the FMUs' own functions, and a row after each, until
+ * Python has to look: the block of rows is full, it is time to, or a step has gone wrong.
+ */
+#ifdef _WIN32
+#include <windows.h>
+#define EXPORTED __declspec(dllexport)
+#else
+#define _POSIX_C_SOURCE 199309L
+#include <time.h>
+#define EXPORTED
+#endif
+#include <stddef.h>
+#include <string.h>
+
+/* The worst of FMI's statuses that is no failure. */
+enum { FMI2_WARNING = 1 };
+
+/* Partial sums that processors add side by side. */
+enum { LANES = 4 };
+
+typedef unsigned reference;
+
+/* FMI's function that moves values of one kind, to an FMU or from it. */
+typedef union {
+    int (*set_reals)(void *component, const reference[], size_t n, const double[]);
+    int (*set_integers)(void *component, const reference[], size_t n, const int[]);
+    int (*get_reals)(void *component, const reference[], size_t n, double[]);
+    int (*get_integers)(void *component, const reference[], size_t n, int[]);
+} mover;
+
+/* Values of one kind that are neighbours in the row. */
+typedef struct {
+    mover call;
+    const reference *references;
+    size_t n;
+    double *values; /* their place in the row */
+    int *integers;  /* as FMI's Integers or Booleans; NULL: they are Reals */
+} move;
+
+typedef struct {
+    void *component;
+    int (*do_step)(void *component, double t, double h, int no_rollback);
+    const move *inputs, *outputs;
+    size_t n_inputs, n_outputs;
+} member;
+
+/* Inputs to gather, and the components to step then. */
+typedef struct {
+    const size_t *targets, *sources;
+    const member *members;
+    size_t n_connections, n_members;
+} stage;
+
+typedef struct {
+    const stage *stages;
+    double *values; /* the row of all values */
+    size_t n_stages, n_values;
+    double step, stop_time;
+    size_t full_steps; /* and, if there are more steps, a shorter one */
+    size_t steps;
+} run;
+
+/* Rows, each with the time in front; Python reads their number meanwhile. */
+typedef struct {
+    double *rows;
+    size_t most, n;
+} block;
+
+/* The first call with a status that is worse than a warning. */
+typedef struct {
+    size_t stage, member;
+    enum { SET_INPUTS, DO_STEP, GET_OUTPUTS } call;
+    int status;
+} failure;
+
+/* Why Python has to look. */
+enum { DUE, FAILED, NOT_FINITE };
+
+/* Seconds since some moment, whatever happens to the date. */
+static double now(void) {
+#ifdef _WIN32
+    return 1e-3 * (double)GetTickCount64();
+#else
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+#endif
+}
+
+static int set(const move *inputs, void *component) {
+    size_t i;
+    if (inputs->integers == NULL) {
+        return inputs->call.set_reals(component, inputs->references, inputs->n, inputs->values);
+    }
+    for (i = 0; i < inputs->n; i++) inputs->integers[i] = (int)inputs->values[i];
+    return inputs->call.set_integers(component, inputs->references, inputs->n, inputs->integers);
+}
+
+static int get(const move *outputs, void *component) {
+    size_t i;
+    int status;
+    if (outputs->integers == NULL) {
+        return outputs->call.get_reals(component, outputs->references, outputs->n, outputs->values);
+    }
+    status = outputs->call.get_integers(component, outputs->references, outputs->n,
+                                        outputs->integers);
+    for (i = 0; i < outputs->n; i++) outputs->values[i] = outputs->integers[i];
+    return status;
+}
+
+/* Step the components of a stage; whether one of them failed. */
+static int stage_failed(const stage *this, double t, double h, failure *why) {
+    size_t i, j;
+    for (i = 0; i < this->n_members; i++) {
+        const member *it = &this->members[i];
+        why->member = i;
+        why->call = SET_INPUTS;
+        for (j = 0; j < it->n_inputs; j++) {
+            if ((why->status = set(&it->inputs[j], it->component)) > FMI2_WARNING) return 1;
+        }
+        why->call = DO_STEP;
+        if ((why->status = it->do_step(it->component, t, h, 1)) > FMI2_WARNING) return 1;
+    }
+    why->call = GET_OUTPUTS;
+    for (i = 0; i < this->n_members; i++) {
+        const member *it = &this->members[i];
+        why->member = i;
+        for (j = 0; j < it->n_outputs; j++) {
+            if ((why->status = get(&it->outputs[j], it->component)) > FMI2_WARNING) return 1;
+        }
+    }
+    return 0;
+}
+
+/* Make a step from t to t + h; whether a component failed. */
+static int step_failed(const run *this, double t, double h, failure *why) {
+    size_t i;
+    for (why->stage = 0; why->stage < this->n_stages; why->stage++) {
+        const stage *it = &this->stages[why->stage];
+        for (i = 0; i < it->n_connections; i++) {
+            this->values[it->targets[i]] = this->values[it->sources[i]];
+        }
+        if (stage_failed(it, t, h, why)) return 1;
+    }
+    return 0;
+}
+
+/* Times zero, what is finite is zero and what is not is NaN. */
+static int all_finite(const double values[], size_t n) {
+    double sums[LANES] = {0.0}, sum = 0.0;
+    size_t i, j;
+    for (i = 0; i + LANES <= n; i += LANES) {
+        for (j = 0; j < LANES; j++) sums[j] += 0.0 * values[i + j];
+    }
+    for (; i < n; i++) sum += 0.0 * values[i];
+    for (j = 0; j < LANES; j++) sum += sums[j];
+    return sum == 0.0;
+}
+
+/* Make the steps from the k-th on. */
+EXPORTED int advance(const run *this, size_t k, double patience, block *rows, failure *why) {
+    const double due = now() + patience;
+    for (; k < this->steps && rows->n < rows->most; k++) {
+        const int full = k < this->full_steps;
+        const double t = (double)k * this->step;
+        const double end = full ? (double)(k + 1) * this->step : this->stop_time;
+        double *row = rows->rows + rows->n * (1 + this->n_values);
+        if (step_failed(this, t, full ? this->step : end - t, why)) return FAILED;
+        if (!all_finite(this->values, this->n_values)) return NOT_FINITE;
+        row[0] = end;
+        memcpy(row + 1, this->values, this->n_values * sizeof *row);
+        rows->n++;
+        if (now() >= due) break;
+    }
+    return DUE;
+}

@@ -1,0 +1,195 @@
+"""FMUs in C with ports of all kinds, and systems of them."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+from zipfile import ZipFile
+
+import pytest
+from hypothesis import strategies as st
+
+from orchestrator.system.component import read_component
+from orchestrator.system.names import PortName
+from orchestrator.system.structure import Connection, System
+
+_SOURCE = Path(__file__).with_name("mixed.c")
+
+#: Kinds of ports, of which a component has up to four inputs and four outputs each.
+KINDS = ("Real", "Integer", "Enumeration", "Boolean")
+_MOST = 4
+
+
+def _constants(first: str) -> dict[str, int]:
+    """The values of an enumeration in the C source, by their names."""
+    found = re.search(rf"enum {{\s*({first}\b[^}}]*)}}", _SOURCE.read_text(encoding="utf-8"))
+    assert found is not None
+    values, value = {}, 0
+    for entry in found[1].split(","):
+        name, _, given = entry.partition("=")
+        value = int(given or value)
+        values[name.strip()] = value
+        value += 1
+    return values
+
+
+_PLACES, CALLS, ACTS = _constants("PORTS"), _constants("SET"), _constants("BEHAVE")
+_PARAMETERS = {name: _PLACES[name.upper()] for name in ("at", "act", "call", "milliseconds")}
+
+
+class Shape(NamedTuple):
+    """How many inputs and outputs of each kind an FMU has, and whether it claims feedthrough."""
+
+    inputs: tuple[int, ...]
+    outputs: tuple[int, ...]
+    feedthrough: bool = False
+
+    def ports(self, causality: str) -> list[tuple[str, str, int]]:
+        """Name, kind and value reference of each input or output."""
+        counts = self.inputs if causality == "input" else self.outputs
+        first = 0 if causality == "input" else _PLACES["OUTPUTS"]
+        # Integers and Enumerations share their references, as FMI's functions do.
+        return [
+            (f"{causality}.{kind}{i}", kind, first + (kind == "Enumeration") * _MOST + i)
+            for kind, n in zip(KINDS, counts, strict=True)
+            for i in range(n)
+        ]
+
+    def description(self) -> str:
+        """Its modelDescription.xml."""
+        variables = [
+            _variable(name, kind, reference, causality)
+            for causality in ("input", "output")
+            for name, kind, reference in self.ports(causality)
+        ]
+        n = len(self.ports("input"))
+        dependencies = " ".join(str(1 + i) for i in range(n)) if self.feedthrough else ""
+        unknowns = "".join(
+            f'<Unknown index="{1 + i}" dependencies="{dependencies}"/>'
+            for i in range(n, len(variables))
+        )
+        variables += [
+            f'<ScalarVariable name="{name}" valueReference="{reference}" causality="parameter" '
+            f'variability="fixed"><Integer start="{-(name == "at")}"/></ScalarVariable>'
+            for name, reference in _PARAMETERS.items()
+        ]
+        outputs = f"<Outputs>{unknowns}</Outputs>" if unknowns else ""
+        return (
+            '<?xml version="1.0" encoding="UTF-8"?>'
+            '<fmiModelDescription fmiVersion="2.0" modelName="Mixed" guid="mixed">'
+            '<CoSimulation modelIdentifier="mixed" canHandleVariableCommunicationStepSize="true"/>'
+            '<TypeDefinitions><SimpleType name="Mood"><Enumeration><Item name="good" value="1"/>'
+            "</Enumeration></SimpleType></TypeDefinitions>"
+            f"<ModelVariables>{''.join(variables)}</ModelVariables>"
+            f"<ModelStructure>{outputs}</ModelStructure></fmiModelDescription>"
+        )
+
+
+def _variable(name: str, kind: str, reference: int, causality: str) -> str:
+    variability = "continuous" if kind == "Real" else "discrete"
+    start = {"Boolean": "false", "Enumeration": "1"}.get(kind, "0")
+    given = f' start="{start}"' if causality == "input" else ""
+    declared = ' declaredType="Mood"' if kind == "Enumeration" else ""
+    initial = "" if causality == "input" else ' initial="calculated"'
+    return (
+        f'<ScalarVariable name="{name}" valueReference="{reference}" causality="{causality}" '
+        f'variability="{variability}"{initial}><{kind}{declared}{given}/></ScalarVariable>'
+    )
+
+
+@cache
+def _library() -> bytes:
+    """The FMU's library; the test is skipped where there is no compiler."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler")
+    with TemporaryDirectory() as folder:
+        library = Path(folder, "mixed.so")
+        subprocess.run(
+            [compiler, "-shared", "-fPIC", "-O1", "-w", "-o", library, _SOURCE], check=True
+        )
+        return library.read_bytes()
+
+
+def build(folder: Path, shape: Shape) -> Path:
+    """The FMU of a shape."""
+    fmu = folder / f"{abs(hash(shape)):x}.fmu"
+    if not fmu.exists():
+        with ZipFile(fmu, "w") as archive:
+            archive.writestr("modelDescription.xml", shape.description())
+            archive.writestr("binaries/linux64/mixed.so", _library())
+            archive.writestr("resources/nothing.txt", "")
+    return fmu
+
+
+def system_of(
+    folder: Path,
+    shapes: Mapping[str, Shape],
+    connections: Mapping[str, str] | None = None,
+    parameters: Mapping[str, int] | None = None,
+) -> System:
+    """A system of such FMUs.
+
+    Args:
+        folder: for the FMUs.
+        shapes: by the names of the components.
+        connections: sources by targets.
+        parameters: by `component.parameter`.
+
+    """
+    components = {
+        name: read_component(name, build(folder, shape)) for name, shape in shapes.items()
+    }
+    wires = tuple(Connection(_port(a), _port(b)) for b, a in (connections or {}).items())
+    values = {_port(name): value for name, value in (parameters or {}).items()}
+    return System("mixed", components, wires).with_parameters(values)
+
+
+def _port(text: str) -> PortName:
+    return PortName(*text.split(".", 1))
+
+
+_COUNTS = st.tuples(*[st.integers(0, _MOST)] * len(KINDS))
+
+
+@st.composite
+def systems(draw: st.DrawFn) -> dict[str, dict]:
+    """Arguments of :func:`system_of`: up to four components, of which one may misbehave."""
+    names = ["a", "b", "c", "d"][: draw(st.integers(1, 4))]
+    # Feedthrough goes one way, so that it makes no loop.
+    shapes = {
+        name: Shape(draw(_COUNTS), draw(_COUNTS), feedthrough=draw(st.booleans())) for name in names
+    }
+    outputs = {
+        kind: [
+            f"{name}.{port}"
+            for name, shape in shapes.items()
+            for port, of_kind, _ in shape.ports("output")
+            if of_kind == kind
+        ]
+        for kind in KINDS
+    }
+    connections = {}
+    for i, (name, shape) in enumerate(shapes.items()):
+        for port, kind, _ in shape.ports("input"):
+            sources = [
+                source
+                for source in outputs[kind]
+                if source.split(".")[0] < name or not shapes[source.split(".")[0]].feedthrough
+            ]
+            if sources and draw(st.booleans()):
+                connections[f"{name}.{port}"] = draw(st.sampled_from(sources))
+    bad = draw(st.sampled_from(names))
+    acts = ["BEHAVE", "WARN", "DISCARD", "FAIL", "NOT_A_NUMBER", "INFINITE", "SAYS"]
+    parameters = {
+        f"{bad}.act": ACTS[draw(st.sampled_from(acts))],
+        f"{bad}.call": draw(st.sampled_from(sorted(CALLS.values()))),
+        f"{bad}.at": draw(st.integers(1, 60)),
+    }
+    return {"shapes": shapes, "connections": connections, "parameters": parameters}
