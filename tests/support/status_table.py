@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import NamedTuple
 
+from fmus.packaging.kinds import NATIVE, PYTHON
 from support.markdown import DOCS, Section, sections
 
 PAGE = DOCS / "status.md"
@@ -105,9 +106,14 @@ def _cell(text: str, state: str) -> Cell:
     return Cell(answer, leads_to or (ERROR if name == ERROR else state))
 
 
-def creations() -> dict[str, bool]:
+def creations(kind: str = PYTHON) -> dict[str, bool]:
     """Whether fmi2Instantiate gives an instance, by what it is called with."""
-    return {case: answer == "instance" for case, answer in _sections()["Creating an instance"].rows}
+    rows = [*_sections()["Creating an instance"].rows]
+    if kind == NATIVE:
+        others = _sections()["The FMUs in C"].rows
+        assert {case for case, _ in others} <= {case for case, _ in rows}
+        rows += others
+    return {case: answer == "instance" for case, answer in rows}
 
 
 def without_an_instance() -> dict[str, str]:
