@@ -74,7 +74,8 @@ class _World:
         if on:
             return
         if call.function == MAKE:
-            self.known[name] = Model(self.fmus[name]) if creations()[call.case] else None
+            of = self.fmus[name]
+            self.known[name] = Model(of) if creations(of.kind)[call.case] else None
         elif call.function == FREE:
             self.known[name] = None
             self.freed_once.add(name)

@@ -166,7 +166,7 @@ class Pair(Players):
 
     def make(self, case: str) -> None:
         made = self.tried.host.instantiate(**CREATIONS[case])
-        if made != creations()[case]:
+        if made != creations(self.library.description.kind)[case]:
             said = [message.text for message in self.tried.host.messages]
             raise Difference(f"{'an' if made else 'no'} instance with {case}: {said}")
         if made and not self.beside.host.instantiate():

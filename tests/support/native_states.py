@@ -102,7 +102,7 @@ def _read(source: _Reader) -> NativeState | None:
         mode=MODES[mode],
         start_time=start_time,
         time=time,
-        parameters=dict(sorted(parameters.items())),
+        parameters=parameters,
         inputs=source.reals(layout.inputs),
         outputs=source.reals(layout.outputs),
         state=None,
@@ -116,7 +116,7 @@ def _read(source: _Reader) -> NativeState | None:
     said["fault"] = bool(source.word())
     said["refused"] = {source.text(): source.text() for _ in range(source.word())}
     said[CHECKSUM] = source.word()
-    return NativeState(sorted(said.items()))
+    return said
 
 
 def _parameter(source: _Reader, port: Port) -> Any:

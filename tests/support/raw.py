@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
+from fmus.packaging.kinds import NATIVE, PYTHON
 from support.raw_fmi import CO_SIMULATION, Callbacks, Logger
 
 
@@ -70,6 +71,7 @@ class Description:
     guid: str
     identifier: str
     variables: tuple[Variable, ...]
+    kind: str = PYTHON
 
     def of(self, causality: str, kind: str | None = None) -> list[Variable]:
         """The variables of a causality."""
@@ -93,6 +95,7 @@ def read_description(folder: Path) -> Description:
         root.attrib["guid"],
         implementation.attrib["modelIdentifier"],
         tuple(_variable(element) for element in root.iterfind("ModelVariables/ScalarVariable")),
+        NATIVE if (folder / "sources").is_dir() else PYTHON,
     )
 
 

@@ -57,7 +57,7 @@ def sealed(said: dict[str, Json]) -> bytes:
 def written(said: Json) -> bytes:
     if isinstance(said, NativeState):
         return native_states.written(said)
-    return json.dumps(said, sort_keys=True).encode()
+    return json.dumps(said).encode()
 
 
 class Mutant(NamedTuple):

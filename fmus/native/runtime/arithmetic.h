@@ -21,7 +21,7 @@
 #include <stdio.h>
 
 /* Bytes of what is said of an error. */
-enum { WHY = 256 };
+enum { WHY = 512 };
 
 typedef struct {
     int raised;
