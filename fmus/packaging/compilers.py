@@ -20,8 +20,10 @@ FLAGS = (
     "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared", "-s",
 )  # fmt: skip
 
-#: Nothing here unwinds the stack. The C library of Windows does, and is compiled alike.
+#: Nothing here unwinds the stack, but for the C library of Windows, half of a library there, which
+#: is compiled with the same options: those for a small one.
 _NO_TABLES = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
+_SMALL = ("-Os",)
 
 #: For the linker of Linux: no trace of when and where, and no padding to whole pages.
 _LINUX = ("-Wl,--build-id=none", "-Wl,-z,noseparate-code")
@@ -89,8 +91,8 @@ def library(
         libraries = []
         for machine in platform.machines:
             target = ("-target", TARGETS[machine]) if compiler.targets else ()
-            tables = () if machine.endswith("-windows") else _NO_TABLES
-            options = [*target, *FLAGS, *tables, "-o", made.name, main, "-lm"]
+            size = _SMALL if machine.endswith("-windows") else _NO_TABLES
+            options = [*target, *FLAGS, *size, "-o", made.name, main, "-lm"]
             process = subprocess.run(
                 [*compiler.command, *options],
                 cwd=folder, capture_output=True, text=True, check=False,
