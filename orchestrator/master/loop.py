@@ -63,8 +63,8 @@ def interpreted(
 ) -> Iterator[int]:
     """Make the steps in Python, and look after each."""
     # Times zero, what is finite is zero and what is not is nan: the cheapest way to see it.
-    is_not_finite = partial(np.vdot, values, np.zeros_like(values))
-    for k, (t, h, end) in enumerate(experiment.steps(), start=1):
+    is_not_finite = partial(values.dot, np.zeros_like(values))
+    for k, t, h, end in experiment.steps():
         for targets, sources, members in stages:
             values[targets] = values[sources]
             step(members, t, h)
