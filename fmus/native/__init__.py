@@ -20,23 +20,30 @@ from pathlib import Path
 
 from fmus.native.tables import tables
 from fmus.native.translator import translated
+from fmus.ports import description_fmi2, description_fmi3
 
 #: What is the same for all components.
 RUNTIME = Path(__file__).parent / "runtime"
 
+#: The file to compile, by the version of FMI: it includes all others.
+VERSIONS = {2: description_fmi2.SOURCE, 3: description_fmi3.SOURCE}
 
-def sources(package: str) -> dict[str, str]:
+
+def sources(package: str, fmi: int = 2) -> dict[str, str]:
     """The C sources of a component by their names, all but identity.h.
-
-    Of fmi2.c and fmi3.c one is compiled, and includes all others.
 
     Args:
         package: of the component, for example `fmus.auv_plant`.
+        fmi: version of FMI, 2 or 3.
 
     """
-    runtime = sorted(RUNTIME.glob("*.[ch]"))
+    others = {name for version, name in VERSIONS.items() if version != fmi}
     return {
-        **{path.name: path.read_text(encoding="utf-8") for path in runtime},
+        **{
+            path.name: path.read_text(encoding="utf-8")
+            for path in sorted(RUNTIME.glob("*.[ch]"))
+            if path.name not in others
+        },
         "equations.c": translated(package),
         "ports.h": tables(package),
     }

@@ -20,8 +20,13 @@ FLAGS = (
     "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared", "-s",
 )  # fmt: skip
 
-#: For the linker of Linux: nothing in a library says when or where it was made.
-_LINUX = ("-Wl,--build-id=none",)
+#: Nothing here unwinds the stack, but for the C library of Windows, half of a library there, which
+#: is compiled with the same options: those for a small one.
+_NO_TABLES = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
+_SMALL = ("-Os",)
+
+#: For the linker of Linux: no trace of when and where, and no padding to whole pages.
+_LINUX = ("-Wl,--build-id=none", "-Wl,-z,noseparate-code")
 
 
 class Compiler(NamedTuple):
@@ -29,7 +34,7 @@ class Compiler(NamedTuple):
 
     Attributes:
         name: with its version.
-        command: that runs it.
+        command: that runs it, with options of its own.
         targets: whether it makes libraries for all machines, and is told for which.
 
     """
@@ -49,7 +54,7 @@ def compiler_for(platforms: Sequence[Platform]) -> Compiler:
     own = compiler()
     others = [platform.name for platform in platforms if platform.machines != (this_machine(),)]
     if own is not None and not others:
-        return Compiler(_version_of(own), [own], targets=False)
+        return Compiler(_version_of(own), [own, *_LINUX], targets=False)
     if find_spec("ziglang") is not None:
         command = [sys.executable, "-m", "ziglang", "cc"]
         return Compiler(f"ziglang {version('ziglang')}", command, targets=True)
@@ -86,8 +91,8 @@ def library(
         libraries = []
         for machine in platform.machines:
             target = ("-target", TARGETS[machine]) if compiler.targets else ()
-            linker = _LINUX if machine.endswith("-linux") else ()
-            options = [*target, *FLAGS, *linker, "-o", made.name, main, "-lm"]
+            size = _SMALL if machine.endswith("-windows") else _NO_TABLES
+            options = [*target, *FLAGS, *size, "-o", made.name, main, "-lm"]
             process = subprocess.run(
                 [*compiler.command, *options],
                 cwd=folder, capture_output=True, text=True, check=False,

@@ -7,7 +7,7 @@ build puts the same text as HTML into each FMU.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
 from importlib.metadata import distribution
 from pathlib import Path
@@ -17,6 +17,7 @@ from markdown_it import MarkdownIt
 
 from fmus.packaging.discovery import components, folder_of
 from fmus.packaging.kinds import NATIVE, PYTHON
+from fmus.ports.description_fmi3 import KINDS
 from fmus.ports.port import FAULT, Port
 
 #: The picture of every component.
@@ -68,8 +69,17 @@ In Python:
 
 A step longer than `h_max`, where there is such a parameter, is split evenly with held inputs.
 
+{refused}"""
+
+#: What fmpy makes of a refusal, by the version of FMI.
+_REFUSED = {
+    "2": """\
 **A refused parameter does not show in a bare `fmpy.simulate_fmu`: the result has two rows, with
-`fault` true, and there is no text. Add `debug_logging=True` to read the reason.**"""
+`fault` true, and there is no text. Add `debug_logging=True` to read the reason.**""",
+    "3": """\
+A refused parameter ends `fmpy.simulate_fmu` at the first step, with an exception that does not say
+why. Add `debug_logging=True` to read the reason.""",
+}
 
 
 def page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
@@ -79,11 +89,14 @@ def page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
     ports: Sequence[Port] = (*import_module(module.replace(".slave", ".ports")).PORTS, FAULT)
     refusals = _REFUSALS.format(answer=_ANSWERS[kind]).replace("fmi2", f"fmi{fmi}")
     made_of = (_NATIVE,) if kind == NATIVE else ()
-    parts = (text, *made_of, *_tables(ports), refusals, _EXAMPLE.format(name=name))
+    tables = _tables(ports, KINDS if fmi == "3" else {})
+    example = _EXAMPLE.format(name=name, refused=_REFUSED[fmi])
+    parts = (text, *made_of, *tables, refusals, example)
     return "\n\n".join(parts) + "\n"
 
 
-def _tables(ports: Sequence[Port]) -> Iterator[str]:
+def _tables(ports: Sequence[Port], kinds: Mapping[str, str]) -> Iterator[str]:
+    """The tables of inputs, outputs and parameters, with other names for their types."""
     for causality, heading in (
         ("input", "Inputs"),
         ("output", "Outputs"),
@@ -98,12 +111,13 @@ def _tables(ports: Sequence[Port]) -> Iterator[str]:
         elif causality == "output":
             columns.append("direct feedthrough from")
         lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
-        lines += ["| " + " | ".join(_row(port)) + " |" for port in found]
+        lines += ["| " + " | ".join(_row(port, kinds)) + " |" for port in found]
         yield f"## {heading}\n\n" + "\n".join(lines)
 
 
-def _row(port: Port) -> list[str]:
-    cells = [f"`{port.name}`", port.kind, port.unit or "", port.description]
+def _row(port: Port, kinds: Mapping[str, str]) -> list[str]:
+    kind = kinds.get(port.kind, port.kind)
+    cells = [f"`{port.name}`", kind, port.unit or "", port.description]
     if port.causality == "parameter":
         cells[3:3] = [_literal(port.start), _range(port), port.variability]
     elif port.causality == "output":

@@ -94,12 +94,8 @@ def fmu_entries(
     package = module.rpartition(".")[0]
     declared = import_module(f"{package}.ports")
     version = _VERSIONS[fmi]
-    others = {other.main for other in _VERSIONS.values()} - {version.main}
-    sources = {
-        name: content.encode()
-        for name, content in native.sources(package).items()
-        if name not in others
-    }
+    written = native.sources(package, int(fmi))
+    sources = {name: content.encode() for name, content in written.items()}
 
     def description(guid: str) -> bytes:
         return version.describe(component, declared.DESCRIPTION, guid, declared.PORTS)

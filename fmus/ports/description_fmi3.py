@@ -32,6 +32,9 @@ _CAPABILITIES = {**CAPABILITIES, "canGetAndSetFMUState": "true", "canSerializeFM
 #: The file of a component's sources that includes all others, and what it is written in.
 SOURCE, _LANGUAGE = "fmi3.c", "C99"
 
+#: Platforms where mathematics is in a library apart from that of C.
+_LIBM_APART = ("x86_64-linux", "aarch64-linux")
+
 
 def fmi3_description(name: str, description: str, token: str, ports: Sequence[Port]) -> bytes:
     """The description of a component.
@@ -74,10 +77,18 @@ def fmi3_description(name: str, description: str, token: str, ports: Sequence[Po
 def fmi3_build_description(name: str) -> bytes:
     """What an importer has to compile: one file, with any compiler and no options."""
     root = Element("fmiBuildDescription", fmiVersion=_VERSION)
-    configuration = SubElement(root, "BuildConfiguration", modelIdentifier=name)
+    _configuration(root, modelIdentifier=name)
+    for platform in _LIBM_APART:
+        linked = _configuration(root, modelIdentifier=name, platform=platform)
+        SubElement(linked, "Library", name="m", external="true")
+    return text(root)
+
+
+def _configuration(root: Element, **attributes: str) -> Element:
+    configuration = SubElement(root, "BuildConfiguration", attributes)
     sources = SubElement(configuration, "SourceFileSet", language=_LANGUAGE)
     SubElement(sources, "SourceFile", name=SOURCE)
-    return text(root)
+    return configuration
 
 
 def _type_definitions(units: Sequence[str]) -> Element:

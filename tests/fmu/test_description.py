@@ -104,9 +104,11 @@ def test_description_of_fmi3_is_valid(fmi3: Path):
 
 
 def test_sources_of_fmi3_are_one_file(fmi3: Path):
-    [build] = read_model_description(str(fmi3)).buildConfigurations
-    assert build.modelIdentifier == read_model_description(str(fmi3)).modelName
-    assert [files.sourceFiles for files in build.sourceFileSets] == [["fmi3.c"]]
+    description = read_model_description(str(fmi3))
+    assert description.buildConfigurations
+    for build in description.buildConfigurations:
+        assert build.modelIdentifier == description.modelName
+        assert [files.sourceFiles for files in build.sourceFileSets] == [["fmi3.c"]]
 
 
 def values_of(variable: dict[str, Any]) -> dict[str, Any]:

@@ -125,8 +125,9 @@ class Loop:
 
     def give(self) -> None:
         """All inputs from the outputs that there are."""
-        for target, source in self.connections:
-            self.values[target.component, target.port] = self.values[source.component, source.port]
+        for wire in self.connections:
+            value = self.values[wire.source.component, wire.source.port]
+            self.values[wire.target.component, wire.target.port] = value
         for name, slave in self.slaves.items():
             inputs = self.groups[name]["input"]
             if inputs:
@@ -139,7 +140,8 @@ class Loop:
             got = slave.getFloat64([v.valueReference for v in outputs])
             self.values |= {(name, v.name): value for v, value in zip(outputs, got, strict=True)}
 
-    def run(self, times: np.ndarray) -> list[dict[str, float]]:
+    def run(self, n: int) -> list[dict[str, float]]:
+        """Outputs after each of n steps, with the inputs that led there."""
         rows = []
         # As many exchanges as there are components: nothing depends on more than all others.
         for _ in self.slaves:
@@ -147,14 +149,11 @@ class Loop:
             self.give()
         for slave in self.slaves.values():
             slave.exitInitializationMode()
-        for now, end in zip(times, [*times[1:], None], strict=True):
+        for k in range(n + 1):
             rows.append({f"{name}.{port}": value for (name, port), value in self.values.items()})
-            if end is None:
-                return rows
             self.give()
-            rows[-1] |= {f"{name}.{port}": value for (name, port), value in self.values.items()}
             for slave in self.slaves.values():
-                slave.doStep(now, end - now)
+                slave.doStep(k * H, H)
             self.take()
         return rows
 
@@ -162,7 +161,7 @@ class Loop:
 def test_loop_of_fig4_is_that_of_the_python_kind(dist: Path, unpacked: Path):
     ours = outcome(dist, "fig4", {}, Experiment(100.0, H, "jacobi"))
     loop = Loop(closed_loop(dist, read_scenario("fig4")), unpacked)
-    rows = loop.run(ours.rows[:, 0])
+    rows = loop.run(5000)
     outputs = [i for i, c in enumerate(ours.columns, start=1) if not c.endswith("fault")]
     theirs = np.array([[row[ours.columns[i - 1]] for i in outputs] for row in rows])
     assert len(theirs) == 5001
@@ -195,7 +194,6 @@ def symbols(path: Path) -> set[str]:
 @pytest.mark.skipif(shutil.which("nm") is None, reason="nm is not installed")
 def test_library_offers_the_functions_of_the_standard_and_nothing_else(unpacked: Path):
     [path] = (unpacked / "AuvPlant" / "binaries").rglob("AuvPlant*")
-    assert len(FUNCTIONS) > 80
     assert symbols(path) == set(FUNCTIONS)
 
 
@@ -239,7 +237,8 @@ SHARED = {
 }
 
 
-@pytest.fixture(scope="module", params=NAMES)
+# Between them they have ports of all types, a state, noise, and all that can go wrong.
+@pytest.fixture(scope="module", params=["AuvPlant", "ObserverController"])
 def worker(request: pytest.FixtureRequest, unpacked: Path) -> Iterator[Worker[Any, str]]:
     another = NAMES[NAMES.index(request.param) - 1]
     with Worker(trials, unpacked / request.param, unpacked / another) as process:
@@ -271,7 +270,7 @@ class Own:
 
     def __init__(self, library: Fmi3Library) -> None:
         self.library = library
-        self.time = 1 + max(v.reference for v in library.description.variables)
+        self.time = library.description.find("time").reference
 
     def of(self, function: str, case: str) -> str:
         if function.startswith("fmi3Instantiate"):

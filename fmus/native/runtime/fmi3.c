@@ -29,7 +29,7 @@ static const names version = {
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
-/* fmi3Boolean and fmi3Clock. A host may have put any byte there, which a bool must not hold. */
+/* fmi3Boolean and fmi3Clock. A host may pass any byte, where a bool is 0 or 1. */
 typedef uint8_t boolean;
 
 /* The variable for the time comes after all others. */
@@ -148,7 +148,6 @@ static string wrong_numbers(size_t n, const uint32_t r[], const void *values, si
     return n == n_values ? wrong_values(n, r, values) : "not as many values as references";
 }
 
-/* For each reference one value, or what `refuse` leaves behind. */
 #define GET(name, type, get)                                                                     \
     EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, type v[], size_t n_v) {   \
         call this = begin(handle, #name, ALWAYS);                                                \
@@ -179,14 +178,12 @@ EXPORT int FMI3(fmi3GetFloat64)(void *handle, const uint32_t r[], size_t n, doub
                                 size_t n_v) {
     call this = begin(handle, "fmi3GetFloat64", ALWAYS);
     if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {
-        size_t from = 0;
-        for (size_t i = 0; i < n; i++) {
-            if (r[i] != TIME) continue;
-            get_reals(this.instance, r + from, i - from, v + from);
-            v[i] = this.instance->run.time;
+        for (size_t i = 0, from = 0; i <= n; i++) {
+            if (i < n && r[i] != TIME) continue;
+            if (i > from) get_reals(this.instance, &r[from], i - from, &v[from]);
+            if (i < n) v[i] = this.instance->run.time;
             from = i + 1;
         }
-        get_reals(this.instance, r + from, n - from, v + from);
     }
     return end(&this);
 }
@@ -200,16 +197,30 @@ EXPORT int FMI3(fmi3SetFloat64)(void *handle, const uint32_t r[], size_t n, cons
 
 /* Types that no variable has: every reference is a wrong one, for which 0 is given. */
 
+static int refuse_all(void *handle, string function, when when, string kind, const uint32_t r[],
+                      size_t n, string wrong) {
+    call this = begin(handle, function, when);
+    if (GOES_ON(this, wrong)) {
+        for (size_t i = 0; i < n; i++) refuse_reference(this.instance, kind, r[i]);
+    }
+    return end(&this);
+}
+
+#define REFUSE_TO_GET(kind, wrong) refuse_all(handle, "fmi3Get" kind, ALWAYS, kind, r, n, wrong)
+#define REFUSE_TO_SET(kind, wrong)                                                               \
+    refuse_all(handle, "fmi3Set" kind, NOT_AFTER_ERROR, kind, r, n, wrong)
+
 #define NO_VARIABLE(kind, type)                                                                  \
-    static type get_##kind(instance *it, uint32_t r) {                                          \
-        refuse_reference(it, #kind, r);                                                          \
-        return 0;                                                                                \
+    EXPORT int FMI3(fmi3Get##kind)(void *handle, const uint32_t r[], size_t n, type v[],         \
+                                   size_t n_v) {                                                 \
+        int status = REFUSE_TO_GET(#kind, wrong_numbers(n, r, v, n_v));                          \
+        for (size_t i = 0; i < n && status == FMI_OK; i++) v[i] = 0;                             \
+        return status;                                                                           \
     }                                                                                            \
-    static void set_##kind(instance *it, uint32_t r, type value) {                              \
-        refuse_reference(it, #kind, r);                                                          \
-    }                                                                                            \
-    GET(fmi3Get##kind, type, get_##kind)                                                         \
-    SET(fmi3Set##kind, type, NULL, set_##kind)
+    EXPORT int FMI3(fmi3Set##kind)(void *handle, const uint32_t r[], size_t n, const type v[],   \
+                                   size_t n_v) {                                                 \
+        return REFUSE_TO_SET(#kind, wrong_numbers(n, r, v, n_v));                                \
+    }
 
 NO_VARIABLE(Float32, float)
 NO_VARIABLE(Int8, int8_t)
@@ -220,45 +231,35 @@ NO_VARIABLE(UInt32, uint32_t)
 NO_VARIABLE(Int64, int64_t)
 NO_VARIABLE(UInt64, uint64_t)
 
+static string wrong_binaries(size_t n, const uint32_t r[], const size_t sizes[], const void *values,
+                             size_t n_values) {
+    string wrong = wrong_numbers(n, r, values, n_values);
+    return wrong != NULL ? wrong : wrong_values(n, r, sizes);
+}
+
 EXPORT int FMI3(fmi3GetBinary)(void *handle, const uint32_t r[], size_t n, size_t sizes[],
                                const uint8_t *v[], size_t n_v) {
-    call this = begin(handle, "fmi3GetBinary", ALWAYS);
-    if (GOES_ON(this, wrong_numbers(n, r, v, n_v)) && GOES_ON(this, wrong_values(n, r, sizes))) {
-        for (size_t i = 0; i < n; i++) {
-            refuse_reference(this.instance, "Binary", r[i]);
-            v[i] = NULL;
-            sizes[i] = 0;
-        }
+    int status = REFUSE_TO_GET("Binary", wrong_binaries(n, r, sizes, v, n_v));
+    for (size_t i = 0; i < n && status == FMI_OK; i++) {
+        v[i] = NULL;
+        sizes[i] = 0;
     }
-    return end(&this);
+    return status;
 }
 
 EXPORT int FMI3(fmi3SetBinary)(void *handle, const uint32_t r[], size_t n, const size_t sizes[],
                                const uint8_t *const v[], size_t n_v) {
-    call this = begin(handle, "fmi3SetBinary", NOT_AFTER_ERROR);
-    if (GOES_ON(this, wrong_numbers(n, r, v, n_v)) && GOES_ON(this, wrong_values(n, r, sizes))) {
-        for (size_t i = 0; i < n; i++) refuse_reference(this.instance, "Binary", r[i]);
-    }
-    return end(&this);
+    return REFUSE_TO_SET("Binary", wrong_binaries(n, r, sizes, v, n_v));
 }
 
 EXPORT int FMI3(fmi3GetClock)(void *handle, const uint32_t r[], size_t n, boolean v[]) {
-    call this = begin(handle, "fmi3GetClock", ALWAYS);
-    if (GOES_ON(this, wrong_values(n, r, v))) {
-        for (size_t i = 0; i < n; i++) {
-            refuse_reference(this.instance, "Clock", r[i]);
-            v[i] = 0;
-        }
-    }
-    return end(&this);
+    int status = REFUSE_TO_GET("Clock", wrong_values(n, r, v));
+    for (size_t i = 0; i < n && status == FMI_OK; i++) v[i] = 0;
+    return status;
 }
 
 EXPORT int FMI3(fmi3SetClock)(void *handle, const uint32_t r[], size_t n, const boolean v[]) {
-    call this = begin(handle, "fmi3SetClock", NOT_AFTER_ERROR);
-    if (GOES_ON(this, wrong_values(n, r, v))) {
-        for (size_t i = 0; i < n; i++) refuse_reference(this.instance, "Clock", r[i]);
-    }
-    return end(&this);
+    return REFUSE_TO_SET("Clock", wrong_values(n, r, v));
 }
 
 /* States */
