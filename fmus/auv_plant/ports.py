@@ -13,6 +13,8 @@ from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, p
 from fmus.ports.quantities import ETA, NU, POSITION, TAU, TAU_W, VELOCITY
 from fmus.ports.vehicle import CONTROL_POINT, VEHICLE
 
+DESCRIPTION = "Autonomous underwater vehicle with limited actuators and noisy position sensor"
+
 _ROLL, _LIMITS, _LOCALISATION = RollAxis(), Limits(), Localisation()
 
 #: Largest standard deviation [m]: with it, no finite position becomes an infinite measurement.

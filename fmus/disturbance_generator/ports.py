@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from auv_fmu.disturbance import Disturbance
 from fmus.ports.groups import ParameterSet
-from fmus.ports.port import Port, inputs, outputs, parameter
+from fmus.ports.port import TIME, Port, inputs, outputs, parameter
 from fmus.ports.quantities import NU, TAU_W
+
+DESCRIPTION = "Disturbance by friction, waves and ocean currents in six degrees of freedom"
 
 _WAVES = Disturbance()
 _INPUTS = inputs("nu", NU, "Velocity in the body frame")
@@ -19,11 +21,13 @@ PARAMETERS = ParameterSet(
 
 PORTS: tuple[Port, ...] = (
     *_INPUTS,
-    # Each direction depends on the velocity in it alone.
+    # Each direction depends on the velocity in it, and on the time.
     *(
         port
         for (k, unit), velocity in zip(TAU_W.items(), _INPUTS)
-        for port in outputs("tau_w", {k: unit}, "Disturbance, with the sign of (2)", [velocity])
+        for port in outputs(
+            "tau_w", {k: unit}, "Disturbance, with the sign of (2)", [velocity, TIME]
+        )
     ),
     *PARAMETERS.ports,
 )

@@ -12,6 +12,8 @@ from fmus.ports.port import H_MAX, Port, outputs, parameters
 from fmus.ports.quantities import ACCELERATION, ETA_WITHOUT_ROLL, POSITION, TAU, VELOCITY
 from fmus.ports.vehicle import CONTROL_POINT, VEHICLE
 
+DESCRIPTION = "Motion planner: helical reference with velocity and acceleration"
+
 
 class Parameters(NamedTuple):
     """What the parameters of MotionPlanner mean."""

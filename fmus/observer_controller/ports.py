@@ -21,6 +21,8 @@ from fmus.ports.port import H_MAX, POSITIVE, Port, outputs, parameter, parameter
 from fmus.ports.quantities import POSITION, VELOCITY, per_axis
 from fmus.ports.vehicle import CONTROL_POINT
 
+DESCRIPTION = "Saturated output-feedback tracking controller with velocity observer"
+
 _GAINS = Gains()
 
 PARAMETERS = ParameterSet(

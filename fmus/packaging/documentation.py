@@ -7,7 +7,7 @@ build puts the same text as HTML into each FMU.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
 from importlib.metadata import distribution
 from pathlib import Path
@@ -16,7 +16,12 @@ from string import Template
 from markdown_it import MarkdownIt
 
 from fmus.packaging.discovery import components, folder_of
+from fmus.packaging.kinds import NATIVE, PYTHON
+from fmus.ports.description_fmi3 import KINDS
 from fmus.ports.port import FAULT, Port
+
+#: The picture of every component.
+ICON = Path(__file__).with_name("icon.png")
 
 _HTML = Path(__file__).with_name("page.html")
 
@@ -26,7 +31,7 @@ _REFUSALS = """\
 A value out of its range or not finite, a value reference that is not there or of another type, an
 output or a fixed parameter set during the run, a call out of order, a state that no run can have
 led to: such a call changes nothing, is logged with status fmi2Discard, and raises `fault`.
-PythonFMU answers it with fmi2OK, so the steps tell: **every fmi2DoStep after it ends with
+{answer} with fmi2OK, so the steps tell: **every fmi2DoStep after it ends with
 fmi2Discard and changes nothing until it is mended**, a value by a good value of the same variable,
 anything by fmi2Reset or by restoring a state.
 
@@ -35,6 +40,20 @@ not be finite, ends with fmi2Discard and leaves everything as it was, noise incl
 step is taken. `fault` stays true until fmi2Reset or until a state without it is restored.
 
 The whole table of calls, states and bad arguments is `docs/status.md` of the project."""
+
+#: Why a refused call is not answered with another status.
+_ANSWERS = {
+    PYTHON: "PythonFMU answers it",
+    NATIVE: "Like its twin in Python, this FMU answers it",
+}
+
+_NATIVE = """\
+## What it is made of
+
+This FMU holds libraries and needs nothing but the C library of its platform, no Python. They were
+compiled from the C sources in its folder `sources`, which any importer can compile for another
+platform: one file that includes all others. The equations in them were translated from the Python
+text that the FMU's twin runs, so both give the same numbers."""
 
 _EXAMPLE = """\
 ## Example
@@ -50,20 +69,34 @@ In Python:
 
 A step longer than `h_max`, where there is such a parameter, is split evenly with held inputs.
 
+{refused}"""
+
+#: What fmpy makes of a refusal, by the version of FMI.
+_REFUSED = {
+    "2": """\
 **A refused parameter does not show in a bare `fmpy.simulate_fmu`: the result has two rows, with
-`fault` true, and there is no text. Add `debug_logging=True` to read the reason.**"""
+`fault` true, and there is no text. Add `debug_logging=True` to read the reason.**""",
+    "3": """\
+A refused parameter ends `fmpy.simulate_fmu` at the first step, with an exception that does not say
+why. Add `debug_logging=True` to read the reason.""",
+}
 
 
-def page(name: str) -> str:
+def page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
     """The page of a component in Markdown: what it is, its ports, what it refuses, an example."""
     module = components()[name]
     text = (folder_of(module) / "page.md").read_text(encoding="utf-8").strip()
     ports: Sequence[Port] = (*import_module(module.replace(".slave", ".ports")).PORTS, FAULT)
-    parts = (text, *_tables(ports), _REFUSALS, _EXAMPLE.format(name=name))
+    refusals = _REFUSALS.format(answer=_ANSWERS[kind]).replace("fmi2", f"fmi{fmi}")
+    made_of = (_NATIVE,) if kind == NATIVE else ()
+    tables = _tables(ports, KINDS if fmi == "3" else {})
+    example = _EXAMPLE.format(name=name, refused=_REFUSED[fmi])
+    parts = (text, *made_of, *tables, refusals, example)
     return "\n\n".join(parts) + "\n"
 
 
-def _tables(ports: Sequence[Port]) -> Iterator[str]:
+def _tables(ports: Sequence[Port], kinds: Mapping[str, str]) -> Iterator[str]:
+    """The tables of inputs, outputs and parameters, with other names for their types."""
     for causality, heading in (
         ("input", "Inputs"),
         ("output", "Outputs"),
@@ -78,12 +111,13 @@ def _tables(ports: Sequence[Port]) -> Iterator[str]:
         elif causality == "output":
             columns.append("direct feedthrough from")
         lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
-        lines += ["| " + " | ".join(_row(port)) + " |" for port in found]
+        lines += ["| " + " | ".join(_row(port, kinds)) + " |" for port in found]
         yield f"## {heading}\n\n" + "\n".join(lines)
 
 
-def _row(port: Port) -> list[str]:
-    cells = [f"`{port.name}`", port.kind, port.unit or "", port.description]
+def _row(port: Port, kinds: Mapping[str, str]) -> list[str]:
+    kind = kinds.get(port.kind, port.kind)
+    cells = [f"`{port.name}`", kind, port.unit or "", port.description]
     if port.causality == "parameter":
         cells[3:3] = [_literal(port.start), _range(port), port.variability]
     elif port.causality == "output":
@@ -104,21 +138,24 @@ def _range(port: Port) -> str:
     return " ".join(filter(None, (lower, upper)))
 
 
-def html(name: str) -> str:
+def html(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
     """The page of a component as one HTML file."""
-    body = MarkdownIt("commonmark").enable("table").render(page(name))
+    body = MarkdownIt("commonmark").enable("table").render(page(name, kind, fmi))
     body = body.replace("<table>", '<div class="table"><table>')
     body = body.replace("</table>", "</table></div>")
     return Template(_HTML.read_text(encoding="utf-8")).substitute(title=name, body=body)
 
 
-def licences() -> str:
-    """Licence of the bundle, and of PythonFMU, parts of which every FMU contains."""
-    texts = [
-        distribution(package).read_text("licenses/LICENSE") or ""
+def licences(kind: str) -> str:
+    """Licence of the bundle, and of PythonFMU, if parts of it are in the FMU."""
+    texts = {
+        package: distribution(package).read_text("licenses/LICENSE") or ""
         for package in ("auv-fmu", "pythonfmu")
-    ]
-    return f"auv-fmu\n\n{texts[0]}\n\nPythonFMU, contained in resources and binaries\n\n{texts[1]}"
+    }
+    ours = f"auv-fmu\n\n{texts['auv-fmu']}"
+    if kind == NATIVE:
+        return ours
+    return f"{ours}\n\nPythonFMU, contained in resources and binaries\n\n{texts['pythonfmu']}"
 
 
 def main() -> None:

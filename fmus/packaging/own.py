@@ -14,7 +14,7 @@ from pathlib import Path
 
 from pythonfmu.builder import get_model_class
 
-from fmus.packaging.build import best_loader, fmu_entries
+from fmus.packaging.python import LOADERS, best_loader, fmu_entries
 from fmus.packaging.sealing import seal
 
 
@@ -44,7 +44,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m fmus.packaging.own", description=__doc__)
     parser.add_argument("script", type=Path)
     parser.add_argument("--out", type=Path, required=True, help="folder to write into")
-    parser.add_argument("--loader", choices=("native", "plain"), help="default: native if it can")
+    parser.add_argument("--loader", choices=LOADERS, help="default: native if it can")
     options = parser.parse_args()
     try:
         print(build_own(options.script, options.out, options.loader))

@@ -12,6 +12,7 @@ import hashlib
 import re
 import uuid
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
 _RESOURCES = "resources/"
@@ -42,6 +43,20 @@ def write_archive(path: Path, entries: dict[str, bytes], compression: int) -> No
         partial.unlink(missing_ok=True)
 
 
+def digest_of(contents: Mapping[str, bytes]) -> bytes:
+    """What tells contents from all others."""
+    digest = hashlib.sha256()
+    for name in sorted(contents):
+        digest.update(f"{name}\0{len(contents[name])}\0".encode())
+        digest.update(contents[name])
+    return digest.digest()
+
+
+def guid_of(digest: bytes) -> str:
+    """A GUID made from a digest."""
+    return f"{{{uuid.UUID(bytes=digest[:16])}}}"
+
+
 def seal(entries: dict[str, bytes], destination: Path) -> None:
     """Write an FMU sealed.
 
@@ -52,12 +67,9 @@ def seal(entries: dict[str, bytes], destination: Path) -> None:
     """
     entries = dict(entries)
     entries[_DESCRIPTION] = _GUID.sub(b'guid=""', entries[_DESCRIPTION], count=1)
-    digest = hashlib.sha256()
-    for name in sorted(entries):
-        digest.update(f"{name}\0{len(entries[name])}\0".encode())
-        digest.update(entries[name])
-    guid = f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}".encode()
-    entries = _renamed(entries, digest.hexdigest()[:12])
+    digest = digest_of(entries)
+    guid = guid_of(digest).encode()
+    entries = _renamed(entries, digest.hex()[:12])
     entries[_DESCRIPTION] = _GUID.sub(b'guid="' + guid + b'"', entries[_DESCRIPTION], count=1)
     entries[_GUID_FILE] = guid
     write_archive(destination, entries, zipfile.ZIP_DEFLATED)

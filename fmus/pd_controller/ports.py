@@ -19,6 +19,8 @@ from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, parameter, parameters
 from fmus.ports.quantities import VELOCITY, per_axis
 from fmus.ports.vehicle import CONTROL_POINT
 
+DESCRIPTION = "Adaptive robust PD tracking controller with measured velocity"
+
 _GAINS = PdGains()
 _INPUTS = (*INPUTS, *inputs("dy", VELOCITY, "Measured velocity of the control point"))
 

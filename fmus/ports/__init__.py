@@ -1,14 +1,17 @@
 """What a port is, the groups that ports come in, and how they are written down for hosts.
 
-==================== ===============================================================
-module               what it states
-==================== ===============================================================
-:mod:`.units`        SI units, as modelDescription.xml declares them
-:mod:`.quantities`   what passes through groups of ports: members and their units
-:mod:`.port`         one port: its declaration and what values it takes
-:mod:`.groups`       flat values of ports from groups, and groups from flat values
-:mod:`.vehicle`      parameters of (2)
-:mod:`.controllers`  what the controllers have in common
-:mod:`.description`  modelDescription.xml, as far as it follows from the ports
-==================== ===============================================================
+======================== =================================================================
+module                   what it states
+======================== =================================================================
+:mod:`.units`            SI units, as modelDescription.xml declares them
+:mod:`.quantities`       what passes through groups of ports: members and their units
+:mod:`.port`             one port: its declaration and what values it takes
+:mod:`.groups`           flat values of ports from groups, and groups from flat values
+:mod:`.vehicle`          parameters of (2)
+:mod:`.controllers`      what the controllers have in common
+:mod:`.description`      what modelDescription.xml says in every version of FMI
+:mod:`.description_fmi2` modelDescription.xml of FMI 2.0
+:mod:`.description_fmi3` modelDescription.xml and buildDescription.xml of FMI 3.0
+:mod:`.terminals`        terminalsAndIcons.xml of FMI 3.0
+======================== =================================================================
 """

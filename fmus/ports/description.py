@@ -1,66 +1,46 @@
-"""modelDescription.xml, as far as it follows from the ports.
-
-Whatever runs a component, PythonFMU or a library, adds its own elements and attributes.
-"""
+"""What modelDescription.xml says in every version of FMI and for both kinds of component."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from xml.etree.ElementTree import Element, SubElement
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+from auv_fmu import __version__
+from auv_fmu.euler import STEP
 from fmus.ports.port import Port, Value
 from fmus.ports.units import UNITS
 
-_CAPABILITIES = {
+#: About every component, by the names of the attributes.
+ABOUT = {"author": "auv-fmu", "license": "MIT", "version": __version__}
+
+#: What wrote the description of a component that no other tool has built.
+GENERATION_TOOL = f"auv-fmu {__version__}"
+
+#: Start, end and step of an experiment when the host names none [s].
+EXPERIMENT = (0.0, 100.0, STEP)
+
+#: What a component can do, where all versions of FMI have the same word for it.
+CAPABILITIES = {
     "needsExecutionTool": "false",
+    "canBeInstantiatedOnlyOncePerProcess": "false",
     "canHandleVariableCommunicationStepSize": "true",
-    "canGetAndSetFMUstate": "true",
-    "canSerializeFMUstate": "true",
 }
 
-
-def complete(root: Element, ports: Sequence[Port]) -> Element:
-    """Fill in what the ports of a component say.
-
-    Args:
-        root: fmiModelDescription with the elements CoSimulation, ModelVariables and
-            ModelStructure.
-        ports: all, in the order of their value references.
-
-    """
-    implementation = root.find("CoSimulation")
-    variables = root.find("ModelVariables")
-    structure = root.find("ModelStructure")
-    assert implementation is not None and variables is not None and structure is not None
-    implementation.attrib.update(_CAPABILITIES)
-    variables[:] = [_variable(reference, port) for reference, port in enumerate(ports)]
-    structure[:] = _structure(ports)
-    units = sorted({port.unit for port in ports if port.unit})
-    root.insert(1, _unit_definitions(units))
-    root.insert(2, _type_definitions(units))
-    return root
+#: Statuses that messages are logged with and that have a category.
+_LOGGED = ("Warning", "Discard", "Error", "Fatal")
 
 
-def _variable(reference: int, port: Port) -> Element:
-    variable = Element(
-        "ScalarVariable",
-        name=port.name,
-        valueReference=str(reference),
-        description=port.description,
-        causality=port.causality,
-        variability=port.variability,
-    )
-    # The standard forbids `initial` on inputs.
-    if port.causality != "input":
-        variable.set("initial", "calculated" if port.causality == "output" else "exact")
-    value = SubElement(variable, port.kind)
-    if port.unit is not None:
-        value.set("declaredType", UNITS[port.unit].type_name)
-        value.set("unit", port.unit)
-    for attribute, number in (("start", port.start), ("min", port.minimum), ("max", port.maximum)):
-        if number is not None:
-            value.set(attribute, literal(number))
-    return variable
+#: How a variable gets its value at the start time; the standard forbids to say so of others.
+_INITIAL = {"output": "calculated", "parameter": "exact"}
+
+
+class Dependency(NamedTuple):
+    """What an output depends on, all by value references."""
+
+    reference: int  #: of the output
+    direct: list[int]  #: what its value depends on without a state between
+    initial: list[int]  #: what its value at the start time depends on
 
 
 def literal(value: Value) -> str:
@@ -70,7 +50,40 @@ def literal(value: Value) -> str:
     return f"{value:.16g}" if isinstance(value, float) else str(value)
 
 
-def _unit_definitions(units: Sequence[str]) -> Element:
+def text(root: Element) -> bytes:
+    """A document, whose bytes depend on nothing but its elements."""
+    indent(root)
+    content: bytes = tostring(root, encoding="utf-8")
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + content + b"\n"
+
+
+def variable_attributes(reference: int, port: Port) -> dict[str, str]:
+    """What is said of a variable apart from its values."""
+    attributes = {
+        "name": port.name,
+        "valueReference": str(reference),
+        "description": port.description,
+        "causality": port.causality,
+        "variability": port.variability,
+    }
+    if port.causality in _INITIAL:
+        attributes["initial"] = _INITIAL[port.causality]
+    return attributes
+
+
+def bounds(port: Port) -> dict[str, str]:
+    """The range of a variable's values."""
+    limits = {"min": port.minimum, "max": port.maximum}
+    return {name: literal(limit) for name, limit in limits.items() if limit is not None}
+
+
+def units_of(ports: Sequence[Port]) -> list[str]:
+    """The units that ports have, each once."""
+    return sorted({port.unit for port in ports if port.unit})
+
+
+def unit_definitions(units: Sequence[str]) -> Element:
+    """Units by the base units that they are made of."""
     definitions = Element("UnitDefinitions")
     for unit in units:
         base = {name: str(exponent) for name, exponent in UNITS[unit].exponents.items()}
@@ -78,31 +91,30 @@ def _unit_definitions(units: Sequence[str]) -> Element:
     return definitions
 
 
-def _type_definitions(units: Sequence[str]) -> Element:
-    definitions = Element("TypeDefinitions")
-    for unit in units:
-        name = UNITS[unit].type_name
-        simple_type = SubElement(definitions, "SimpleType", name=name)
-        SubElement(simple_type, "Real", quantity=name, unit=unit)
-    return definitions
-
-
-def _structure(ports: Sequence[Port]) -> tuple[Element, Element]:
-    """Outputs with their direct feedthrough; InitialUnknowns with the parameters as well."""
-    index = {port.name: str(i) for i, port in enumerate(ports, start=1)}
-    parameters = [index[port.name] for port in ports if port.causality == "parameter"]
-    outputs, initial_unknowns = Element("Outputs"), Element("InitialUnknowns")
+def dependencies(ports: Sequence[Port]) -> Iterator[Dependency]:
+    """What each output depends on: its direct feedthrough, and at the start the parameters too."""
+    reference = {port.name: i for i, port in enumerate(ports)}
+    parameters = [reference[port.name] for port in ports if port.causality == "parameter"]
     for port in ports:
         if port.causality == "output":
-            inputs = [index[name] for name in port.feedthrough]
+            # FMI 2.0 has no variable for the time.
+            direct = [reference[name] for name in port.feedthrough if name in reference]
             # fault is false at the start whatever is set, unless that is refused.
-            initial = [*inputs, *parameters] if port.kind == "Real" else []
-            for parent, known in ((outputs, inputs), (initial_unknowns, initial)):
-                SubElement(
-                    parent,
-                    "Unknown",
-                    index=index[port.name],
-                    dependencies=" ".join(known),
-                    dependenciesKind=" ".join(["dependent"] * len(known)),
-                )
-    return outputs, initial_unknowns
+            initial = [*direct, *parameters] if port.kind == "Real" else []
+            yield Dependency(reference[port.name], direct, initial)
+
+
+def log_categories(fmi: str) -> Element:
+    """The categories of messages, with the statuses of a version of FMI such as `fmi2`."""
+    categories = Element("LogCategories")
+    for status in _LOGGED:
+        described = f"Log messages with {fmi}{status} status."
+        SubElement(categories, "Category", name=f"logStatus{status}", description=described)
+    SubElement(categories, "Category", name="logAll", description="Log all messages.")
+    return categories
+
+
+def default_experiment() -> Element:
+    """The experiment that a host runs if nothing else is asked for."""
+    start, stop, step = map(str, EXPERIMENT)
+    return Element("DefaultExperiment", startTime=start, stopTime=stop, stepSize=step)

@@ -9,12 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
-from typing import Any, Generic, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Generic, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from fmus.ports.port import Port, Value
 from fmus.ports.quantities import group_name
 
 T = TypeVar("T")
+
+
+class Nothing(NamedTuple):
+    """State of a component without memory; inputs of one without inputs."""
 
 
 def slices(ports: Sequence[Port]) -> dict[str, slice]:
@@ -131,6 +135,15 @@ class ParameterSet(Generic[T]):
         """All parameters, in the order of their declaration."""
         return tuple(port for field in self._fields.values() for port in _ports(field))
 
+    @property
+    def paths(self) -> dict[str, tuple[str | int, ...]]:
+        """Where each parameter lies in the set, by its name: fields, and places in tuples."""
+        return {
+            port.name: (name, *path)
+            for name, field in self._fields.items()
+            for port, path in _paths(field)
+        }
+
     def of(self, values: Mapping[str, Value]) -> T:
         """The parameter set with these values of its ports, by name."""
         return self._made(**{name: _taken(field, values) for name, field in self._fields.items()})
@@ -141,6 +154,16 @@ def _ports(field: Field) -> Iterator[Port]:
         yield field
     else:
         yield from field.ports if isinstance(field, ParameterSet) else field
+
+
+def _paths(field: Field) -> Iterator[tuple[Port, tuple[str | int, ...]]]:
+    if isinstance(field, Port):
+        yield field, ()
+    elif isinstance(field, tuple):
+        yield from ((port, (i,)) for i, port in enumerate(field))
+    else:
+        paths = field.paths
+        yield from ((port, paths[port.name]) for port in field.ports)
 
 
 def _taken(field: Field, values: Mapping[str, Value]) -> object:

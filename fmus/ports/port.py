@@ -35,7 +35,7 @@ class Port:
 
     Attributes:
         name: structured name, for example `tau.u`.
-        causality: `input`, `output` or `parameter`.
+        causality: `input`, `output`, `parameter`, or `independent`, which is the time.
         variability: `continuous`, `discrete`, `fixed` or `tunable`.
         kind: FMI type: `Real`, `Integer`, `Boolean` or `String`.
         unit: of a Real, a key of :data:`fmus.ports.units.UNITS`.
@@ -43,7 +43,7 @@ class Port:
         description: one line.
         minimum, maximum: inclusive bounds of a number.
         choices: values that a String may have, with what each stands for in the equations.
-        feedthrough: of an output, the inputs it depends on without a state between.
+        feedthrough: of an output, what it depends on without a state between: inputs, the time.
 
     """
 
@@ -173,3 +173,6 @@ FAULT = Port(
     "Boolean",
     "True from the moment the component refused an input, a parameter or a step",
 )
+
+#: What all is a function of. A variable in FMI 3.0 alone.
+TIME = Port("time", "independent", "continuous", "Real", "Time", "s")

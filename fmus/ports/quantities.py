@@ -43,6 +43,11 @@ def group_name(name: str) -> str:
     return name.split(".", maxsplit=1)[0].split("[", maxsplit=1)[0]
 
 
+def member_of(name: str) -> str:
+    """The member that a structured name stands for, within its group."""
+    return name[len(group_name(name)) + 1 :].removesuffix("]")
+
+
 def per_axis(unit: str) -> Members:
     """The diagonal of a gain matrix, one entry an axis of the control point."""
     return dict.fromkeys((1, 2, 3), unit)

@@ -76,7 +76,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
         The host adds the name of the instance.
         """
-        said = key or message
+        said = (key or message)[:_LONGEST_MESSAGE]
         if said in self._said or len(self._said) >= MOST_MESSAGES:
             return
         self._said.add(said)

@@ -13,15 +13,14 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from math import ceil, isfinite
-from typing import Any, ClassVar, Generic, NamedTuple, TypeVar, get_args, get_origin
+from typing import Any, ClassVar, Generic, TypeVar, get_args, get_origin
 from xml.etree.ElementTree import Element
 
 from pythonfmu import DefaultExperiment
 
-from auv_fmu import __version__
-from auv_fmu.euler import STEP
-from fmus.ports.description import complete
-from fmus.ports.groups import ParameterSet, packing, unpacking
+from fmus.ports.description import ABOUT, EXPERIMENT
+from fmus.ports.description_fmi2 import complete
+from fmus.ports.groups import ParameterSet, packing, slices, unpacking
 from fmus.ports.port import H_MAX, Refusal, Value
 from fmus.slave.callbacks import (
     INITIALISATION,
@@ -33,7 +32,7 @@ from fmus.slave.callbacks import (
     explained,
 )
 from fmus.slave.shape import measuring
-from fmus.slave.state import Snapshot, checked, from_bytes, to_bytes, unusable
+from fmus.slave.state import Snapshot, checked, from_bytes, nearly_equal, to_bytes, unusable
 
 #: A step may exceed `h_max` by this share without being split: hosts round their time.
 ROUNDING = 1e-9
@@ -61,10 +60,6 @@ Outputs = TypeVar("Outputs")
 Parameters = TypeVar("Parameters")
 
 
-class Nothing(NamedTuple):
-    """State of a component without memory; inputs of one without inputs."""
-
-
 class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
     """Base of all components.
 
@@ -73,10 +68,8 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
     :meth:`begin` and :meth:`advance`. These may raise: what they raise becomes a refusal.
     """
 
-    author = "auv-fmu"
-    license = "MIT"
-    version = __version__
-    default_experiment = DefaultExperiment(0.0, 100.0, STEP)
+    author, license, version = ABOUT["author"], ABOUT["license"], ABOUT["version"]
+    default_experiment = DefaultExperiment(*EXPERIMENT)
 
     #: What the parameters mean to the equations; `h_max` is not among them.
     parameter_set: ParameterSet[Parameters]
@@ -107,8 +100,19 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         """
         return ()
 
-    def check_state(self, parameters: Parameters, state: State, outputs: list[float]) -> None:
-        """Raise Refusal if no run can have led to a state and outputs, all of them finite."""
+    def expected(self, parameters: Parameters, state: State, outputs: Outputs) -> Outputs | None:
+        """The outputs that belong to a state that is restored; None: that cannot be told.
+
+        Args:
+            parameters: that are restored with it.
+            state: all of it finite.
+            outputs: that are restored with it: they tell what else they depend on.
+
+        Raises:
+            Refusal: no run can have led to the state.
+
+        """
+        return None
 
     def hidden_state(self) -> Any:
         """What a component keeps outside its state: JSON-safe, immutable."""
@@ -130,6 +134,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         }
         cls._unpack = staticmethod(unpacking(inputs, ports["input"], cls.group_of))
         cls._pack = staticmethod(packing(outputs, ports["output"]))
+        cls._output_places = slices(ports["output"])
         cls._norm = staticmethod(measuring(cls._state_type))
         cls._samples = cls.sample is not Component.sample
         # PythonFMU looks methods up by names that miss Python's cache: the first class has them.
@@ -293,7 +298,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
             meaning = self._meaning(wanted["parameters"])
             if not self._norm(wanted["state"]) <= LARGEST_STATE:
                 raise Refusal(f"beyond {LARGEST_STATE:g}")
-            self.check_state(meaning[0], wanted["state"], wanted["outputs"])
+            self._check_outputs(meaning[0], wanted["state"], wanted["outputs"])
             # Nothing of this instance has changed so far, and nothing can fail after this.
             self.restore_hidden_state(wanted["hidden"])
             self._adopt(wanted["parameters"], meaning)
@@ -303,6 +308,12 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         self._mode, self._start_time = wanted["mode"], wanted["start_time"]
         # Before the first step all follows from parameters and inputs, and is computed once more.
         self._stale = self._mode == INITIALISING
+
+    def _check_outputs(self, parameters: Parameters, state: State, values: list[float]) -> None:
+        groups: Any = {group: tuple(values[at]) for group, at in self._output_places.items()}
+        expected = self.expected(parameters, state, groups)
+        if expected is not None and not nearly_equal(self._pack(expected), values):
+            raise Refusal("its outputs are not those of its state")
 
     _fmu_state_to_bytes = staticmethod(to_bytes)
     _fmu_state_from_bytes = staticmethod(from_bytes)

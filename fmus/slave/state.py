@@ -69,7 +69,7 @@ def from_bytes(content: bytes) -> dict[str, Any]:
 
 
 def _text(value: Mapping[str, Any]) -> bytes:
-    return json.dumps(value, sort_keys=True).encode("utf-8")
+    return json.dumps(value).encode("utf-8")
 
 
 def _checksum(snapshot: Mapping[str, Any]) -> int:

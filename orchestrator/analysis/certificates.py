@@ -12,7 +12,7 @@ import numpy as np
 
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
-from auv_fmu.saturation import INTEGRALS, SATURATIONS
+from auv_fmu.saturation import SATURATIONS
 from orchestrator.analysis.signals import (
     ACTUATORS,
     ATTITUDE,
@@ -76,8 +76,7 @@ def _rows(start: Table, end: Table) -> Iterator[list[float]]:
     plant = vehicle(lambda name: parameter(start, name))
     ell, lambda_ = parameter(start, ELL), parameter(start, _LAMBDA)
     K2 = (parameter(start, _K2[0]), parameter(start, _K2[1]), parameter(start, _K2[2]))
-    name = str(start.parameters[port_name(_SATURATION)])
-    s, integral = SATURATIONS[name], INTEGRALS[name]
+    s = SATURATIONS[str(start.parameters[port_name(_SATURATION)])]
     lower, upper = limits(start)
 
     y, dy, euler = true_control_point(start), start.group(*DY), start.group(*ATTITUDE)
@@ -91,7 +90,7 @@ def _rows(start: Table, end: Table) -> Iterator[list[float]]:
         r_1, r_2 = composite_errors(dy[i], dy_d[i], dy_hat[i], e_z[i], z_measured[i], lambda_, s)
         errors = Errors(e[i].tolist(), z[i].tolist(), r_1, r_2)
         rotation = rotation_from_euler(*euler[i].tolist())
-        V = lyapunov(plant, rotation, errors, K2, integral, ell)
+        V = lyapunov(plant, rotation, errors, K2, s, ell)
         yield [t, V, *r_1, *r_2, *margin[i]]
 
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from orchestrator.analysis import gains
-from orchestrator.commands.options import OK, add_out, add_set, assignments
+from orchestrator.commands.options import OK, add_fmi, add_kind, add_out, add_set, assignments
 from orchestrator.commands.streams import show
+from orchestrator.errors import InputError
 from orchestrator.experiments import bundle
+from orchestrator.experiments.bundle import DEFAULT_FOLDERS, NATIVE, PYTHON
 from orchestrator.experiments.own_controller import build_own
 from orchestrator.experiments.scenario import names, read_scenario
 from orchestrator.experiments.wiring import closed_loop
@@ -20,6 +23,14 @@ def add_to(commands: Any) -> None:
     build = commands.add_parser(
         "build", help="build every FMU and the bundle auv.ssp, or a component of your own"
     )
+    add_kind(build)
+    add_fmi(build)
+    build.add_argument(
+        "--platforms",
+        metavar="NAME,...|all",
+        help=f"that --kind {NATIVE} has libraries for, by the names of FMI; all but this machine's "
+        "own need auv-fmu[native]; default: this machine",
+    )
     build.add_argument(
         "script",
         nargs="?",
@@ -27,12 +38,13 @@ def add_to(commands: Any) -> None:
         metavar="SCRIPT.py",
         help="a slave of PythonFMU, whose FMU is built beside it; default: the bundle",
     )
-    add_out(build, None, f"{bundle.DEFAULT_FOLDER}, or the folder of SCRIPT.py")
+    folders = f"{DEFAULT_FOLDERS[PYTHON]} or {DEFAULT_FOLDERS[NATIVE]}"
+    add_out(build, None, f"{folders}, or the folder of SCRIPT.py")
     build.add_argument(
         "--loader",
         choices=("native", "plain"),
-        help="native: the FMUs also run in hosts that are no Python programs; needs a C compiler "
-        "and is the default where there is one",
+        help=f"of --kind {PYTHON}; native: the FMUs also run in hosts that are no Python programs; "
+        "needs a C compiler and is the default where there is one",
     )
     build.set_defaults(action=_build)
 
@@ -46,15 +58,30 @@ def add_to(commands: Any) -> None:
 
 def _build(options: argparse.Namespace) -> int:
     if options.script is not None:
+        if options.kind != PYTHON:
+            raise InputError(f"{options.script}: only the bundle's components are translated to C")
         show(build_own(options.script, options.out, options.loader))
         return OK
-    folder = options.out or bundle.DEFAULT_FOLDER
-    written = bundle.build(folder, options.loader)
+    folder = options.out or DEFAULT_FOLDERS[options.kind]
+    written = bundle.build(
+        folder,
+        options.loader,
+        kind=options.kind,
+        fmi=options.fmi,
+        platforms=options.platforms,
+    )
     for path in written:
         show(path)
     state = "built" if written else "up to date"
-    show(f"{folder} is {state}, with the {bundle.loader_of(folder)} loader")
+    show(f"{folder} is {state}, {_described(bundle.settings_of(folder))}")
     return OK
+
+
+def _described(settings: Mapping[str, str]) -> str:
+    """How FMUs were built, in words."""
+    if settings["kind"] == PYTHON:
+        return f"with the {settings['loader']} loader"
+    return f"FMI {settings['fmi']}.0 for {settings['platforms']}, by {settings['compiler']}"
 
 
 def _list(_: argparse.Namespace) -> int:

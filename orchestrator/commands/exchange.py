@@ -8,7 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator.commands.options import FAILED, OK, add_out, add_set, add_system, assignments
+from orchestrator.commands.options import (
+    FAILED,
+    OK,
+    add_fmi,
+    add_kind,
+    add_out,
+    add_set,
+    add_system,
+    assignments,
+)
 from orchestrator.commands.streams import show
 from orchestrator.errors import InputError
 from orchestrator.exchange.hosts import HOSTS, compare
@@ -41,6 +50,8 @@ def add_to(commands: Any) -> None:
     export.add_argument(
         "--step", type=float, metavar="S", help="communication step [s]; default: the scenario's"
     )
+    add_kind(export)
+    add_fmi(export)
     add_set(export)
     add_out(export, None, "exports/SCENARIO/")
     export.set_defaults(action=_export)
@@ -50,6 +61,7 @@ def add_to(commands: Any) -> None:
         "host", nargs="*", metavar="HOST", help=f"of {', '.join(HOSTS)}; default: all"
     )
     _add_scenario(others)
+    add_kind(others)
     others.add_argument(
         "--steps", type=int, default=5000, metavar="N", help="how many; default: 5000"
     )
@@ -79,7 +91,7 @@ def _add_scenario(parser: argparse.ArgumentParser) -> None:
 
 def _export(options: argparse.Namespace) -> int:
     request = Request(step=options.step, parameters=assignments(options))
-    prepared = prepare(*loaded(options.scenario), request)
+    prepared = prepare(*loaded(options.scenario, options.kind, options.fmi), request)
     experiment = prepared.experiment
     system = replace(
         prepared.system,
@@ -108,7 +120,7 @@ def _hosts(options: argparse.Namespace) -> int:
     unknown = set(options.host) - HOSTS.keys()
     if unknown:
         raise InputError(f"no host {', '.join(sorted(unknown))}; there are {', '.join(HOSTS)}")
-    system = load(options.scenario)
+    system = load(options.scenario, options.kind)
     step = system.step or DEFAULT_STEP
     verdicts = compare(system, options.host or list(HOSTS), options.steps, step)
     show(f"{'host':13} {'package':34} {'max deviation':>14} {'steps/s':>8}  worst port")

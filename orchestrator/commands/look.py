@@ -105,7 +105,7 @@ def _view(options: argparse.Namespace) -> int:
 
 
 def _animate(options: argparse.Namespace) -> int:
-    scenario, system = loaded(options.scenario)
+    scenario, system = loaded(options.scenario, options.kind)
     out = options.out or Path("results", f"{scenario.name}.gif")
     check_film(out, options.fps)
     prepared = prepare(scenario, system, request(options))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from orchestrator.commands.streams import say
 from orchestrator.errors import InputError
+from orchestrator.experiments.bundle import FMI, KINDS, NATIVE, PYTHON
 from orchestrator.experiments.preparation import Request
 from orchestrator.master.experiment import ORDERS
 from orchestrator.master.observer import Ending
@@ -42,6 +43,28 @@ def add_experiment(parser: argparse.ArgumentParser) -> None:
         default=ORDERS[0],
         help=f"order in which the components are stepped; default: {ORDERS[0]}",
     )
+    add_kind(parser)
+
+
+def add_kind(parser: argparse.ArgumentParser) -> None:
+    """Which FMUs of the bundle."""
+    parser.add_argument(
+        "--kind",
+        choices=KINDS,
+        default=PYTHON,
+        help="of the bundle's FMUs: Python sources, or their translation to C, with the same "
+        f"numbers; default: {PYTHON}",
+    )
+
+
+def add_fmi(parser: argparse.ArgumentParser) -> None:
+    """Which version of FMI."""
+    parser.add_argument(
+        "--fmi",
+        choices=FMI,
+        default=FMI[0],
+        help=f"version of the FMUs; 3 needs --kind {NATIVE}; default: {FMI[0]}",
+    )
 
 
 def add_set(parser: argparse.ArgumentParser) -> None:
@@ -68,7 +91,13 @@ def add_out(parser: argparse.ArgumentParser, default: Path | None, otherwise: st
 
 def request(options: argparse.Namespace) -> Request:
     """What the user asks for beyond the scenario."""
-    return Request(options.stop_time, options.step, options.order, assignments(options))
+    return Request(
+        options.stop_time,
+        options.step,
+        options.order,
+        assignments(options),
+        kind=options.kind,
+    )
 
 
 def status(name: str, ending: Ending) -> int:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from orchestrator.commands.options import OK, add_out
+from orchestrator.commands.options import OK, add_kind, add_out
 from orchestrator.commands.streams import show
 from orchestrator.experiments.scenario import names
 from orchestrator.paper.report import write_report
@@ -21,11 +21,13 @@ def add_to(commands: Any) -> None:
         metavar="FILE.toml",
         help="a scenario file to be in the report beside those of `auv-fmu list`",
     )
+    add_kind(report)
     add_out(report, Path("results", "report"))
     report.set_defaults(action=_report)
 
 
 def _report(options: argparse.Namespace) -> int:
-    for path in write_report(options.out, [*names(), *options.scenarios], options.command):
+    scenarios = [*names(), *options.scenarios]
+    for path in write_report(options.out, scenarios, options.command, kind=options.kind):
         show(path)
     return OK

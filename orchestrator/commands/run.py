@@ -80,7 +80,7 @@ def add_to(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     isolation = isolation_of(options.isolate, options.step_timeout)
     wanted = replace(request(options), isolation=isolation, loop=options.loop)
-    runs = with_companion(prepare(*loaded(options.scenario), wanted), wanted)
+    runs = with_companion(prepare(*loaded(options.scenario, options.kind), wanted), wanted)
     folder = options.out or Path("results", runs[0].scenario.name)
     files = Files(options.interval, options.columns, options.format, options.figures)
     # Until all is said: who stops a run several times wants to know, too, where its rows are.

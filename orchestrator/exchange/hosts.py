@@ -23,6 +23,7 @@ import numpy as np
 from fmpy.ssp.simulation import simulate_ssp
 
 from orchestrator.errors import InputError, last_line
+from orchestrator.exchange import c_host
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.simulation import completed
 from orchestrator.master.table import Table
@@ -171,6 +172,13 @@ def _container(system: System, folder: Path, steps: int, step: float) -> tuple[n
     return np.column_stack([table[name] for name in names])[1:], seconds
 
 
+def _c_program(system: System, folder: Path, steps: int, step: float) -> tuple[np.ndarray, float]:
+    what = c_host.plan(system, Experiment(steps * step, step, "jacobi"))
+    names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
+    rows, seconds = c_host.run([c_host.compiled(folder)], folder, what, names)
+    return rows[1:], seconds
+
+
 HOSTS: dict[str, Host] = {
     "libcosim-ssp": Host("libcosimpy", _libcosim_ssp),
     "libcosim-osp": Host("libcosimpy", _libcosim_osp),
@@ -183,6 +191,7 @@ HOSTS: dict[str, Host] = {
         compared=("plant.eta.x", "plant.eta.y", "plant.eta.z"),
         why="exchanges no initial values and accumulates its time",
     ),
+    "c-program": Host("auv_fmu", _c_program),
 }
 
 

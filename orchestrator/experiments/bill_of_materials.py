@@ -17,19 +17,24 @@ def checksums(files: Sequence[Path]) -> bytes:
     return "".join(f"{digest_of(path)}  {path.name}\n" for path in files).encode()
 
 
-def bill(files: Sequence[Path]) -> bytes:
+def bill(files: Sequence[Path], contained: Sequence[str]) -> bytes:
     """CycloneDX 1.5: the files of the bundle and the packages whose code they contain.
 
     Without time and serial number: the same bundle has the same bill.
+
+    Args:
+        files: of the bundle.
+        contained: the packages, besides ours.
+
     """
-    packages = [_package(name) for name in ("auv-fmu", "pythonfmu")]
+    ours, *others = map(_package, ("auv-fmu", *contained))
     content = {
         "bomFormat": "CycloneDX",
         "specVersion": "1.5",
         "version": 1,
-        "metadata": {"component": packages[0]},
+        "metadata": {"component": ours},
         "components": [
-            packages[1],
+            *others,
             *(
                 {
                     "type": "file",
@@ -39,7 +44,9 @@ def bill(files: Sequence[Path]) -> bytes:
                 for path in files
             ),
         ],
-        "dependencies": [{"ref": packages[0]["bom-ref"], "dependsOn": [packages[1]["bom-ref"]]}],
+        "dependencies": [
+            {"ref": ours["bom-ref"], "dependsOn": [package["bom-ref"] for package in others]}
+        ],
     }
     return (json.dumps(content, indent=2) + "\n").encode()
 

@@ -1,7 +1,8 @@
 """The bundle: every FMU and the SSP of the closed loop, built when missing or stale.
 
 `auv-fmu build` writes it where the user wants it. Runs use FMUs of their own in the user's cache
-folder, one folder for each version of the sources, so that nothing appears where they are called.
+folder, one folder for each version of the sources and each kind of FMU, so that nothing appears
+where they are called.
 """
 
 from __future__ import annotations
@@ -28,11 +29,18 @@ from orchestrator.experiments.bill_of_materials import (
 from orchestrator.experiments.folder import replaced, to_disk
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.system.children import run_module
+from orchestrator.system.component import WRITABLE
 from orchestrator.system.leftovers import claimed, remove_left
 from orchestrator.system.ssp.writing import ssp_bytes
 
-#: Where `auv-fmu build` writes unless another folder is named.
-DEFAULT_FOLDER = Path("fmus", "dist")
+#: The kinds of FMU that a component comes as: Python sources, or their translation to C.
+KINDS = PYTHON, NATIVE = "python", "native"
+
+#: The versions of FMI; the Python kind has the first.
+FMI = ("2", "3")
+
+#: Where `auv-fmu build` writes each kind unless another folder is named.
+DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "native")}
 
 #: The archive of the closed loop, and what was built beside it, from what.
 ARCHIVE, MANIFEST = "auv.ssp", "build.json"
@@ -40,17 +48,30 @@ ARCHIVE, MANIFEST = "auv.ssp", "build.json"
 #: How the name of a folder of the cache begins that is being made.
 _PARTIAL = ".partial-"
 
-#: Packages that the FMUs are made of.
-_SOURCES = ("auv_fmu", "fmus", "pythonfmu")
+#: Packages that the FMUs of each kind are made of.
+_SOURCES = {PYTHON: ("auv_fmu", "fmus", "pythonfmu"), NATIVE: ("auv_fmu", "fmus")}
+
+#: Packages besides ours whose code is in them.
+_CONTAINED = {PYTHON: ("pythonfmu",), NATIVE: ()}
 
 
-def build(folder: Path, loader: str | None = None) -> list[Path]:
+def build(
+    folder: Path,
+    loader: str | None = None,
+    *,
+    kind: str = PYTHON,
+    fmi: str = FMI[0],
+    platforms: str | None = None,
+) -> list[Path]:
     """Bring a folder with FMUs and SSP up to date.
 
     Args:
         folder: made if it does not exist.
-        loader: `native` or `plain`; None: what is there, and for new files native where it can be
-            compiled.
+        loader: of the Python kind, `native` or `plain`; None: what is there, and for new files
+            native where it can be compiled.
+        kind: one of :data:`KINDS`.
+        fmi: version, one of :data:`FMI`.
+        platforms: of the native kind, with commas between them; None: this machine.
 
     Returns:
         The files that had to be written.
@@ -64,12 +85,15 @@ def build(folder: Path, loader: str | None = None) -> list[Path]:
         for path in (*folder.glob("*.fmu"), folder / MANIFEST):
             if path.is_file():
                 shutil.copy2(path, unfinished)
-        run_fmus("packaging.build", unfinished, *(("--loader", loader) if loader else ()))
+        options = ["--kind", kind, "--fmi", fmi]
+        options += ["--loader", loader] if loader is not None else []
+        options += ["--platforms", platforms] if platforms is not None else []
+        run_fmus("packaging.build", unfinished, *options)
         archive = unfinished / ARCHIVE
-        archive.write_bytes(ssp_bytes(closed_loop(unfinished)))
+        archive.write_bytes(ssp_bytes(closed_loop(unfinished, versions=WRITABLE)))
         files = [*sorted(unfinished.glob("*.fmu")), archive]
         (unfinished / CHECKSUMS).write_bytes(checksums(files))
-        (unfinished / BILL).write_bytes(bill(files))
+        (unfinished / BILL).write_bytes(bill(files, _CONTAINED[kind]))
         for path in unfinished.iterdir():
             before = folder / path.name
             if before.is_file() and before.read_bytes() == path.read_bytes():
@@ -78,10 +102,10 @@ def build(folder: Path, loader: str | None = None) -> list[Path]:
     return [folder / name for name in written]
 
 
-def loader_of(folder: Path) -> str:
-    """Which loader the FMUs in a folder were built with."""
+def settings_of(folder: Path) -> dict[str, str]:
+    """How the FMUs in a folder were built."""
     content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-    return str(content["loader"])
+    return dict(content["settings"])
 
 
 def run_fmus(module: str, folder: Path, *options: str) -> list[Path]:
@@ -106,15 +130,22 @@ def run_fmus(module: str, folder: Path, *options: str) -> list[Path]:
 
 
 @cache
-def current_fmus() -> Path:
+def current_fmus(kind: str = PYTHON, fmi: str = FMI[0]) -> Path:
     """The folder with the FMUs of the installed sources, built if it is not there.
 
+    Args:
+        kind: one of :data:`KINDS`.
+        fmi: version, one of :data:`FMI`.
+
     Raises:
-        InputError: they cannot be built, or the cache folder cannot be written.
+        InputError: there is no such kind, they cannot be built, or the cache folder cannot be
+            written.
 
     """
+    if kind not in KINDS:
+        raise InputError(f"kind {kind!r}: use one of {', '.join(KINDS)}")
     cache_folder = user_cache_path("auv-fmu", appauthor=False) / "fmus"
-    folder = cache_folder / _fingerprint()
+    folder = cache_folder / _fingerprint(kind, fmi)
     if _is_whole(folder):
         return folder
     try:
@@ -123,7 +154,7 @@ def current_fmus() -> Path:
         partial = Path(mkdtemp(prefix=_PARTIAL, dir=cache_folder))
         try:
             with claimed(partial):
-                _build_cached(partial, folder)
+                _build_cached(partial, folder, "--kind", kind, "--fmi", fmi)
         finally:
             rmtree(partial, ignore_errors=True)
     except OSError as error:
@@ -136,9 +167,9 @@ def current_fmus() -> Path:
     return folder
 
 
-def _build_cached(partial: Path, folder: Path) -> None:
+def _build_cached(partial: Path, folder: Path, *options: str) -> None:
     """Build into a folder that takes the place of another when it is whole."""
-    run_fmus("packaging.build", partial)
+    run_fmus("packaging.build", partial, *options)
     for path in (*partial.iterdir(), partial):
         to_disk(path)
     # What somebody has cleaned away in part is made anew.
@@ -155,10 +186,10 @@ def _is_whole(folder: Path) -> bool:
         return False
 
 
-def _fingerprint() -> str:
-    """Hash of everything that the FMUs depend on."""
-    digest = hashlib.sha256()
-    for package in _SOURCES:
+def _fingerprint(kind: str, fmi: str) -> str:
+    """Hash of everything that the FMUs of a kind depend on."""
+    digest = hashlib.sha256(f"{kind} {fmi}\0".encode())
+    for package in _SOURCES[kind]:
         specification = find_spec(package)
         assert specification is not None and specification.submodule_search_locations
         [root] = specification.submodule_search_locations

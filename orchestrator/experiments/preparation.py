@@ -9,12 +9,13 @@ from pathlib import Path
 from auv_fmu.euler import STEP
 from orchestrator.analysis.figures import check_figure
 from orchestrator.errors import InputError
-from orchestrator.experiments.bundle import current_fmus
+from orchestrator.experiments.bundle import FMI, PYTHON, current_fmus
 from orchestrator.experiments.scenario import Scenario, read_scenario
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.isolated import Isolation
-from orchestrator.master.loop import LOOPS, PYTHON, Loop, chosen
+from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
+from orchestrator.system.component import RUNNABLE, WRITABLE
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.reading import read_ssp
 from orchestrator.system.structure import System
@@ -31,6 +32,7 @@ class Request:
         stop_time, step: experiment [s]; None: the scenario's or the system's own.
         order: of evaluation.
         parameters: values that win over the scenario's.
+        kind: of the bundle's FMUs, one of :data:`orchestrator.experiments.bundle.KINDS`.
         isolation: of the FMUs in processes of their own; None: they run in this one.
         loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
 
@@ -41,6 +43,7 @@ class Request:
     order: str = ORDERS[0]
     parameters: Mapping[PortName, object] = field(default_factory=dict)
     isolation: Isolation | None = None
+    kind: str = PYTHON
     loop: str = LOOPS[0]
 
 
@@ -52,20 +55,21 @@ class Prepared:
     system: System
     experiment: Experiment
     isolation: Isolation | None = None
-    loop: Loop = PYTHON
+    loop: Loop = PYTHON_LOOP
 
 
-def load(name: str | Path) -> System:
+def load(name: str | Path, kind: str = PYTHON) -> System:
     """The system of a scenario, or of an SSP, with its experiment.
 
     Args:
         name: of a scenario of the bundle, or path of a .toml or .ssp file.
+        kind: of the bundle's FMUs, `python` or `native`.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.
 
     """
-    scenario, system = loaded(str(name))
+    scenario, system = loaded(str(name), kind)
     return replace(
         system,
         name=scenario.name,
@@ -74,21 +78,36 @@ def load(name: str | Path) -> System:
     )
 
 
-def loaded(name: str) -> tuple[Scenario, System]:
+def loaded(name: str, kind: str = PYTHON, fmi: str = FMI[0]) -> tuple[Scenario, System]:
     """A scenario and its system.
 
     Args:
         name: of a scenario of the bundle, or path of a .toml or .ssp file.
+        kind: of the bundle's FMUs, `python` or `native`; FMUs that a file names are as they are.
+        fmi: their version of FMI. The master can step those of the first.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.
 
     """
     if name.endswith(".ssp"):
+        check_brings_its_own(name, kind, fmi)
         return Scenario(Path(name).stem, title=Path(name).name), read_ssp(Path(name))
     scenario = read_scenario(name)
     check_figure(scenario.figure)
-    return scenario, closed_loop(current_fmus(), scenario)
+    versions = RUNNABLE if fmi == FMI[0] else WRITABLE
+    return scenario, closed_loop(current_fmus(kind, fmi), scenario, versions)
+
+
+def check_brings_its_own(name: str, kind: str, fmi: str = FMI[0]) -> None:
+    """Check that no other FMUs are asked for than those that a system comes with.
+
+    Raises:
+        InputError: it would not have any effect.
+
+    """
+    if (kind, fmi) != (PYTHON, FMI[0]):
+        raise InputError(f"{name}: comes with its FMUs; kind and fmi are for the bundle's own")
 
 
 def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
@@ -123,7 +142,7 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     scenario = prepared.scenario
     if not scenario.compare:
         return [prepared]
-    companion, system = loaded(scenario.compare)
+    companion, system = loaded(scenario.compare, request.kind)
     shared = {
         target: value
         for target, value in {**scenario.parameters, **request.parameters}.items()

@@ -13,11 +13,13 @@ from time import monotonic
 from typing import Any
 
 from orchestrator.experiments.bill_of_materials import digest_of
+from orchestrator.experiments.bundle import NATIVE, PYTHON
 from orchestrator.experiments.folder import RECORD, whole
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observer import Ending, Header
 from orchestrator.system.names import port_name
+from orchestrator.system.unpacking import runs_python, unpacked
 
 #: Packages whose versions a result depends on.
 PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy", "matplotlib")
@@ -73,7 +75,11 @@ def write_record(
         },
         "loop": header.loop,
         "fmus": {
-            component.name: {"file": component.fmu.name, "sha256": digest_of(component.fmu)}
+            component.name: {
+                "file": component.fmu.name,
+                "sha256": digest_of(component.fmu),
+                "kind": PYTHON if runs_python(unpacked(component.fmu)) else NATIVE,
+            }
             for component in prepared.system.components.values()
         },
         "parameters": {str(name): value for name, value in header.parameters.items()},

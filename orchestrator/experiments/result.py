@@ -13,8 +13,15 @@ from typing import TYPE_CHECKING, Any
 from orchestrator.analysis.metrics import metrics_of
 from orchestrator.analysis.plot import plot
 from orchestrator.errors import InputError, did_you_mean
+from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.folder import replaced
-from orchestrator.experiments.preparation import Prepared, Request, loaded, prepare
+from orchestrator.experiments.preparation import (
+    Prepared,
+    Request,
+    check_brings_its_own,
+    loaded,
+    prepare,
+)
 from orchestrator.experiments.record import Clock, write_record
 from orchestrator.experiments.run import metrics_json, write_metrics
 from orchestrator.experiments.scenario import Scenario
@@ -165,6 +172,7 @@ def simulate(
     stop_time: float | None = None,
     step: float | None = None,
     order: str = ORDERS[0],
+    kind: str = PYTHON,
     progress: bool = False,
     isolate: bool = False,
     step_timeout: float | None = None,
@@ -182,6 +190,7 @@ def simulate(
         stop_time: end of the run [s]; None: the scenario's own.
         step: communication step [s]; None: the scenario's own, else 0.02.
         order: `gauss-seidel`, as the paper's scheme has it, or `jacobi`, as most tools step.
+        kind: of the bundle's FMUs, `python` or `native`: translated to C, with the same numbers.
         progress: show a bar on runs that take longer than some seconds.
         isolate: run each FMU in a process of its own, whose end, whatever it does, is no more than
             a failure of the run.
@@ -199,16 +208,17 @@ def simulate(
 
     """
     if isinstance(system, System):
+        check_brings_its_own(str(system), kind)
         scenario = Scenario(system.name)
     else:
-        scenario, system = loaded(str(system))
+        scenario, system = loaded(str(system), kind)
     if not isinstance(parameters, Mapping | None):
         raise InputError(f"parameters: a mapping by component.parameter, not {parameters!r}")
     changes: dict[PortName, object] = {
         port_name(str(name)): value for name, value in (parameters or {}).items()
     }
     isolation = isolation_of(isolate, step_timeout)
-    request = Request(stop_time, step, order, changes, isolation, loop)
+    request = Request(stop_time, step, order, changes, isolation, kind, loop)
     prepared = prepare(scenario, system, request)
     result = Result(prepared)
     observers: list[Observer] = [result, *([Progress(scenario.name)] * progress)]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import InputError, did_you_mean
 from orchestrator.experiments.scenario import Scenario
-from orchestrator.system.component import Component, read_component
+from orchestrator.system.component import RUNNABLE, Component, read_component
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import Connection, System
 
@@ -22,12 +22,15 @@ def read_wiring() -> dict[str, Any]:
     return tomllib.loads(_WIRING.read_text(encoding="utf-8"))
 
 
-def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
+def closed_loop(
+    folder: Path, scenario: Scenario | None = None, versions: Sequence[str] = RUNNABLE
+) -> System:
     """The wiring of the closed loop over the FMUs in a folder.
 
     Args:
         folder: with the built FMUs.
         scenario: whose components, wires and parameters change it; None: the closed loop as is.
+        versions: of FMI that its FMUs may have.
 
     Raises:
         InputError: a component or group of ports that the scenario names does not exist.
@@ -67,7 +70,9 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
                 if {target.split(".")[0], source.split(".")[0]} <= chosen.keys()
             }
     components = {
-        name: read_component(name, Path(fmu) if fmu.endswith(".fmu") else folder / f"{fmu}.fmu")
+        name: read_component(
+            name, Path(fmu) if fmu.endswith(".fmu") else folder / f"{fmu}.fmu", versions
+        )
         for name, fmu in chosen.items()
     }
     system = System(

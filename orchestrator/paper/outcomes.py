@@ -21,6 +21,7 @@ from orchestrator.analysis.metrics import Metrics
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
 from orchestrator.experiments.bill_of_materials import digest_of
+from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.folder import whole
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.experiments.record import PACKAGES
@@ -59,15 +60,16 @@ class Outcome:
 class Outcomes:
     """Outcomes of runs; equal ones, of whatever name, are made once."""
 
-    def __init__(self, folder: Path, stop_time: float | None = None) -> None:
+    def __init__(self, folder: Path, stop_time: float | None = None, kind: str = PYTHON) -> None:
         """Start without any.
 
         Args:
             folder: in which outcomes are kept.
             stop_time: of all runs [s]; None: their own.
+            kind: of the bundle's FMUs in all runs.
 
         """
-        self._folder, self._stop_time = folder, stop_time
+        self._folder, self._stop_time, self._kind = folder, stop_time, kind
         self._keys: dict[Run, str] = {}
         self._labels: dict[str, str] = {}
         self._outcomes: dict[str, Outcome] = {}
@@ -94,19 +96,19 @@ class Outcomes:
         """
         missing: dict[str, tuple[int, Run]] = {}
         for run in runs:
-            shortened = replace(run, stop_time=self._stop_time or run.stop_time)
+            wanted = replace(run, stop_time=self._stop_time or run.stop_time, kind=self._kind)
             try:
-                prepared = shortened.prepared()
+                prepared = wanted.prepared()
             except InputError as error:
                 self._keys[run] = self._labels[run.label] = key = run.label
                 self._outcomes[key] = Outcome({"failure": str(error)}, Table())
                 continue
             self._keys[run] = key = key_of(prepared)
-            label = shortened.label
+            label = wanted.label
             self._labels[key] = min(label, self._labels.get(key, label), key=len)
             kept = _read(self._file(key))
             if kept is None:
-                missing.setdefault(key, (prepared.experiment.rows, shortened))
+                missing.setdefault(key, (prepared.experiment.rows, wanted))
             else:
                 self._outcomes[key] = kept
         longest_first = sorted(missing.items(), key=lambda item: -item[1][0])

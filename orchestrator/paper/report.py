@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.analysis import gains
-from orchestrator.experiments.bundle import current_fmus
+from orchestrator.experiments.bundle import PYTHON, current_fmus
 from orchestrator.experiments.folder import replaced
 from orchestrator.experiments.record import PACKAGES, Clock, write_files
 from orchestrator.experiments.wiring import closed_loop
@@ -51,6 +51,7 @@ def write_report(
     scenarios: Sequence[str],
     command: Sequence[str],
     stop_time: float | None = None,
+    kind: str = PYTHON,
 ) -> tuple[Path, Path]:
     """Run what was not run before, and write `report.html`, `report.md` and their figures.
 
@@ -59,6 +60,7 @@ def write_report(
         scenarios: that have a section: names, or paths of files.
         command: for the record.
         stop_time: of all runs [s]; None: their own. For a look at the report, not at the paper.
+        kind: of the bundle's FMUs in all runs.
 
     Returns:
         The two files.
@@ -69,9 +71,10 @@ def write_report(
 
     """
     clock = Clock()
-    current_fmus()
-    chapters = sections(scenarios)
-    outcomes = Outcomes(folder / _RUNS, stop_time)
+    # Built before there are processes that would each build them.
+    fmus = current_fmus(kind)
+    chapters = sections(scenarios, kind)
+    outcomes = Outcomes(folder / _RUNS, stop_time, kind)
     with replaced(folder) as unfinished:
         with workers() as crew:
             outcomes.make(
@@ -83,7 +86,7 @@ def write_report(
                 crew,
             )
             notes, effects = _draw(chapters, outcomes, unfinished, crew)
-        body = "\n\n".join(_text(chapters, outcomes, notes, effects, command, unfinished))
+        body = "\n\n".join(_text(chapters, outcomes, notes, effects, command, unfinished, fmus))
         body = readings.linked(body)
         text = f"{_TITLE}\n\n{readings.linked(_INTRODUCTION)}\n\n{contents(body)}\n\n{body}\n"
         (unfinished / "report.md").write_text(text, encoding="utf-8")
@@ -120,6 +123,7 @@ def _text(
     effects: dict[str, str],
     command: Sequence[str],
     folder: Path,
+    fmus: Path,
 ) -> Iterator[str]:
     yield "## Every printed number and claim"
     yield _claims(outcomes)
@@ -133,7 +137,7 @@ def _text(
         yield effects[effect.name]
         yield "\n".join(f"- `auv-fmu run {outcomes.label(run)}`" for run in effect.runs)
     yield "## Gain conditions"
-    yield f"`auv-fmu gains`:\n\n```\n{gains.check(closed_loop(current_fmus()))}\n```"
+    yield f"`auv-fmu gains`:\n\n```\n{gains.check(closed_loop(fmus))}\n```"
     yield "## Readings"
     yield readings.section()
     yield "## Versions and commands"

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.preparation import (
     Prepared,
     Request,
@@ -28,6 +29,7 @@ class Run:
         parameters: values that win over the scenario's, by `component.parameter`.
         order: of evaluation.
         stop_time, step: experiment [s]; None: the scenario's own.
+        kind: of the bundle's FMUs.
 
     """
 
@@ -36,6 +38,7 @@ class Run:
     order: str = ORDERS[0]
     stop_time: float | None = None
     step: float | None = None
+    kind: str = PYTHON
 
     @property
     def label(self) -> str:
@@ -44,6 +47,7 @@ class Run:
             *(("--stop-time", _text(self.stop_time)) if self.stop_time is not None else ()),
             *(("--step", _text(self.step)) if self.step is not None else ()),
             *(("--order", self.order) if self.order != ORDERS[0] else ()),
+            *(("--kind", self.kind) if self.kind != PYTHON else ()),
         ]
         for name, value in self.parameters.items():
             options += ["--set", f"{name}={_text(value)}"]
@@ -53,7 +57,7 @@ class Run:
     def request(self) -> Request:
         """The changes."""
         parameters = {port_name(name): value for name, value in self.parameters.items()}
-        return Request(self.stop_time, self.step, self.order, parameters)
+        return Request(self.stop_time, self.step, self.order, parameters, kind=self.kind)
 
     def prepared(self) -> Prepared:
         """What is run.
@@ -62,7 +66,7 @@ class Run:
             InputError: scenario or changes are not usable.
 
         """
-        return prepare(*loaded(self.scenario), self.request)
+        return prepare(*loaded(self.scenario, self.kind), self.request)
 
     def companions(self) -> list[Run]:
         """Runs that are drawn together with this one.
@@ -73,7 +77,7 @@ class Run:
         """
         prepared = self.prepared()
         return [
-            _as_run(prepared.scenario.compare, companion)
+            _as_run(prepared.scenario.compare, companion, self.kind)
             for companion in with_companion(prepared, self.request)[1:]
         ]
 
@@ -83,9 +87,9 @@ def _text(value: Value) -> str:
     return literal(value).removesuffix(".0") if isinstance(value, float) else literal(value)
 
 
-def _as_run(scenario: str, prepared: Prepared) -> Run:
+def _as_run(scenario: str, prepared: Prepared, kind: str) -> Run:
     """What was prepared from a scenario, by the least changes to it."""
-    own = Run(scenario).prepared()
+    own = Run(scenario, kind=kind).prepared()
     experiment = prepared.experiment
     return Run(
         scenario,
@@ -97,4 +101,5 @@ def _as_run(scenario: str, prepared: Prepared) -> Run:
         experiment.order,
         None if experiment.stop_time == own.experiment.stop_time else experiment.stop_time,
         None if experiment.step == own.experiment.step else experiment.step,
+        kind,
     )

@@ -11,6 +11,7 @@ from typing import Any
 
 from orchestrator.analysis.figures import FIGURES, Drawn, draw
 from orchestrator.errors import InputError, did_you_mean
+from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.scenario import Scenario, read_scenario
 from orchestrator.paper.formatting import actuator_values, numbers, picture, plain, table
 from orchestrator.paper.outcomes import Outcome, Outcomes
@@ -52,8 +53,12 @@ class Section:
         return plain(self.scenario.title or self.scenario.name)
 
 
-def sections(references: Sequence[str]) -> list[Section]:
-    """The sections of some scenarios, names or paths of files.
+def sections(references: Sequence[str], kind: str = PYTHON) -> list[Section]:
+    """The sections of some scenarios.
+
+    Args:
+        references: names of scenarios, or paths of files.
+        kind: of the bundle's FMUs in their runs.
 
     Raises:
         InputError: there is no such scenario, or its file has a mistake.
@@ -64,7 +69,7 @@ def sections(references: Sequence[str]) -> list[Section]:
         scenario = read_scenario(reference)
         taken = {section.name for section in found}
         name = next(name for name in _numbered(scenario.name) if name not in taken)
-        found.append(Section(name, scenario, _runs(reference, scenario)))
+        found.append(Section(name, scenario, _runs(reference, scenario, kind)))
     return found
 
 
@@ -76,9 +81,9 @@ def _numbered(name: str) -> Iterator[str]:
         n += 1
 
 
-def _runs(reference: str, scenario: Scenario) -> dict[str, Run]:
+def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Run]:
     """The run of a scenario and what it is drawn with: its companion, or its twin without noise."""
-    run = Run(reference)
+    run = Run(reference, kind=kind)
     try:
         system = run.prepared().system
     except InputError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -13,6 +14,9 @@ from fmpy.model_description import ModelDescription, ModelVariable
 from orchestrator.errors import InputError, did_you_mean, reason
 from orchestrator.system.unpacking import Version, unpacked, version_of
 from orchestrator.system.values import Value, typed
+
+#: The versions of FMI that a system can be written with, and those that the master can step.
+WRITABLE, RUNNABLE = ("2.0", "3.0"), ("2.0",)
 
 
 @dataclass(frozen=True)
@@ -75,25 +79,30 @@ class Component:
         return False
 
 
-def read_component(name: str, fmu: Path) -> Component:
+def read_component(name: str, fmu: Path, versions: Sequence[str] = RUNNABLE) -> Component:
     """An FMU as a component.
 
+    Args:
+        name: of the instance.
+        fmu: the file.
+        versions: of FMI that it may have.
+
     Raises:
-        InputError: the file is missing or is no FMI 2.0 co-simulation FMU.
+        InputError: the file is missing or is no such FMU for co-simulation.
 
     """
-    return Component(name, fmu, _description(fmu, version_of(fmu)))
+    return Component(name, fmu, _description(fmu, version_of(fmu), tuple(versions)))
 
 
 @lru_cache(maxsize=256)
-def _description(fmu: Path, _: Version) -> ModelDescription:
+def _description(fmu: Path, _: Version, versions: tuple[str, ...]) -> ModelDescription:
     folder = unpacked(fmu)
     try:
         description = fmpy.read_model_description(folder)
     except Exception as error:
         raise InputError(f"{fmu}: not a readable FMU: {reason(error)}") from error
-    if description.fmiVersion != "2.0" or description.coSimulation is None:
-        raise InputError(f"{fmu}: not an FMI 2.0 co-simulation FMU")
+    if description.fmiVersion not in versions or description.coSimulation is None:
+        raise InputError(f"{fmu}: not an FMI {' or '.join(versions)} co-simulation FMU")
     if not re.fullmatch(r"[A-Za-z_]\w*", description.coSimulation.modelIdentifier, re.ASCII):
         raise InputError(
             f"{fmu}: its model identifier {description.coSimulation.modelIdentifier!r} names no "

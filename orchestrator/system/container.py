@@ -59,7 +59,9 @@ def write_container(system: System, folder: Path) -> list[Path]:
         for component in system.components.values():
             shutil.copyfile(component.fmu, Path(work, component.fmu.name))
         Path(work, "system.json").write_text(json.dumps(content), encoding="utf-8")
-        options = ["-container", "system.json", "-fmu-directory", work]
+        versions = {component.description.fmiVersion for component in system.components.values()}
+        fmi = max(versions).partition(".")[0]
+        options = ["-container", "system.json", "-fmu-directory", work, "-fmi", fmi]
         process = run_module(f"{_TOOLBOX}.cli.fmucontainer", *options, folder=Path(work))
         built = Path(work, f"{system.name}.fmu")
         if process.returncode != 0 or not built.is_file():

@@ -6,14 +6,30 @@ import shutil
 from pathlib import Path
 from xml.etree import ElementTree
 
+from orchestrator.errors import InputError
 from orchestrator.system.structure import System
 from orchestrator.system.values import literal
+
+#: The versions of FMI that libcosim knows and we can write.
+_TAKEN = ("2.0",)
 
 _OSP = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
 
 
 def write_osp(system: System, folder: Path) -> list[Path]:
-    """Write `OspSystemStructure.xml` and the FMUs beside it, for libcosim and its command line."""
+    """Write `OspSystemStructure.xml` and the FMUs beside it, for libcosim and its command line.
+
+    Raises:
+        InputError: there is an FMU that libcosim cannot open.
+
+    """
+    for component in system.components.values():
+        version = component.description.fmiVersion
+        if version not in _TAKEN:
+            raise InputError(
+                f"{component.name}: libcosim takes no FMU of FMI {version}; write an SSP, or FMUs "
+                "with --fmi 2"
+            )
     root = ElementTree.Element("OspSystemStructure", xmlns=_OSP, version="0.1")
     for tag, text in (("StartTime", "0.0"), ("BaseStepSize", str(system.step))):
         ElementTree.SubElement(root, tag).text = text

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from orchestrator.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
-from orchestrator.system.values import Value, typed, unit_of
+from orchestrator.system.values import Value, type_of, typed, unit_of
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class System:
                     f"{source} -> {target}: {end} is of causality {variable.causality}, "
                     f"not {wanted}"
                 )
-        if a.type != b.type or a.type == "String":
+        if type_of(a) != type_of(b) or a.type == "String":
             raise InputError(f"{source} -> {target}: cannot feed {a.type} into {b.type}")
         unit_a, unit_b = unit_of(a), unit_of(b)
         if unit_a and unit_b and unit_a != unit_b:

@@ -106,6 +106,11 @@ def _check(entries: Sequence[ZipInfo]) -> None:
             raise ValueError(f"{entry.filename!r} is longer than {_MOST_OF_A_DESCRIPTION:,} bytes")
 
 
+def runs_python(folder: Path) -> bool:
+    """Whether an unpacked FMU is one of PythonFMU's."""
+    return (folder / "resources" / "slavemodule.txt").is_file()
+
+
 def check_place(folder: Path) -> None:
     """Check that an unpacked FMU can be told where it is.
 
@@ -115,9 +120,12 @@ def check_place(folder: Path) -> None:
     """
     # PythonFMU 0.7 does not decode the URI of its folder, but for spaces, and crashes its host. Our
     # loader, which has PythonFMU's library beside it, does that for it.
-    plain = (folder / "resources" / "slavemodule.txt").is_file()
     loader = any((folder / "binaries").glob("*/*_pythonfmu.*"))
-    if plain and not loader and (odd := re.sub(r"[\w./~-]| ", "", str(folder), flags=re.ASCII)):
+    if (
+        runs_python(folder)
+        and not loader
+        and (odd := re.sub(r"[\w./~-]| ", "", str(folder), flags=re.ASCII))
+    ):
         raise InputError(
             f"temporary folder {str(folder)!r}: PythonFMU takes no {odd[0]!r} in it; set TMPDIR to "
             "another, or build the FMU with --loader native"

@@ -15,6 +15,9 @@ Value: TypeAlias = float | int | bool | str
 #: What FMI's Integers can hold.
 _INTEGERS = -(2**31), 2**31 - 1
 
+#: What FMI 2.0 calls the types of FMI 3.0 that have a name there.
+_NAMES = {"Float64": "Real", "Int32": "Integer"}
+
 BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 _KINDS = {
     "Real": "a real number",
@@ -39,14 +42,14 @@ def typed(name: str, variable: ModelVariable, value: object) -> Value:
     try:
         text = str(value).strip()
         shown = f" = {shortened(text)}"
-        if variable.type == "Boolean":
+        if type_of(variable) == "Boolean":
             return BOOLEANS[text.lower()]
-        if variable.type == "String":
+        if type_of(variable) == "String":
             return _transferable(text)
-        number = real(text) if variable.type == "Real" else int(_plain(text))
+        number = real(text) if type_of(variable) == "Real" else int(_plain(text))
     except (KeyError, ValueError):
         # Python itself refuses to write and to read integers of very many digits.
-        kind = _KINDS.get(variable.type, "an integer")
+        kind = _KINDS.get(type_of(variable), "an integer")
         raise InputError(f"{name}{shown}: not {kind}") from None
     if isinstance(number, float) and not isfinite(number):
         raise InputError(f"{name}{shown}: must be finite")
@@ -80,10 +83,15 @@ def _transferable(text: str) -> str:
 def _range(variable: ModelVariable) -> tuple[float | None, float | None]:
     lower = None if variable.min is None else float(variable.min)
     upper = None if variable.max is None else float(variable.max)
-    if variable.type == "Real":
+    if type_of(variable) == "Real":
         return lower, upper
     least, most = _INTEGERS
     return (least if lower is None else lower), (most if upper is None else upper)
+
+
+def type_of(variable: ModelVariable) -> str:
+    """The type of a variable, as FMI 2.0 calls it."""
+    return _NAMES.get(variable.type, str(variable.type))
 
 
 def literal(value: Value) -> str:

@@ -14,9 +14,9 @@ from auv_fmu.adaptation import bound, regressor, robust_force, theta_hat_rate
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import ELL, actuator_command
 from auv_fmu.euler import advance, advance_4
-from auv_fmu.saturation import Saturation, hyperbolic_tangent
+from auv_fmu.saturation import TANH, Saturation, saturation
 from auv_fmu.types import Vector3, Vector4
-from auv_fmu.vectors import difference, norm
+from auv_fmu.vectors import difference, distance, norm
 
 
 class Gains(NamedTuple):
@@ -31,7 +31,7 @@ class Gains(NamedTuple):
     theta_0: Vector4 = (0.0, 0.0, 0.0, 0.0)  #: prior of the parameters [N, kg/s, kg/m, kg]
     eps_t: float = 1.0  #: width of the boundary layer [W]
     ell: float = ELL  #: distance of the control point [m]
-    s: Saturation = hyperbolic_tangent  #: saturation function of Definition 2
+    s: Saturation = TANH  #: saturation function of Definition 2
     printed_jacobian: bool = False  #: (11) as printed, for zero roll (reading 3)
     innovation_gate: float = 1.0  #: largest credible |y - y_hat| [m], not in the paper; 0: none
 
@@ -69,31 +69,44 @@ def initial_state(gains: Gains, y: Vector3) -> ControllerState:
     """The initial conditions below (24): y_hat(0) = y(0), and theta_hat(0) = theta_0."""
     y_hat = y
     z = difference(y, y_hat)
-    s_z, _ = gains.s(z)
+    s_z, _ = saturation(gains.s, z)
     dy_hat_o = observer.initial_dy_hat_o(s_z, z, gains.lambda_, gains.k_d)
     return ControllerState(y_hat, dy_hat_o, gains.theta_0)
 
 
-def gated(gains: Gains, state: ControllerState, y: Vector3) -> ControllerState:
-    """The state, or a restarted observer if y is further from y_hat than a vehicle can move.
-
-    Not in the paper. A host without an exchange of initial values hands the controller zeros
-    in its first step; without the gate the observer would be kicked by k_d times the distance
-    to the origin. theta_hat is kept.
+def credible(gains: Gains, state: ControllerState, y: Vector3) -> bool:
+    """Whether a measurement lies where a vehicle can have moved to. Not in the paper.
 
     Args:
         gains: of the controller; `innovation_gate` [m] is the threshold, 0 turns it off.
         state: of the controller.
         y: new measurement of the control point [m].
 
-    Returns:
-        `state` itself when the measurement is credible.
-
     """
     gate = gains.innovation_gate
-    if not gate or norm(difference(y, state.y_hat)) <= gate:
-        return state
-    return initial_state(gains, y)._replace(theta_hat=state.theta_hat)
+    return not gate or distance(y, state.y_hat) <= gate
+
+
+def restarted(gains: Gains, state: ControllerState, y: Vector3) -> ControllerState:
+    """The state with an observer that begins anew, at a measurement that is not credible.
+
+    Not in the paper. A host without an exchange of initial values hands the controller zeros
+    in its first step; without this the observer would be kicked by k_d times the distance
+    to the origin. theta_hat is kept.
+
+    Args:
+        gains: of the controller.
+        state: of the controller.
+        y: new measurement of the control point [m].
+
+    """
+    fresh = initial_state(gains, y)
+    return ControllerState(fresh.y_hat, fresh.dy_hat_o, state.theta_hat)
+
+
+def gated(gains: Gains, state: ControllerState, y: Vector3) -> ControllerState:
+    """The state, with a restarted observer if the measurement y [m] is not credible."""
+    return state if credible(gains, state, y) else restarted(gains, state, y)
 
 
 def virtual_velocity(dy_d: Vector3, s_ez: Vector3, lambda_: float) -> Vector3:
@@ -184,8 +197,8 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement) -> 
     y, (phi, theta, psi), y_d, dy_d, ddy_d = measurement
     y_hat, dy_hat_o, theta_hat = state
     e, z = difference(y, y_d), difference(y, y_hat)  # above (16)
-    s_z, _ = s(z)
-    s_ez, slope_ez = s(difference(y_hat, y_d))  # e - z = y_hat - y_d
+    s_z, _ = saturation(s, z)
+    s_ez, slope_ez = saturation(s, difference(y_hat, y_d))  # e - z = y_hat - y_d
     dy_hat = observer.dy_hat(dy_hat_o, s_z, z, lambda_, k_d)  # (23)
     dy_o = observer.dy_o(dy_hat, s_z, lambda_)  # (18)
     dy_r = virtual_velocity(dy_d, s_ez, lambda_)  # (16)
@@ -193,7 +206,7 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement) -> 
     r_hat_sum = estimated_error_sum(dy_hat, dy_d, s_ez, s_z, lambda_)  # below (21)
     G = regressor(dy_r, ddy_r)  # below (20)
     rho_hat = bound(G, theta_hat)  # below (21)
-    s_dy, _ = s(difference(dy_o, dy_r))
+    s_dy, _ = saturation(s, difference(dy_o, dy_r))
     robust = robust_force(rho_hat, r_hat_sum, eps_t)  # last term of (21)
     F = control_force(s_dy, s_ez, s_z, robust, K1, K2)  # bracket of (21)
     rotation = rotation_from_euler(0.0 if printed_jacobian else phi, theta, psi)  # reading 3

@@ -6,13 +6,32 @@ its value and its slope together, because Remark 3 needs both.
 
 from __future__ import annotations
 
-from math import exp, hypot, log, log1p, tanh
-from typing import Callable
+from math import exp, log, log1p, sqrt, tanh
 
 from auv_fmu.types import Vector3
 
-#: xi -> (s(xi), diagonal of S'(xi))
-Saturation = Callable[[Vector3], tuple[Vector3, Vector3]]
+#: A saturation function as a value: which one of this module it is.
+Saturation = int
+
+#: Those named in the paper.
+TANH: Saturation = 0
+ALGEBRAIC: Saturation = 1
+
+#: The same by the names users select them with.
+SATURATIONS: dict[str, Saturation] = {"tanh": TANH, "algebraic": ALGEBRAIC}
+
+#: Largest slope s'_M of Lemma 1 of each.
+MAXIMUM_SLOPE: dict[str, float] = {"tanh": 1.0, "algebraic": 1.0}
+
+#: From here on 1 + xi^2 is xi^2 but for rounding, and not much later too large for a float.
+_LARGE = 1e9
+
+
+def saturation(s: Saturation, xi: Vector3) -> tuple[Vector3, Vector3]:
+    """s(xi) and the diagonal of S'(xi), for the saturation function s."""
+    if s == ALGEBRAIC:
+        return algebraic(xi)
+    return hyperbolic_tangent(xi)
 
 
 def hyperbolic_tangent(xi: Vector3) -> tuple[Vector3, Vector3]:
@@ -23,7 +42,7 @@ def hyperbolic_tangent(xi: Vector3) -> tuple[Vector3, Vector3]:
 
 def algebraic(xi: Vector3) -> tuple[Vector3, Vector3]:
     """xi_i / sqrt(1 + xi_i^2) and its slopes (1 + xi_i^2)^(-3/2): M = 1, s'_M = 1."""
-    root_1, root_2, root_3 = hypot(1.0, xi[0]), hypot(1.0, xi[1]), hypot(1.0, xi[2])
+    root_1, root_2, root_3 = root(xi[0]), root(xi[1]), root(xi[2])
     return (
         (xi[0] / root_1, xi[1] / root_2, xi[2] / root_3),
         (
@@ -34,24 +53,18 @@ def algebraic(xi: Vector3) -> tuple[Vector3, Vector3]:
     )
 
 
+def root(xi: float) -> float:
+    """sqrt(1 + xi^2), without overflow."""
+    return sqrt(1.0 + xi * xi) if abs(xi) < _LARGE else abs(xi)
+
+
+def integral(s: Saturation, xi: float) -> float:
+    """Integral of s_i from 0 to xi, items (i) and (ii) of Lemma 1."""
+    if s == ALGEBRAIC:
+        return root(xi) - 1.0
+    return log_cosh(xi)
+
+
 def log_cosh(xi: float) -> float:
     """Integral of tanh from 0 to xi: ln(cosh(xi)), without overflow."""
     return abs(xi) + log1p(exp(-2.0 * abs(xi))) - log(2.0)
-
-
-def algebraic_integral(xi: float) -> float:
-    """Integral of xi / sqrt(1 + xi^2) from 0 to xi: sqrt(1 + xi^2) - 1."""
-    return hypot(1.0, xi) - 1.0
-
-
-#: xi_i -> integral of s_i from 0 to xi_i, items (i) and (ii) of Lemma 1
-Integral = Callable[[float], float]
-
-#: The saturation functions named in the paper, by the names users select them with.
-SATURATIONS: dict[str, Saturation] = {"tanh": hyperbolic_tangent, "algebraic": algebraic}
-
-#: Largest slope s'_M of Lemma 1 of each.
-MAXIMUM_SLOPE: dict[str, float] = {"tanh": 1.0, "algebraic": 1.0}
-
-#: Integrals of each, as the Lyapunov functions (34) and (55) need them.
-INTEGRALS: dict[str, Integral] = {"tanh": log_cosh, "algebraic": algebraic_integral}

@@ -295,7 +295,7 @@ def test_sanitizers_find_nothing_whatever_a_host_calls(dist: Path, tmp_path: Pat
 
 def test_plain_variant_is_there_on_request(tmp_path: Path):
     bundle.build(tmp_path, "plain")
-    assert bundle.loader_of(tmp_path) == "plain"
+    assert bundle.settings_of(tmp_path)["loader"] == "plain"
     fmpy.extract(tmp_path / "AuvPlant.fmu", unzipdir=tmp_path / "unpacked")
     libraries = tmp_path / "unpacked/binaries/linux64"
     assert [path.name for path in libraries.iterdir()] == ["AuvPlant.so"]

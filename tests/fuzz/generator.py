@@ -61,10 +61,8 @@ _ON_NOTHING = ("fmi2DoStep", "fmi2Reset", "fmi2EnterInitializationMode", "fmi2Ge
 class _World:
     """What a sequence has come to, as far as the model knows."""
 
-    def __init__(
-        self, random: Random, fmus: Mapping[str, Description], foreign: Mapping[str, bytes]
-    ) -> None:
-        self.random, self.fmus, self.foreign = random, fmus, foreign
+    def __init__(self, random: Random, fmus: Mapping[str, Description]) -> None:
+        self.random, self.fmus = random, fmus
         self.known: dict[str, Model | None] = dict.fromkeys(fmus)
         self.freed_once: set[str] = set()
         self.models: dict[str, Model] = {}
@@ -76,7 +74,8 @@ class _World:
         if on:
             return
         if call.function == MAKE:
-            self.known[name] = Model(self.fmus[name]) if creations()[call.case] else None
+            of = self.fmus[name]
+            self.known[name] = Model(of) if creations(of.kind)[call.case] else None
         elif call.function == FREE:
             self.known[name] = None
             self.freed_once.add(name)
@@ -110,22 +109,18 @@ class _World:
             own,
             foreign if others else [],
             freed,
-            self.foreign[self.fmus[name].name],
             0.0 if known is None else known.time,
             f"{name}.",
         )
 
 
-def generated(
-    seed: int, fmu: str, descriptions: Mapping[str, Description], foreign: Mapping[str, bytes]
-) -> Calls:
+def generated(seed: int, fmu: str, descriptions: Mapping[str, Description]) -> Calls:
     """The sequence of a seed.
 
     Args:
         seed: of everything that is drawn.
         fmu: that it is about.
         descriptions: of this FMU and those that may run beside it.
-        foreign: to each of them, a serialised state of another.
 
     """
     random = Random(f"{seed} {fmu}")
@@ -134,7 +129,7 @@ def generated(
     fmus = {"a": fmu}
     for name in "bcd"[: count - 1]:
         fmus[name] = fmu if random.random() < 0.6 else random.choice([*descriptions])
-    world = _World(random, {name: descriptions[of] for name, of in fmus.items()}, foreign)
+    world = _World(random, {name: descriptions[of] for name, of in fmus.items()})
     for _ in range(random.randrange(LEAST, MOST) * (1 + count) // 2):
         name = random.choice([*fmus])
         if world.known[name] is None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -74,55 +75,117 @@ class Difference(Exception):
 
 
 @dataclass
-class _Side:
-    """One of the two instances, and the states that were saved of it."""
+class Side:
+    """One of two instances, and the states that were saved of it."""
 
     host: Host
     saved: Saved = field(default_factory=Saved)
+    stale: int | None = None
+
+    def on(self, call: Call, on: str) -> Status:
+        """Make a call on NULL or on the instance that was freed."""
+        lives, self.host.component = self.host.component, None if on == "NULL" else self.stale
+        try:
+            return make(self.host, call, self.saved)
+        finally:
+            self.host.component = lives
 
 
-class Pair:
-    """An instance, and the one beside it that gets the good calls alone."""
+class Players(ABC):
+    """Two instances that a sequence is played on side by side."""
 
-    def __init__(self, library: Library, saved: Saved, beside: Saved) -> None:
-        self.library = library
-        self.tried, self.beside = _Side(Host(library), saved), _Side(Host(library), beside)
-        self.known = Model(library.description)
-        self.count = 0
-        self.stale: int | None = None
+    def __init__(self, *sides: Side) -> None:
+        self.sides = sides
+
+    @abstractmethod
+    def make(self, case: str) -> None:
+        """Instantiate."""
+
+    @abstractmethod
+    def play(self, call: Call) -> None:
+        """Make a call."""
+
+    @abstractmethod
+    def play_on(self, call: Call, on: str) -> None:
+        """Make a call on NULL or on the instance that was freed."""
+
+    @abstractmethod
+    def compare_all(self) -> None:
+        """Hold the two instances against each other in full."""
 
     @property
     def lives(self) -> bool:
-        return self.tried.host.component is not None
+        return self.sides[0].host.component is not None
+
+    @property
+    def has_lived(self) -> bool:
+        return self.sides[0].stale is not None
+
+    def free(self) -> None:
+        for side in self.sides:
+            side.stale = side.host.component
+            side.host.free()
+
+    def forget(self, prefix: str) -> None:
+        """Take the states whose slots begin so for freed: they ended with their instance."""
+        for side in self.sides:
+            for slot in [slot for slot in side.saved.states if slot.startswith(prefix)]:
+                side.saved.freed[slot] = side.saved.states.pop(slot)
+
+    def applies(self, call: Call) -> bool:
+        """Whether the slots that a call names are there: shrinking may have taken them away."""
+        saved, arguments = self.sides[0].saved, call.arguments
+        if "freed" in arguments:
+            return arguments["freed"] in saved.freed
+        if call.function == "fmi2GetFMUstate":
+            return not arguments.get("again") or arguments["slot"] in saved.states
+        wanted = arguments.get("slot") or arguments.get("bytes of")
+        return wanted is None or wanted in saved.states
+
+
+class Pair(Players):
+    """An instance, and the one beside it that gets the good calls alone."""
+
+    def __init__(
+        self, library: Library, saved: Saved, beside: Saved, models: dict[str, Model]
+    ) -> None:
+        """Prepare.
+
+        Args:
+            library: of the FMU.
+            saved: states of all instances of this FMU that are tried.
+            beside: those of the instances beside them.
+            models: what is known of the former, by slot.
+
+        """
+        self.library, self._models = library, models
+        self.tried, self.beside = Side(Host(library), saved), Side(Host(library), beside)
+        super().__init__(self.tried, self.beside)
+        self.known = Model(library.description)
+        self.count = 0
 
     def make(self, case: str) -> None:
         made = self.tried.host.instantiate(**CREATIONS[case])
-        if made != creations()[case]:
+        if made != creations(self.library.description.kind)[case]:
             said = [message.text for message in self.tried.host.messages]
             raise Difference(f"{'an' if made else 'no'} instance with {case}: {said}")
         if made and not self.beside.host.instantiate():
             raise Difference("no instance beside it")
         self.known = Model(self.library.description)
 
-    def free(self) -> None:
-        self.stale = self.tried.host.component
-        for side in (self.tried, self.beside):
-            side.host.free()
+    def forget(self, prefix: str) -> None:
+        super().forget(prefix)
+        for slot in [slot for slot in self._models if slot.startswith(prefix)]:
+            del self._models[slot]
 
     def play_on(self, call: Call, on: str) -> None:
-        """A call on NULL or on the instance that was freed."""
-        host = self.tried.host
-        lives, host.component = host.component, self.stale if on != "NULL" else None
-        try:
-            status = make(host, call, self.tried.saved)
-        finally:
-            host.component = lives
+        status = self.tried.on(call, on)
         if f"fmi2{status.name}" != without_an_instance()[on]:
             raise Difference(f"{status.name} on {on}")
 
-    def play(self, call: Call, models: dict[str, Model]) -> None:
+    def play(self, call: Call) -> None:
         cell = self.known.cell(call)
-        known = self.known.after(call, models)
+        known = self.known.after(call, self._models)
         expected = cell.answer.status
         if cell.answer.name in ("OK", "partly", "new", "restored"):
             status = self._make_beside(call)
@@ -138,7 +201,7 @@ class Pair:
             raise Difference(str(error)) from error
         if f"fmi2{status.name}" != expected:
             raise Difference(f"{status.name} in the state {self.known.state}, not {expected}")
-        keep(models, call, self.known)
+        keep(self._models, call, self.known)
         self.known = known
         self.count += 1
         self.compare(cell.answer.changes_nothing, self.count % STATES_EVERY == 0)
@@ -176,75 +239,77 @@ class Pair:
         except AssertionError as error:
             raise Difference(str(error)) from error
 
-    def applies(self, call: Call) -> bool:
-        """Whether the slots that a call names are there: shrinking may have taken them away."""
-        saved, arguments = self.tried.saved, call.arguments
-        if "freed" in arguments:
-            return arguments["freed"] in saved.freed
-        if call.function == "fmi2GetFMUstate":
-            return not arguments.get("again") or arguments["slot"] in saved.states
-        wanted = arguments.get("slot") or arguments.get("bytes of")
-        return wanted is None or wanted in saved.states
+    def compare_all(self) -> None:
+        self.compare(values=True, state=True)
 
 
-def play(sequence: Calls, libraries: Mapping[str, Library]) -> None:
-    """Play a sequence.
+def pairs(
+    sequence: Calls, libraries: Mapping[str, Library], foreign: Mapping[str, bytes]
+) -> dict[str, Players]:
+    """Those that hold the instances of a sequence against the model.
 
     Args:
         sequence: to be played.
         libraries: by the names of their FMUs.
-
-    Raises:
-        Difference: an answer is not the table's; says after which action.
+        foreign: to each FMU, a serialised state of another.
 
     """
-    used = set(sequence.fmus.values())
-    saved, beside = ({fmu: Saved() for fmu in used} for _ in range(2))
-    pairs = {
-        name: Pair(libraries[fmu], saved[fmu], beside[fmu]) for name, fmu in sequence.fmus.items()
-    }
     models: dict[str, Model] = {}
+    saved, beside = ({fmu: Saved(foreign=foreign[fmu]) for fmu in foreign} for _ in range(2))
+    return {
+        name: Pair(libraries[fmu], saved[fmu], beside[fmu], models)
+        for name, fmu in sequence.fmus.items()
+    }
+
+
+def play(sequence: Calls, players: Mapping[str, Players]) -> None:
+    """Play a sequence.
+
+    Args:
+        sequence: to be played.
+        players: by the names of its instances.
+
+    Raises:
+        Difference: an answer is not the one that is expected; says after which action.
+
+    """
     try:
         if sequence.threads:
-            _play_in_threads(sequence, pairs, models)
+            _play_in_threads(sequence, players)
         else:
             for i, action in enumerate(sequence.actions):
-                _play_one(i, action, pairs, models)
-        for pair in pairs.values():
-            if pair.lives:
-                pair.compare(values=True, state=True)
+                _play_one(i, action, players[action.instance])
+        for one in players.values():
+            if one.lives:
+                one.compare_all()
     finally:
-        for pair in pairs.values():
-            pair.free()
+        for one in players.values():
+            one.free()
 
 
-def _play_one(i: int, action: Action, pairs: Mapping[str, Pair], models: dict[str, Model]) -> None:
+def _play_one(i: int, action: Action, players: Players) -> None:
     name, call, on = action
-    pair = pairs[name]
     try:
         if call.function == MAKE:
-            if not pair.lives:
-                pair.make(call.case)
+            if not players.lives:
+                players.make(call.case)
         elif on:
-            if on == "NULL" or (pair.stale is not None and not pair.lives):
-                pair.play_on(call, on)
-        elif not pair.lives:
+            if on == "NULL" or (players.has_lived and not players.lives):
+                players.play_on(call, on)
+        elif not players.lives:
             pass
         elif call.function == FREE:
-            pair.compare(values=True, state=True)
-            pair.free()
-            for side in (pair.tried, pair.beside):
-                for slot in [slot for slot in side.saved.states if slot.startswith(f"{name}.")]:
-                    side.saved.freed[slot] = side.saved.states.pop(slot)
-                    models.pop(slot, None)
-        elif pair.applies(call):
-            pair.play(call, models)
+            players.compare_all()
+            players.free()
+            players.forget(f"{name}.")
+        elif players.applies(call):
+            players.play(call)
     except Difference as difference:
         raise Difference(f"after action {i}, {name}: {difference}") from difference
 
 
-def _play_in_threads(sequence: Calls, pairs: Mapping[str, Pair], models: dict[str, Model]) -> None:
-    barrier = threading.Barrier(len(pairs))
+def _play_in_threads(sequence: Calls, players: Mapping[str, Players]) -> None:
+    barrier = threading.Barrier(len(players))
     differences: list[Difference] = []
 
     def run(name: str) -> None:
@@ -252,13 +317,13 @@ def _play_in_threads(sequence: Calls, pairs: Mapping[str, Pair], models: dict[st
         try:
             for i, action in enumerate(sequence.actions):
                 if action.instance == name:
-                    _play_one(i, action, pairs, models)
+                    _play_one(i, action, players[name])
         except Difference as difference:
             differences.append(difference)
 
     interval = sys.getswitchinterval()
     sys.setswitchinterval(1e-5)
-    threads = [threading.Thread(target=run, args=(name,)) for name in pairs]
+    threads = [threading.Thread(target=run, args=(name,)) for name in players]
     for thread in threads:
         thread.start()
     for thread in threads:

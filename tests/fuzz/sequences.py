@@ -1,11 +1,11 @@
-"""Fuzz FMUs with sequences of calls and with mutated states.
+"""Fuzz FMUs of either kind with sequences of calls and with mutated states.
 
     PYTHONPATH=tests python -m fuzz.sequences --fmus fmus/dist --runs 10000
 
 Sequences come out of seeds and are held against the model that is made from docs/status.md, and
-against a second instance that gets the good calls alone. FMUs are native code, so everything runs
-in processes of its own; what makes one crash, hang or answer otherwise is shrunk by playing shorter
-sequences again, and printed as calls.
+against a second instance that gets the good calls alone; with `--twin`, against FMUs of the other
+kind. FMUs are native code, so everything runs in processes of its own; what makes one crash, hang
+or answer otherwise is shrunk by playing shorter sequences again, and printed as calls.
 
 hypothesis has a machine for this (RuleBasedStateMachine). It shrinks in the process that the FMU
 has just ended, and takes 17 ms for a sequence of 30 empty rules, as long as these take with calls.
@@ -20,17 +20,22 @@ import time
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from fuzz.generator import generated
 from fuzz.mutants import Taken, Trials, reached
-from fuzz.player import Calls, Difference, play
+from fuzz.player import Calls, Difference, Players, pairs, play
+from fuzz.twins import twins
 from support.raw import Description, Host, Library
+from support.sanitizers import sanitize, sanitizers
 from support.worker import Lost, Worker
 
 KINDS = ("sequences", "states")
+
+#: What is done with sequences where there are two kinds of FMUs.
+TWINS = "twins"
 
 #: Sequences or mutants in one task, and the longest time for one of them [s].
 BATCH, PATIENCE = 25, 30.0
@@ -43,8 +48,8 @@ RUNS = 6
 
 
 class Task(NamedTuple):
-    """What a process is asked: to attack with `sequences` or `states` out of seeds, to `describe`
-    the FMU, to `make` the sequence of a seed, to `show` one, or to `play` it.
+    """What a process is asked: to attack with `sequences`, `states` or `twins` out of seeds, to
+    `describe` the FMU, to `make` the sequence of a seed, to `show` one, or to `play` it.
     """
 
     kind: str
@@ -59,34 +64,72 @@ class Finding(NamedTuple):
     what: str
 
 
-def serve(folders: Mapping[str, Path], name: str) -> Callable[[Task], Any]:
-    """Prepare a process for tasks on an FMU; the others lend it company and states."""
-    libraries = {n: Library(folders[n]) for n in dict.fromkeys([name, *folders])}
+class Loaded(NamedTuple):
+    """FMUs of one kind in this process, by name."""
+
+    libraries: dict[str, Library]
+    contents: dict[str, list[bytes]]
+    foreign: dict[str, bytes]
+
+
+def _loaded(folders: Mapping[str, Path], first: str) -> Loaded:
+    libraries = {n: Library(folders[n]) for n in dict.fromkeys([first, *folders])}
     contents = {n: reached(library, 0) for n, library in libraries.items()}
-    descriptions = {n: library.description for n, library in libraries.items()}
     names = [*contents]
     # The state that is foreign to an FMU is that of the one before it.
     foreign = {n: contents[names[i - 1]][-1] for i, n in enumerate(names)}
+    return Loaded(libraries, contents, foreign)
+
+
+def serve(
+    folders: Mapping[str, Path], twin: Mapping[str, Path], name: str
+) -> Callable[[Task], Any]:
+    """Prepare a process for tasks on an FMU; the others lend it company and states.
+
+    Args:
+        folders: of the FMUs.
+        twin: of those of the other kind; empty: sequences are held against the model.
+        name: of the FMU.
+
+    """
+    ours = _loaded(folders, name)
+    theirs = _loaded(twin, name) if twin else None
+    descriptions = {n: library.description for n, library in ours.libraries.items()}
     mutants: list[Trials] = []
 
     def sequence_of(seed: int) -> Calls:
-        return generated(seed, name, descriptions, foreign)
+        return generated(seed, name, descriptions)
+
+    def cast(sequence: Calls) -> dict[str, Players]:
+        if theirs is None:
+            return pairs(sequence, ours.libraries, ours.foreign)
+        libraries = (ours.libraries, theirs.libraries)
+        return twins(sequence, libraries, (ours.foreign, theirs.foreign))
+
+    def played(sequence: Calls, seed: int = 0) -> list[Finding]:
+        try:
+            play(sequence, cast(sequence))
+        except Difference as difference:
+            return [Finding(seed, str(difference))]
+        except Exception as error:
+            return [Finding(seed, f"{type(error).__name__}: {error}")]
+        return []
 
     def do(task: Task) -> Any:
         if task.kind == "states":
             if not mutants:
-                others = [content for n in contents if n != name for content in contents[n]]
-                mutants.append(_mutants(libraries[name], others))
+                others = [c for n in ours.contents if n != name for c in ours.contents[n]]
+                mutants.append(_mutants(ours.libraries[name], others))
             return [f for seed in task.seeds for f in _tried(mutants[0], seed)]
-        if task.kind == "sequences":
-            return [f for seed in task.seeds for f in _played(sequence_of(seed), libraries, seed)]
+        if task.kind in ("sequences", TWINS):
+            return [f for seed in task.seeds for f in played(sequence_of(seed), seed)]
         if task.kind == "describe":
             return descriptions[name]
         if task.sequence is None:
             return sequence_of(task.seeds[0])
         if task.kind == "show":
-            return task.sequence.shown(libraries)
-        return _played(task.sequence, libraries, 0)
+            return task.sequence.shown(ours.libraries)
+        return played(task.sequence)
 
     return do
 
@@ -96,16 +139,6 @@ def _mutants(library: Library, foreign: Sequence[bytes]) -> Trials:
     assert host.instantiate()
     bases = [content for seed in range(RUNS) for content in reached(library, seed)]
     return Trials(host, bases, foreign)
-
-
-def _played(sequence: Calls, libraries: Mapping[str, Library], seed: int) -> list[Finding]:
-    try:
-        play(sequence, libraries)
-    except Difference as difference:
-        return [Finding(seed, str(difference))]
-    except Exception as error:
-        return [Finding(seed, f"{type(error).__name__}: {error}")]
-    return []
 
 
 def _tried(trials: Trials, seed: int) -> list[Finding]:
@@ -119,9 +152,19 @@ def _tried(trials: Trials, seed: int) -> list[Finding]:
 class Fuzzer:
     """One FMU under attack."""
 
-    def __init__(self, folders: Mapping[str, Path], name: str) -> None:
-        self.name, self._folders = name, folders
-        self._worker: Worker[Task, Any] = Worker(serve, folders, name)
+    def __init__(
+        self, folders: Mapping[str, Path], name: str, twin: Mapping[str, Path] | None = None
+    ) -> None:
+        """Prepare an attack.
+
+        Args:
+            folders: of unpacked FMUs.
+            name: of the one that is attacked.
+            twin: folders of those of the other kind that sequences are played on, too.
+
+        """
+        self.name = name
+        self._worker: Worker[Task, Any] = Worker(serve, folders, twin or {}, name)
 
     def __enter__(self) -> Fuzzer:
         return self
@@ -184,7 +227,7 @@ class Fuzzer:
     def explained(self, kind: str, finding: Finding) -> str:
         """A finding as a text to be read, with the calls that lead to it."""
         said = f"{self.name}, {kind}, seed {finding.seed}: {finding.what}"
-        if kind != "sequences":
+        if kind == "states":
             return said
         sequence = self.shrunk(self.sequence(finding.seed))
         again = self.replay(sequence) or "not seen again"
@@ -215,7 +258,7 @@ def attack(
 
     Args:
         fuzzer: of the FMU.
-        kind: `sequences` or `states`.
+        kind: `sequences`, `states` or `twins`.
         seeds: of them.
         most: kinds of findings that are explained.
         progress: is told how far it is.
@@ -249,6 +292,12 @@ def main() -> int:
     """Command line of the module."""
     parser = argparse.ArgumentParser(prog="python -m fuzz.sequences", description=__doc__)
     parser.add_argument("--fmus", type=Path, default=Path("fmus/dist"), help="folder of FMUs")
+    parser.add_argument("--twin", type=Path, help="folder of the same FMUs of the other kind")
+    parser.add_argument(
+        "--sanitize",
+        action="store_true",
+        help="compile the sources of the FMUs again, with AddressSanitizer and UBSan",
+    )
     parser.add_argument("--only", nargs="*", help="names of FMUs")
     parser.add_argument("--runs", type=int, default=10_000, help="sequences, and states, an FMU")
     parser.add_argument("--first", type=int, default=0, help="first seed")
@@ -257,15 +306,24 @@ def main() -> int:
     parser.add_argument("--most", type=int, default=5, help="kinds of findings to explain")
     parser.add_argument("--jobs", type=int, default=2, help="FMUs attacked at the same time")
     options = parser.parse_args()
-    kinds = [options.kind] if options.kind else KINDS
+    kinds = [TWINS] if options.twin else [options.kind] if options.kind else KINDS
     seeds = range(options.first, options.first + options.runs)
     failed = False
-    with unpacked(sorted(options.fmus.glob("*.fmu"))) as folders:
-        if not folders:
-            parser.error(f"no FMUs in {options.fmus}: python -m fmus.packaging.build makes them")
+    with ExitStack() as stack:
+        folders, twin = (
+            stack.enter_context(unpacked(sorted(found.glob("*.fmu")) if found else []))
+            for found in (options.fmus, options.twin)
+        )
+        if not folders or (options.twin and folders.keys() != twin.keys()):
+            parser.error("no FMUs, or not the same ones of each kind: auv-fmu build makes them")
+        if options.sanitize:
+            for folder in (twin or folders).values():
+                sanitize(folder)
+            reports = stack.enter_context(sanitizers())
+            stack.callback(lambda: print(reports))
 
         def one(name: str) -> list[list[str]]:
-            with Fuzzer(folders, name) as fuzzer:
+            with Fuzzer(folders, name, twin) as fuzzer:
                 if options.show is not None:
                     sequence = fuzzer.sequence(options.show)
                     print(fuzzer.show(sequence), fuzzer.replay(sequence) or "no finding", sep="\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from random import Random
@@ -19,27 +20,40 @@ from support import states
 from support.calls import CASES, Call, Draw, Item
 from support.instances import NAMES
 from support.raw import Description, Library, Variable, instance
+from support.sanitizers import GCC, sanitize, sanitizers
 from support.worker import Lost, Worker
 
 #: Seeds of CI: those of the night come after them.
-SEQUENCES, STATES = range(200), range(400)
+SEQUENCES, STATES, TWINS = range(200), range(400), range(200)
+
+#: Folders of unpacked FMUs, by name.
+Folders = dict[str, Path]
+
+KINDS = ("python", "native")
+each_kind = pytest.mark.parametrize("kind", KINDS)
 
 
 @pytest.fixture(scope="module")
-def folders(dist: Path) -> Iterator[dict[str, Path]]:
-    with unpacked([dist / f"{name}.fmu" for name in NAMES]) as found:
-        yield found
+def kinds(dist: Path, native: Path) -> Iterator[dict[str, Folders]]:
+    with ExitStack() as stack:
+        yield {
+            kind: stack.enter_context(unpacked([folder / f"{name}.fmu" for name in NAMES]))
+            for kind, folder in zip(KINDS, (dist, native), strict=True)
+        }
 
 
-@pytest.fixture(scope="module", params=NAMES)
-def fuzzer(request: pytest.FixtureRequest, folders: dict[str, Path]) -> Iterator[Fuzzer]:
-    with Fuzzer(folders, request.param) as attacker:
+@pytest.fixture(
+    scope="module", params=[(kind, name) for kind in KINDS for name in NAMES], ids=" ".join
+)
+def fuzzer(request: pytest.FixtureRequest, kinds: dict[str, Folders]) -> Iterator[Fuzzer]:
+    kind, name = request.param
+    with Fuzzer(kinds[kind], name) as attacker:
         yield attacker
 
 
-@pytest.fixture(scope="module")
-def planner(folders: dict[str, Path]) -> Iterator[Fuzzer]:
-    with Fuzzer(folders, "MotionPlanner") as attacker:
+@pytest.fixture(scope="module", params=KINDS)
+def planner(request: pytest.FixtureRequest, kinds: dict[str, Folders]) -> Iterator[Fuzzer]:
+    with Fuzzer(kinds[request.param], "MotionPlanner") as attacker:
         yield attacker
 
 
@@ -55,6 +69,25 @@ def test_sequences_are_answered_as_the_table_says(fuzzer: Fuzzer):
 def test_no_state_is_taken_that_cannot_be_reached(fuzzer: Fuzzer):
     findings = [f for _, found in fuzzer.attack("states", STATES) for f in found]
     assert not findings, explained(fuzzer, "states", findings)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_kinds_answer_alike(kinds: dict[str, Folders], name: str):
+    with Fuzzer(kinds["python"], name, kinds["native"]) as fuzzer:
+        findings = [f for _, found in fuzzer.attack("twins", TWINS) for f in found]
+        assert not findings, explained(fuzzer, "twins", findings)
+
+
+@pytest.mark.skipif(GCC is None, reason="gcc is not installed")
+def test_sanitizers_find_nothing(native: Path):
+    with unpacked([native / f"{name}.fmu" for name in NAMES]) as folders, sanitizers() as reports:
+        for folder in folders.values():
+            sanitize(folder)
+        for name in NAMES:
+            with Fuzzer(folders, name) as fuzzer:
+                for kind in ("sequences", "states"):
+                    findings = [f for _, found in fuzzer.attack(kind, SEQUENCES) for f in found]
+                    assert not findings, f"{explained(fuzzer, kind, findings)}\n{reports}"
 
 
 # What it found
@@ -110,11 +143,12 @@ def change_output(said: dict[str, Any], i: int, more: float) -> None:
     said["outputs"][i] += more
 
 
+@each_kind
 @pytest.mark.parametrize(
     ("name", "what"), [(name, what) for what, (names, _) in TAKEN_ONCE.items() for name in names]
 )
-def test_state_that_was_taken_once_does_no_harm(folders, name, what):
-    library = Library(folders[name])
+def test_state_that_was_taken_once_does_no_harm(kinds, kind, name, what):
+    library = Library(kinds[kind][name])
     contents = reached(library, 1)
     said = next(state for state in map(states.read, contents) if state["mode"] == "stepping")
     _, change = TAKEN_ONCE[what]
@@ -164,9 +198,12 @@ def test_process_that_crashes_or_hangs_is_told_and_replaced():
         assert worker.ask("fine", 30.0) == "fine"
 
 
+@each_kind
 @pytest.mark.parametrize("name", NAMES)
-def test_states_that_were_reached_are_told_from_others(folders: dict[str, Path], name: str):
-    library = Library(folders[name])
+def test_states_that_were_reached_are_told_from_others(
+    kinds: dict[str, Folders], kind: str, name: str
+):
+    library = Library(kinds[kind][name])
     contents = reached(library, 1)
     said = [without_checksum(content) for content in contents]
     samples = [state for state in said if state is not None]

@@ -22,7 +22,7 @@ FLOORS = {
         "errors", "reading", "system", "master", "analysis", "experiments", "exchange", "paper",
         "commands",
     ),
-    "fmus": ("ports", "slave", "components", "packaging"),
+    "fmus": ("ports", "slave", "native", "components", "packaging"),
 }  # fmt: skip
 
 #: What a package may import besides itself and the standard library.

@@ -80,12 +80,12 @@ class Trial:
         self.good = host.get_state()
         freed = host.get_state()
         self.saved = Saved(
-            {"own": host.get_state(), "other": company.other.get_state()}, {"freed": freed}
+            {"own": host.get_state(), "other": company.other.get_state()},
+            {"freed": freed},
+            company.foreign,
         )
         assert host.free_state(freed) == Status.OK
-        self.draw = Draw(
-            Random(1), host.description, ["own"], ["other"], ["freed"], company.foreign, self.time
-        )
+        self.draw = Draw(Random(1), host.description, ["own"], ["other"], ["freed"], self.time)
         arguments = CASES[row.key](self.draw)
         self.call = None if arguments is None else Call(*row.key, arguments)
 

@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
+from fmus.packaging.kinds import NATIVE, PYTHON
 from support.raw_fmi import CO_SIMULATION, Callbacks, Logger
 
 
@@ -70,6 +71,7 @@ class Description:
     guid: str
     identifier: str
     variables: tuple[Variable, ...]
+    kind: str = PYTHON
 
     def of(self, causality: str, kind: str | None = None) -> list[Variable]:
         """The variables of a causality."""
@@ -93,6 +95,7 @@ def read_description(folder: Path) -> Description:
         root.attrib["guid"],
         implementation.attrib["modelIdentifier"],
         tuple(_variable(element) for element in root.iterfind("ModelVariables/ScalarVariable")),
+        NATIVE if (folder / "sources").is_dir() else PYTHON,
     )
 
 
@@ -135,6 +138,7 @@ class Message(NamedTuple):
     """What an FMU has logged."""
 
     status: Status
+    category: str
     text: str
 
 
@@ -167,8 +171,9 @@ class Host:
         self._fault = self.description.find("fault")
         self._outputs = _Arrays("Real", self.description.of("output", "Real"))
 
-    def _log(self, _environment: int, _name: bytes, status: int, _category: bytes, text: bytes):
-        self.messages.append(Message(Status(status), (text or b"").decode("utf-8", "replace")))
+    def _log(self, _environment: int, _name: bytes, status: int, category: bytes, text: bytes):
+        texts = (word.decode("utf-8", "replace") for word in (category or b"", text or b""))
+        self.messages.append(Message(Status(status), *texts))
 
     def instantiate(
         self,

@@ -1,9 +1,9 @@
 """Serialised states that were tampered with: by their bytes, and by what they say.
 
-A state that is JSON is changed by a grammar: one of its values becomes something else, a key
-comes, goes or is renamed, a part is taken from another state. Its checksum is left as it is or made
-to fit again; with one that fits, what the state says is all that speaks against it. States of other
-formats are changed by their bytes alone.
+What a state says is changed by a grammar: one of its values becomes something else, a key comes,
+goes or is renamed, a part is taken from another state. Its checksum is left as it is or made to fit
+again; with one that fits, what the state says is all that speaks against it. What the format of
+FMUs in C has no place for is changed in their bytes.
 """
 
 from __future__ import annotations
@@ -14,22 +14,27 @@ from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
 from math import inf, nan
 from random import Random
+from struct import pack
 from typing import Any, NamedTuple
 
-CHECKSUM = "checksum"
+from support import native_states
+from support.native_states import CHECKSUM, NativeState, Unwritable
 
 #: What tells of refusals, not of the run.
 REFUSALS = ("fault", "refused")
+
+#: What differs between states of the two kinds of an FMU that are one.
+OF_THE_KIND = ("identity", "time", CHECKSUM)
 
 Json = Any
 
 
 def read(content: bytes) -> dict[str, Json] | None:
-    """What a state says, if it is JSON."""
+    """What a state says, if these are the bytes of one."""
     try:
         said = json.loads(content)
     except (ValueError, RecursionError):
-        return None
+        return native_states.read(content)
     return said if isinstance(said, dict) else None
 
 
@@ -43,12 +48,16 @@ def without_refusals(content: bytes) -> Json:
 
 def sealed(said: dict[str, Json]) -> bytes:
     """Bytes of a state with a checksum that fits."""
+    if isinstance(said, NativeState):
+        return native_states.resealed(written(NativeState({**said, CHECKSUM: 0})))
     rest = {key: value for key, value in said.items() if key != CHECKSUM}
     return written({**rest, CHECKSUM: crc32(written(rest))})
 
 
 def written(said: Json) -> bytes:
-    return json.dumps(said, sort_keys=True).encode()
+    if isinstance(said, NativeState):
+        return native_states.written(said)
+    return json.dumps(said).encode()
 
 
 class Mutant(NamedTuple):
@@ -106,6 +115,19 @@ BYTES: dict[str, Callable[[bytes, Random], bytes]] = {
     "appended": _appended,
     "inserted": _inserted,
 }
+
+#: Numbers that stand for something else in the bytes of a state: lengths, kinds, texts, Reals.
+_ODD_BYTES = (
+    *(pack("<I", word) for word in (0, 1, 2, 5, 11, 12, 2**16, 2**31 - 1, 2**31, 2**32 - 1)),
+    *(pack("<d", real) for real in (nan, inf, -inf, 1e308, -1e308, 1e-320, -0.0, 0.0, 1.0, -1.0)),
+)  # fmt: skip
+
+
+def _overwritten(content: bytes, random: Random) -> bytes:
+    more = random.choice(_ODD_BYTES)
+    place = random.randrange(len(content))
+    return content[:place] + more + content[place + len(more) :]
+
 
 # Changes of what is said
 
@@ -258,7 +280,11 @@ def mutant(content: bytes, random: Random, lenders: Sequence[Json] = ()) -> Muta
     if said is None or random.random() < 0.2:
         name = random.choice([*BYTES])
         return Mutant(BYTES[name](content, random), name)
-    if random.random() < 0.05:
+    if isinstance(said, NativeState):
+        if random.random() < 0.2:
+            changed = native_states.resealed(_overwritten(content, random))
+            return Mutant(changed, "bytes overwritten; the checksum fits")
+    elif random.random() < 0.05:
         return _with_a_key_twice(content, random)
     done: list[str] = []
     fits = random.random() < 0.8
@@ -268,6 +294,8 @@ def mutant(content: bytes, random: Random, lenders: Sequence[Json] = ()) -> Muta
             one = VALUES[name](said, random, lenders)
             done += [one] if one else []
         changed = sealed(said) if fits else written(said)
+    except Unwritable:
+        return mutant(content, random, lenders)
     except (OverflowError, ValueError):
         # Integers that no float holds, or with too many digits to be written.
         return Mutant(_flipped(content, random), "bits flipped")
@@ -283,22 +311,27 @@ def _impossible(content: bytes, random: Random) -> bytes:
     said = read(content)
     if said is None:
         return _noise(content, random)
-    parameters = said["parameters"]
+    parameters, outputs = said["parameters"], said["outputs"]
+    first = next(iter(parameters))
     change = random.choice(
         (
-            lambda: said.update(mode="bogus"),
-            lambda: said.update(start_time=nan),
-            lambda: said.update(fault="no"),
-            lambda: said.update(outputs=[*said["outputs"], 0.0]),
-            lambda: said.update(outputs=[inf, *said["outputs"][1:]]),
-            lambda: said.update(parameters={}),
-            lambda: said.update(parameters={**parameters, next(iter(parameters)): []}),
-            lambda: said.pop("inputs"),
-            lambda: said.update(state=5.0),
+            {"mode": "bogus"},
+            {"start_time": nan},
+            {"fault": "no"},
+            {"fault": 2},
+            {"outputs": [*outputs, 0.0]},
+            {"outputs": [inf, *outputs[1:]]},
+            {"parameters": {}},
+            {"parameters": {**parameters, first: []}},
+            {"parameters": {**parameters, first: nan}},
+            {"inputs": None},
+            {"state": 5.0},
         )
     )
-    change()
-    return sealed(said)
+    try:
+        return sealed(type(said)({**said, **change}))
+    except Unwritable:
+        return _impossible(content, random)
 
 
 def _changed_values(content: bytes, random: Random) -> bytes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import NamedTuple
 
+from fmus.packaging.kinds import NATIVE, PYTHON
 from support.markdown import DOCS, Section, sections
 
 PAGE = DOCS / "status.md"
@@ -105,9 +106,14 @@ def _cell(text: str, state: str) -> Cell:
     return Cell(answer, leads_to or (ERROR if name == ERROR else state))
 
 
-def creations() -> dict[str, bool]:
+def creations(kind: str = PYTHON) -> dict[str, bool]:
     """Whether fmi2Instantiate gives an instance, by what it is called with."""
-    return {case: answer == "instance" for case, answer in _sections()["Creating an instance"].rows}
+    rows = [*_sections()["Creating an instance"].rows]
+    if kind == NATIVE:
+        others = _sections()["The FMUs in C"].rows
+        assert {case for case, _ in others} <= {case for case, _ in rows}
+        rows += others
+    return {case: answer == "instance" for case, answer in rows}
 
 
 def without_an_instance() -> dict[str, str]:
@@ -119,3 +125,21 @@ def without_the_loader() -> dict[tuple[str, str], str]:
     """What becomes of calls on FMUs without the native loader, by function and case."""
     rows = _sections()["Without the native loader"].rows
     return {(function, case): answer for function, case, answer in rows}
+
+
+def _tables_of_fmi3() -> list[Section]:
+    return [section for section in sections(PAGE) if section.heading == "FMI 3.0"]
+
+
+@cache
+def names_in_fmi3() -> dict[str, str]:
+    """The functions of FMI 3.0 that answer as functions of FMI 2.0 do, by the names of these."""
+    names, _ = _tables_of_fmi3()
+    return dict(names.rows)
+
+
+@cache
+def fmi3_rows() -> dict[tuple[str, str], str]:
+    """What FMI 3.0 alone has: the answers, by function and case."""
+    _, own = _tables_of_fmi3()
+    return {(function, case): answer for function, case, answer in own.rows}

@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from fmus.packaging.kinds import PYTHON
 from support.calls import MANY
 from support.cells import Company, check
 from support.raw import Host, Library, Status, instance
@@ -49,12 +50,13 @@ CREATIONS: dict[str, dict[str, Any]] = {
 }
 
 
-def trials(folder: Path, other: Path) -> Callable[[Cell], str]:
+def trials(folder: Path, other: Path, kind: str = PYTHON) -> Callable[[Cell], str]:
     """Prepare a process for trials on an FMU.
 
     Args:
         folder: of the unpacked FMU.
         other: of another one.
+        kind: of both.
 
     Returns:
         What tells what is wrong with a cell, empty: nothing.
@@ -72,7 +74,7 @@ def trials(folder: Path, other: Path) -> Callable[[Cell], str]:
         (function, case), state = cell
         try:
             if function == CREATION:
-                _check_creation(library, case)
+                _check_creation(library, case, creations(kind)[case])
             elif function == WITHOUT_AN_INSTANCE:
                 _check_without_an_instance(library, case)
             elif not check(library, (function, case), state, company):
@@ -95,10 +97,10 @@ def _location(library: Library, case: str) -> Iterator[dict[str, Any]]:
         elif case == "a resource location that is an empty folder":
             made.mkdir()
         elif case == "a resource location whose slavemodule.txt is garbage":
-            shutil.copytree(resources, made)
+            _copied(resources, made)
             (made / "slavemodule.txt").write_bytes(b"\xff\x00/../garbage\n")
         elif case == "a resource location whose script raises":
-            shutil.copytree(resources, made)
+            _copied(resources, made)
             (made / "raising.py").write_text("raise RuntimeError('on purpose')\n")
             (made / "slavemodule.txt").write_text("raising")
         else:
@@ -108,11 +110,18 @@ def _location(library: Library, case: str) -> Iterator[dict[str, Any]]:
         yield {"location": str(made).encode() if plain else made.as_uri().encode()}
 
 
-def _check_creation(library: Library, case: str) -> None:
+def _copied(resources: Path, made: Path) -> None:
+    if resources.exists():
+        shutil.copytree(resources, made)
+    else:
+        made.mkdir()
+
+
+def _check_creation(library: Library, case: str, possible: bool) -> None:
     host = Host(library)
     with _location(library, case) as arguments:
         made = host.instantiate(**arguments)
-    assert made == creations()[case], "an instance" if made else "no instance"
+    assert made == possible, "an instance" if made else "no instance"
     if made:
         assert host.setup() == host.enter() == host.exit() == host.step(0.0, 0.02) == Status.OK
         host.free()

@@ -14,8 +14,9 @@ from typing import Any, Generic, NamedTuple, TypeVar
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
-#: No worker may take more address space than this [bytes].
+#: No worker may take more address space than this [bytes], unless AddressSanitizer wants all of it.
 MOST_MEMORY = 4 << 30
+_SANITIZED = "ASAN_OPTIONS"
 
 
 class Lost(NamedTuple):
@@ -91,7 +92,8 @@ def _serve(connection: Connection, start: Callable[..., Any], arguments: tuple[A
     # FMUs have nobody else to tell of calls on what is no instance.
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+    if _SANITIZED not in os.environ:
+        resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
     do = start(*arguments)
     while True:
         try:

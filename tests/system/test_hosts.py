@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.exchange import c_host
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.exchange.verify import verify
 from orchestrator.experiments.scenario import read_scenario
@@ -25,6 +26,8 @@ def test_host_gives_the_numbers_of_our_jacobi_master(dist: Path, host: str, scen
     """Every Real output over 500 steps, to 1e-9; fmpy.ssp ignores parameters, so fig4 only."""
     if find_spec(HOSTS[host].package) is None:
         pytest.skip(f"{HOSTS[host].package} is not installed")
+    if host == "c-program" and c_host.compiler() is None:
+        pytest.skip("there is no C compiler")
     if host == "fmpy-ssp" and scenario != "fig4":
         pytest.skip("fmpy.ssp ignores parameter sets")
     system = closed_loop(dist, read_scenario(scenario))

@@ -1,4 +1,4 @@
-"""Systems as SSP 1.0 archives: what the master runs and what other hosts open.
+"""Systems as SSP archives: what the master runs and what other hosts open.
 
 ==================  =====================================================
 module              what it does

@@ -39,8 +39,11 @@ def read_ssp(archive: Path) -> System:
     """
     folder = unpacked(archive)
     try:
-        description = fmpy_ssd.read_ssd(str(archive))
         root = ElementTree.parse(folder / STRUCTURE).getroot()
+        _check_version(archive, root)
+        description = fmpy_ssd.read_ssd(str(archive))
+    except InputError:
+        raise
     except Exception as error:
         raise InputError(f"{archive}: not a readable SSP: {reason(error)}") from error
     _check_supported(archive, root)
@@ -66,6 +69,12 @@ def read_ssp(archive: Path) -> System:
         step=step,
     )
     return found.with_parameters(_parameters(archive, system, found))
+
+
+def _check_version(archive: Path, root: ElementTree.Element) -> None:
+    version = root.get("version", "")
+    if version.startswith("2."):
+        raise InputError(f"{archive}: is an SSP {version}; this master takes SSP 1.0 with FMI 2.0")
 
 
 def _check_supported(archive: Path, root: ElementTree.Element) -> None:

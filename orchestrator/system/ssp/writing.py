@@ -1,4 +1,4 @@
-"""A system as an SSP 1.0 archive."""
+"""A system as an SSP archive: 1.0, or 2.0 where there are FMUs of FMI 3.0 in it."""
 
 from __future__ import annotations
 
@@ -54,7 +54,9 @@ def _parameter_source(component: Component) -> str:
 def parameter_set_xml(system: System, component: Component) -> bytes:
     """The values that a system sets in one component, as an SSV."""
     _register_prefixes()
-    root = ElementTree.Element(f"{{{SSV}}}ParameterSet", name=PARAMETER_SET, version="1.0")
+    root = ElementTree.Element(
+        f"{{{SSV}}}ParameterSet", name=PARAMETER_SET, version=_version(component)
+    )
     parameters = ElementTree.SubElement(root, f"{{{SSV}}}Parameters")
     for name, value in system.parameters_of(component.name).items():
         kind = component.variable(name).type
@@ -81,7 +83,11 @@ def structure_xml(system: System) -> bytes:
     libcosim needs its step size as an annotation.
     """
     _register_prefixes()
-    root = ElementTree.Element(_ssd("SystemStructureDescription"), name=system.name, version="1.0")
+    root = ElementTree.Element(
+        _ssd("SystemStructureDescription"),
+        name=system.name,
+        version=max(map(_version, system.components.values())),
+    )
     structure = ElementTree.SubElement(root, _ssd("System"), name=system.name)
     elements = ElementTree.SubElement(structure, _ssd("Elements"))
     for position, component in enumerate(system.components.values()):
@@ -102,6 +108,11 @@ def structure_xml(system: System) -> bytes:
     _add_units(root, system)
     _add_experiment(root, system)
     return _serialised(root)
+
+
+def _version(component: Component) -> str:
+    """The first version of SSP that has words for the types of a component's ports."""
+    return "1.0" if component.description.fmiVersion == "2.0" else "2.0"
 
 
 def _ssd(tag: str) -> str:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from auv_fmu import observer
 from auv_fmu.control_point import actuated_velocity
 from auv_fmu.output_feedback import virtual_velocity
-from auv_fmu.saturation import Integral, Saturation
+from auv_fmu.saturation import Saturation, integral, saturation
 from auv_fmu.types import Rotation, Vector3
 from auv_fmu.vectors import difference
 from auv_fmu.vehicle import Vehicle
@@ -41,21 +41,21 @@ def composite_errors(
         s: saturation function.
 
     """
-    dy_r = virtual_velocity(dy_d, s(e_z)[0], lambda_)
-    dy_o = observer.dy_o(dy_hat, s(z)[0], lambda_)
+    dy_r = virtual_velocity(dy_d, saturation(s, e_z)[0], lambda_)
+    dy_o = observer.dy_o(dy_hat, saturation(s, z)[0], lambda_)
     return difference(dy, dy_r), difference(dy, dy_o)
 
 
-def potential(e: Vector3, z: Vector3, K2: Vector3, integral: Integral) -> float:
+def potential(e: Vector3, z: Vector3, K2: Vector3, s: Saturation) -> float:
     """The sums over k_2i of (34) and (55) [J].
 
     Args:
         e, z: tracking and estimation error [m].
         K2: diagonal of K_2 [N].
-        integral: of the saturation function.
+        s: saturation function.
 
     """
-    return sum(k * (integral(e_i - z_i) + integral(z_i)) for k, e_i, z_i in zip(K2, e, z))
+    return sum(k * (integral(s, e_i - z_i) + integral(s, z_i)) for k, e_i, z_i in zip(K2, e, z))
 
 
 def kinetic(vehicle: Vehicle, rotation: Rotation, r: Vector3, ell: float) -> float:
@@ -77,7 +77,7 @@ def lyapunov(
     rotation: Rotation,
     errors: Errors,
     K2: Vector3,
-    integral: Integral,
+    s: Saturation,
     ell: float,
 ) -> float:
     """V of (34) or (55) [J] without its last term, which needs the unknown theta.
@@ -87,13 +87,13 @@ def lyapunov(
         rotation: body to earth.
         errors: at the same instant.
         K2: diagonal of K_2 [N].
-        integral: of the saturation function.
+        s: saturation function.
         ell: distance of the control point [m].
 
     """
     e, z, r_1, r_2 = errors
     return (
-        potential(e, z, K2, integral)
+        potential(e, z, K2, s)
         + kinetic(vehicle, rotation, r_1, ell)
         + kinetic(vehicle, rotation, r_2, ell)
     )

@@ -9,7 +9,7 @@ from auv_fmu.closed_loop import Setting, closed_loop
 from auv_fmu.disturbance import Disturbance
 from auv_fmu.output_feedback import Gains
 from auv_fmu.plant import Localisation
-from auv_fmu.saturation import algebraic, hyperbolic_tangent
+from auv_fmu.saturation import ALGEBRAIC, TANH
 
 QUIET = Localisation(std=0.0)
 
@@ -69,7 +69,7 @@ def test_noise_is_that_of_its_seed():
     assert len({first(seed) for seed in seeds}) == len(seeds)
 
 
-@pytest.mark.parametrize("s", [hyperbolic_tangent, algebraic])
+@pytest.mark.parametrize("s", [TANH, ALGEBRAIC])
 def test_closed_loop_of_either_saturation_function_converges(s):
     """Theorem 2: the tracking error ends in a ball; 10 cm in 60 s from 6 m for our numbers."""
     *_, last = closed_loop(3000, Setting(gains=Gains(s=s), localisation=QUIET))

@@ -7,7 +7,7 @@ import pytest
 
 import auv_fmu
 from auv_fmu import control_point, euler
-from auv_fmu.saturation import hyperbolic_tangent
+from auv_fmu.saturation import TANH
 
 TEN, ZERO_3, ZERO_4, ZERO_6 = (10.0,) * 3, (0.0,) * 3, (0.0,) * 4, (0.0,) * 6
 CONTROLLER = {
@@ -36,7 +36,7 @@ SECTION_4_1 = {
     "RollAxis": {"m44": 22.5, "d44": 20.0},
     "Limits": {"tau_min": (-80.0,) * 3, "tau_max": (80.0,) * 3},
     "Disturbance": {"A_f": 0.5, "A_d": 1.0, "omega_d": 0.1},
-    "Gains": {**CONTROLLER, "K2": TEN, "k_d": 50.0, "s": hyperbolic_tangent},
+    "Gains": {**CONTROLLER, "K2": TEN, "k_d": 50.0, "s": TANH},
     "PdGains": CONTROLLER,
     "Setting": {
         "eta_0": (2.0, 6.0, 0.0, 0.0, 0.0, 0.0),

@@ -8,7 +8,7 @@ from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.proof.control_point_model import M_2
 from auv_fmu.proof.gain_conditions import bounds
 from auv_fmu.proof.lyapunov import Errors, composite_errors, kinetic, lyapunov
-from auv_fmu.saturation import INTEGRALS, SATURATIONS
+from auv_fmu.saturation import SATURATIONS, saturation
 from auv_fmu.vehicle import Vehicle
 from support.strategies import angles, lengths, pitch_angles, speeds, vectors
 
@@ -38,11 +38,11 @@ def test_composite_errors_are_17_and_19(dy, dy_d, dy_hat, e_z, z):
 def test_bounds_35_of_the_lyapunov_function(name, euler, e, z, r_1, r_2, ell):
     """With the largest slope s'_M = 1, and without the terms in theta."""
     errors = Errors(e, z, r_1, r_2)
-    V = lyapunov(VEHICLE, rotation_from_euler(*euler), errors, K2, INTEGRALS[name], ell)
+    V = lyapunov(VEHICLE, rotation_from_euler(*euler), errors, K2, SATURATIONS[name], ell)
     known = bounds(VEHICLE, ell)
     e_z = tuple(np.subtract(e, z))
     r_square = np.dot(r_1, r_1) + np.dot(r_2, r_2)
-    s_ez, s_z = (np.array(SATURATIONS[name](x)[0]) for x in (e_z, z))
+    s_ez, s_z = (np.array(saturation(SATURATIONS[name], x)[0]) for x in (e_z, z))
     lower = 0.5 * np.dot(K2, s_ez**2 + s_z**2) + 0.5 * known.lambda_m2 * r_square
     upper = 0.5 * max(K2) * (np.dot(e_z, e_z) + np.dot(z, z)) + 0.5 * known.lambda_M2 * r_square
     assert lower * (1 - 1e-12) - 1e-12 <= V <= upper * (1 + 1e-12) + 1e-12

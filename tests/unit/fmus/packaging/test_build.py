@@ -24,12 +24,12 @@ def test_every_source_is_part_of_the_fingerprint(tmp_path: Path, monkeypatch: py
             folders[package.__name__],
             ignore=shutil.ignore_patterns("dist", "__pycache__", "py.typed"),
         )
-    monkeypatch.setattr(build, "_FOLDERS", folders)
-    fingerprints = {build.fingerprint()}
+    monkeypatch.setattr(build, "package_folder", folders.__getitem__)
+    fingerprints = {build.fingerprint(tuple(folders))}
     sources = [path for path in sorted(tmp_path.rglob("*")) if path.is_file()]
     for path in sources:
         path.write_bytes(path.read_bytes() + b"\n")
-        fingerprints.add(build.fingerprint())
+        fingerprints.add(build.fingerprint(tuple(folders)))
     assert len(fingerprints) == 1 + len(sources)
 
 
@@ -51,10 +51,10 @@ def test_fmu_contains_what_runs_in_it_and_no_more(dist: Path, name: str):
 @pytest.mark.parametrize(
     "content",
     ["", "[]", "{}", "null", "[" * 100_000, "\0", '{"sha256": {}}',
-     '{"sha256": [], "loader": "native"}', '{"sha256": {}, "loader": "other"}'],
+     '{"sha256": [], "settings": {}}', '{"sha256": {}, "settings": "other"}'],
 )  # fmt: skip
 def test_manifest_that_is_none_counts_as_none(tmp_path: Path, content: str):
     manifest = tmp_path / build.MANIFEST
-    assert build._built_before(manifest) == {}
+    assert build.built_before(manifest) == {}
     manifest.write_text(content)
-    assert build._built_before(manifest) == {}
+    assert build.built_before(manifest) == {}

@@ -1,0 +1,183 @@
+"""What the two kinds of FMUs cost in each host: `python benchmarks/kinds.py`.
+
+Every repetition times Fig. 4, one after the other: the straight line `auv_fmu.closed_loop`; our
+master on FMUs of the Python kind, on their twins in C, and on these in the compiled loop, every
+port recorded; a program in C on the twins, every port recorded, too; libcosim and ecos on either
+kind, which step in Jacobi order, and our compiled loop in that order. What comes before the first
+step is not counted. Printed are medians, ratios being taken within each repetition; then the size
+of the FMUs, and the time of an instance after the first.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+from collections import deque
+from collections.abc import Callable
+from ctypes import byref, c_char_p, c_int, c_void_p
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import NamedTuple
+
+import fmpy
+from fmpy.fmi2 import FMU2Slave
+
+from auv_fmu.closed_loop import closed_loop
+from auv_fmu.euler import STEP
+from orchestrator.exchange import c_host
+from orchestrator.exchange.hosts import HOSTS, compare
+from orchestrator.experiments import bundle
+from orchestrator.experiments.wiring import closed_loop as wired
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.simulation import simulate
+from orchestrator.master.table import Table
+from orchestrator.system.structure import System
+
+#: Instances that are timed.
+INSTANCES = 1000
+
+#: Seconds that a number of steps takes.
+Engine = Callable[[int], float]
+
+
+class Goal(NamedTuple):
+    """How many times faster one engine is to be than another."""
+
+    fast: str
+    slow: str
+    times: float
+
+
+STRAIGHT = "straight-line Python loop"
+PYTHON, NATIVE = "master, Python kind", "master, native kind"
+COMPILED, COMPILED_JACOBI = "compiled loop, native kind", "compiled loop, native kind, Jacobi"
+C_PROGRAM = "C program, native kind"
+
+GOALS = [
+    Goal(NATIVE, PYTHON, 1.0),
+    Goal(COMPILED, PYTHON, 30.0),
+    *(Goal(f"{host}, native kind", f"{host}, Python kind", 4.0) for host in ("libcosim", "ecos")),
+    *(Goal(COMPILED_JACOBI, f"{host}, native kind", 20.0) for host in ("libcosim", "ecos")),
+]
+
+#: Keys of other hosts by what they are called here.
+OTHERS = {"libcosim": "libcosim-ssp", "ecos": "ecos"}
+
+
+def timed(function: Callable[[], object]) -> float:
+    """Wall-clock seconds of one call."""
+    start = perf_counter()
+    function()
+    return perf_counter() - start
+
+
+def straight_line(steps: int) -> float:
+    """The equations without FMI or master."""
+    return timed(lambda: deque(closed_loop(steps), maxlen=0))
+
+
+def in_our_master(system: System, loop: str, order: str, steps: int) -> float:
+    """Steps of a run whose rows are kept in memory, without its set-up."""
+
+    def run(n: int) -> float:
+        experiment = Experiment(n * STEP, STEP, order)
+        return timed(lambda: simulate(system, experiment, [Table()], loop=loop))
+
+    return run(steps) - run(1)
+
+
+def in_c(system: System, program: Path, steps: int) -> float:
+    """Steps in a program that calls the FMUs from C."""
+    plan = c_host.plan(system, Experiment(steps * STEP, STEP))
+    return c_host.run([program], program.parent, plan, [])[1]
+
+
+def in_another(system: System, host: str, steps: int) -> float:
+    """Steps in a host that is not ours, as it is driven from Python."""
+    [verdict] = compare(system, [host], steps, STEP)
+    if verdict.failure is not None:
+        raise SystemExit(f"{host}: {verdict.failure}")
+    return steps / verdict.steps_per_second
+
+
+def engines(python: System, native: System, folder: Path) -> dict[str, Engine]:
+    """All that can run here."""
+    found: dict[str, Engine] = {
+        STRAIGHT: straight_line,
+        PYTHON: partial(in_our_master, python, "python", "gauss-seidel"),
+        NATIVE: partial(in_our_master, native, "python", "gauss-seidel"),
+        COMPILED: partial(in_our_master, native, "compiled", "gauss-seidel"),
+        COMPILED_JACOBI: partial(in_our_master, native, "compiled", "jacobi"),
+        C_PROGRAM: partial(in_c, native, c_host.compiled(folder)),
+    }
+    for name, host in OTHERS.items():
+        if find_spec(HOSTS[host].package) is not None:
+            found[f"{name}, Python kind"] = partial(in_another, python, host)
+            found[f"{name}, native kind"] = partial(in_another, native, host)
+    return found
+
+
+def instance_time(fmu: Path, folder: Path) -> float:
+    """Median seconds of fmi2Instantiate after the first."""
+    unpacked = fmpy.extract(fmu, unzipdir=folder)
+    description = fmpy.read_model_description(unpacked)
+    slave = FMU2Slave(
+        guid=description.guid,
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        unzipDirectory=str(unpacked),
+    )
+    slave.instantiate()  # it knows the callbacks
+    make, free = slave.dll["fmi2Instantiate"], slave.dll["fmi2FreeInstance"]
+    texts = [b"timed", description.guid.encode(), (folder / "resources").as_uri().encode()]
+    name, guid, resources = map(c_char_p, texts)
+    callbacks = byref(slave.callbacks)
+    make.argtypes, make.restype, free.argtypes, free.restype = None, c_void_p, None, None
+    times = []
+    for _ in range(INSTANCES):
+        start = perf_counter()
+        component = make(name, c_int(1), guid, resources, callbacks, c_int(0), c_int(0))
+        times.append(perf_counter() - start)
+        free(c_void_p(component))
+    return median(times)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--steps", type=int, default=5000)
+    parser.add_argument("--repetitions", type=int, default=9)
+    options = parser.parse_args()
+    print(f"{platform.python_implementation()} {platform.python_version()}, {platform.machine()}")
+    print(f"medians of {options.repetitions} repetitions of {options.steps} steps")
+    with TemporaryDirectory(prefix="auvfmu") as temporary:
+        folders = {kind: Path(temporary, kind) for kind in ("python", "native")}
+        for kind, folder in folders.items():
+            bundle.build(folder, kind=kind)
+        runs = engines(*(wired(folder) for folder in folders.values()), Path(temporary))
+        for run in runs.values():
+            run(10)
+        times = [
+            {name: 1e6 * run(options.steps) / options.steps for name, run in runs.items()}
+            for _ in range(options.repetitions)
+        ]
+        for name in runs:
+            print(f"{name:35} {median(row[name] for row in times):8.2f} us a step")
+        for fast, slow, wanted in GOALS:
+            if slow in runs:
+                ratio = median(row[slow] / row[fast] for row in times)
+                print(f"{fast} is {ratio:.1f} times faster than {slow}; goal {wanted:g}")
+        for kind, folder in folders.items():
+            for fmu in sorted(folder.glob("*.fmu")):
+                seconds = instance_time(fmu, Path(temporary, "unpacked", kind, fmu.stem))
+                print(
+                    f"{fmu.stem:20} {kind:6} {fmu.stat().st_size / 1000:4.0f} kB, "
+                    f"{1e6 * seconds:6.1f} us an instance"
+                )
+
+
+if __name__ == "__main__":
+    main()

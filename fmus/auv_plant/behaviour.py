@@ -1,0 +1,124 @@
+"""How the equations run in AuvPlant, in either kind of it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypedDict
+
+from auv_fmu import plant
+from auv_fmu.actuators import limit, limit_all
+from auv_fmu.attitude import rotation_from_quaternion
+from auv_fmu.plant import PlantState
+from auv_fmu.types import Rotation, Vector3, Vector6
+from fmus.auv_plant.ports import Parameters
+from fmus.ports.port import Refusal
+
+#: By how much the square of the length of a normalised quaternion is off.
+_ROUNDING = 2e-12
+
+#: More standard deviations than any number of Random.gauss is off: sqrt(-2 log(2^-53)) is 8.6.
+_MOST_DEVIATIONS = 9.0
+
+
+class Inputs(NamedTuple):
+    """Commanded force and moments, and the disturbance."""
+
+    tau: Vector3
+    tau_w: Vector6
+
+
+class Outputs(TypedDict):
+    """What is seen of the vehicle; y has no noise yet."""
+
+    eta: Vector6
+    nu: Vector6
+    y: Vector3
+    dy: Vector3
+    tau_applied: Vector3
+
+
+def check(parameters: Parameters) -> None:
+    """Refuse limits that leave an actuator nothing."""
+    lower, upper = parameters.limits
+    _check_limits("u", lower[0], upper[0])
+    _check_limits("q", lower[1], upper[1])
+    _check_limits("r", lower[2], upper[2])
+
+
+def _check_limits(k: str, tau_min: float, tau_max: float) -> None:
+    if not tau_min < tau_max:
+        raise Refusal(f"tau_min.{k} = {tau_min:g} must be below tau_max.{k} = {tau_max:g}")
+
+
+def begin(parameters: Parameters, inputs: Inputs) -> tuple[PlantState, Rotation, Outputs]:
+    """State, its attitude and outputs at the start."""
+    x, y, z, phi, theta, psi = parameters.eta0
+    state = plant.initial_state((x, y, z), (phi, theta, psi), parameters.nu0)
+    rotation = rotation_from_quaternion(state.quaternion)
+    return state, rotation, _seen(parameters, state, rotation, _limited(parameters, inputs.tau))
+
+
+def derive(state: PlantState) -> Rotation:
+    """What a step needs of the state, and the outputs before it have needed already."""
+    return rotation_from_quaternion(state.quaternion)
+
+
+def advance(
+    parameters: Parameters, state: PlantState, derived: Rotation, inputs: Inputs, h: float, n: int
+) -> tuple[PlantState, Rotation, Outputs]:
+    """State, its attitude and outputs after n steps of h seconds."""
+    tau = _limited(parameters, inputs.tau)
+    while n > 0:
+        state = plant.step(
+            parameters.vehicle, parameters.roll, state, derived, tau, inputs.tau_w, h
+        )
+        derived = rotation_from_quaternion(state.quaternion)
+        n -= 1
+    return state, derived, _seen(parameters, state, derived, tau)
+
+
+def seed(parameters: Parameters) -> int:
+    """Of the noise."""
+    return parameters.noise.seed
+
+
+def measured(parameters: Parameters, y: Vector3, n: Vector3) -> Vector3:
+    """The output y with noise, of three independent standard normal numbers."""
+    return plant.measure(y, n, parameters.noise.std)
+
+
+def expected(parameters: Parameters, state: PlantState, outputs: Outputs) -> Outputs:
+    """The outputs that belong to a state and to what else some outputs show."""
+    a, b, c, d = state.quaternion
+    if not abs(a * a + b * b + c * c + d * d - 1.0) <= _ROUNDING:
+        raise Refusal("its quaternion is not of length one")
+    rotation = rotation_from_quaternion(state.quaternion)
+    tau = _limited(parameters, outputs["tau_applied"])
+    seen = _seen(parameters, state, rotation, tau)
+    most = _MOST_DEVIATIONS * parameters.noise.std
+    y, noisy = seen["y"], outputs["y"]
+    return {
+        "eta": seen["eta"],
+        "nu": seen["nu"],
+        "y": (
+            y[0] + limit(noisy[0] - y[0], -most, most),
+            y[1] + limit(noisy[1] - y[1], -most, most),
+            y[2] + limit(noisy[2] - y[2], -most, most),
+        ),
+        "dy": seen["dy"],
+        "tau_applied": tau,
+    }
+
+
+def _limited(parameters: Parameters, tau: Vector3) -> Vector3:
+    return limit_all(tau, parameters.limits.tau_min, parameters.limits.tau_max)
+
+
+def _seen(parameters: Parameters, state: PlantState, rotation: Rotation, tau: Vector3) -> Outputs:
+    euler, y, dy = plant.outputs(state, rotation, parameters.ell)
+    return {
+        "eta": (*state.position, *euler),
+        "nu": state.nu,
+        "y": y,
+        "dy": dy,
+        "tau_applied": tau,
+    }

@@ -1,0 +1,17 @@
+/* The component: what the equations and ports of a model need to be an FMU. */
+#include "component.h"
+
+#include "equations.c"
+#include "identity.h"
+#include "instance.h"
+#include "ports.h"
+
+#include "utf8.c"
+#include "text.c"
+#include "messages.c"
+#include "handles.c"
+#include "noise.c"
+#include "store.c"
+#include "run.c"
+#include "state.c"
+#include "guard.c"

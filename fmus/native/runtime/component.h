@@ -1,0 +1,127 @@
+/* The component as the functions of an FMI version see it: fmi2.c and fmi3.c are written over this.
+ *
+ * Such a file includes this one first, defines what is declared under "The version", and includes
+ * component.c, so that all is one translation unit. A function of FMI is then
+ *
+ *     call this = begin(handle, "fmi2Terminate", NOT_AFTER_ERROR);
+ *     if (GOES_ON(this, NULL)) terminate(&this);
+ *     return end(&this);
+ *
+ * What the component refuses is no failure of the call: it raises `fault` and blocks the steps
+ * until it is mended. docs/status.md says what is answered to what.
+ */
+#ifndef COMPONENT_H
+#define COMPONENT_H
+
+#include "platform.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+typedef const char *string;
+
+/* fmi2Status and fmi3Status. */
+enum { FMI_OK, FMI_WARNING, FMI_DISCARD, FMI_ERROR, FMI_FATAL };
+
+typedef enum { REAL, INTEGER, BOOLEAN, STRING } kind;
+
+typedef struct instance instance;
+
+/* The host's logger, as the version casts it, and what it is called with. */
+typedef struct {
+    void (*function)(void);
+    void *environment;
+} logger;
+
+/* A call between its beginning and its end. */
+typedef struct {
+    instance *instance; /* NULL: the handle is not that of a live instance */
+    string function;
+    int status;  /* what the call is answered with */
+    void *entry; /* of the instance in the table of handles */
+} call;
+
+/* The version */
+
+/* What it calls things. */
+typedef struct {
+    string kinds[STRING + 1]; /* types of values */
+    string token;             /* what tells an FMU from others */
+    string terminate;         /* the function that ends a run */
+} names;
+
+static const names version;
+
+/* Calls the logger, which is not NULL. */
+static void deliver(const logger *host, string instance_name, int status, string category,
+                    string text);
+
+/* Making and freeing */
+
+/* A handle of a new instance; NULL, with a message that says why, if anything is wrong.
+ *
+ * wrong: what is, with arguments that the version alone knows; NULL: nothing.
+ * token: the FMU's, with braces or without; NULL and "" go with any FMU. */
+static void *instantiate(string function, string wrong, string name, string token, logger host,
+                         int logging);
+
+/* Frees an instance and its states; what is no live instance it leaves alone. */
+static void free_instance(void *handle, string function);
+
+/* The frame of every other call */
+
+/* Whether a call is let through in FMI's error state. */
+typedef enum { NOT_AFTER_ERROR, ALWAYS } when;
+
+/* Waits until no other thread is in a call of the instance. */
+static call begin(void *handle, string function, when when);
+
+/* Whether a call goes on: only then it is looked at what is wrong with its arguments. */
+#define GOES_ON(call, wrong) ((call).status == FMI_OK && sound(&(call), wrong))
+
+/* What is wrong, unless it is NULL, is told, and leads to FMI's error state. */
+static int sound(call *this, string wrong);
+
+/* Lets the next call of the instance begin; the status of this one. */
+static int end(call *this);
+
+/* What is wrong with arguments; NULL: nothing. */
+static string wrong_values(size_t n, const uint32_t *references, const void *values);
+static string wrong_strings(size_t n, const uint32_t *references, const string *texts);
+
+/* Messages: errors are told even where logging is off; no categories: all. */
+static void choose_messages(call *this, int logging, size_t n, const string categories[]);
+static void tell(instance *it, int status, string text);
+
+/* Modes. What comes in the wrong mode is refused. An experiment that is refused gives 0. */
+static int set_experiment(call *this, double start, int has_stop, double stop);
+static void enter_initialisation(call *this);
+static void exit_initialisation(call *this);
+static void terminate(call *this);
+static void reset(call *this);
+
+/* Values. What belongs to no port of the type is refused, and got as 0 or "". */
+static void get_reals(instance *it, const uint32_t references[], size_t n, double values[]);
+static int32_t get_integer(instance *it, uint32_t reference);
+static int get_boolean(instance *it, uint32_t reference);
+static string get_string(instance *it, uint32_t reference);
+static void set_reals(instance *it, const uint32_t references[], size_t n, const double values[]);
+static void set_integer(instance *it, uint32_t reference, int32_t value);
+static void set_boolean(instance *it, uint32_t reference, int value);
+static void set_string(instance *it, uint32_t reference, string value);
+
+/* Refuses a reference for a type that no port has; `kind` is the version's name of it. */
+static void refuse_reference(instance *it, string kind, uint32_t reference);
+
+/* Steps: FMI_OK or FMI_DISCARD. */
+static int take_step(instance *it, double time, double step);
+
+/* States: each looks at its arguments first. A handle that is not NULL is used again. */
+static void get_state(call *this, void **state);
+static void set_state(call *this, void *state);
+static void free_state(call *this, void **state);
+static void size_of_state(call *this, void *state, size_t *size);
+static void serialise_state(call *this, void *state, unsigned char bytes[], size_t size);
+static void deserialise_state(call *this, const unsigned char bytes[], size_t size, void **state);
+
+#endif

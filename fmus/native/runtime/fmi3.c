@@ -1,0 +1,344 @@
+/* The functions of FMI 3.0, and the one file to compile: it includes all others.
+ *
+ * Where FMI3_FUNCTION_PREFIX is defined, as the standard has it, it stands before the names of the
+ * functions, so that several FMUs can be linked into one program.
+ *
+ * What co-simulation without events, clocks, arrays and derivatives does not need is not supported,
+ * and answered with fmi3Error.
+ */
+#include "component.h"
+
+static const names version = {
+    .kinds = {"Float64", "Int32", "Boolean", "String"},
+    .token = "instantiation token",
+    .terminate = "fmi3Terminate",
+};
+
+#include "component.c"
+
+#if defined(FMI3_FUNCTION_PREFIX) && !defined(FMI3_OVERRIDE_FUNCTION_PREFIX)
+#define PASTE(prefix, name) prefix##name
+#define PREFIXED(prefix, name) PASTE(prefix, name)
+#define FMI3(name) PREFIXED(FMI3_FUNCTION_PREFIX, name)
+#else
+#define FMI3(name) name
+#endif
+
+/* Functions of FMI take more than a component has to know. */
+#if defined(__GNUC__)
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
+
+/* fmi3Boolean and fmi3Clock. A host may pass any byte, where a bool is 0 or 1. */
+typedef uint8_t boolean;
+
+/* The variable for the time comes after all others. */
+enum { TIME = N_PORTS };
+
+/* Messages */
+
+typedef void (*log_message)(void *environment, int status, string category, string text);
+
+/* A # stands before the reference of a variable, unless it is doubled. */
+static void deliver(const logger *host, string instance_name, int status, string category,
+                    string text) {
+    char doubled[2 * MOST_TEXT + 1], *end = doubled;
+    for (; *text != '\0'; text++) {
+        if (*text == '#') *end++ = '#';
+        *end++ = *text;
+    }
+    *end = '\0';
+    ((log_message)host->function)(host->environment, status, category, doubled);
+}
+
+/* Turns the named categories on or off, and leaves the others as they are; no names: all of them. */
+static void switch_categories(call *this, int on, size_t n, const string names[]) {
+    enum { ALL = sizeof CATEGORIES / sizeof *CATEGORIES };
+    string chosen[ALL];
+    size_t n_chosen = 0;
+    for (size_t i = 0; i < ALL; i++) {
+        int named = n == 0;
+        for (size_t k = 0; k < n && !named; k++) named = strcmp(names[k], CATEGORIES[i]) == 0;
+        if (named ? on : wanted(&this->instance->host, FMI_OK, CATEGORIES[i])) {
+            chosen[n_chosen++] = CATEGORIES[i];
+        }
+    }
+    choose_messages(this, n_chosen > 0, n_chosen, chosen);
+}
+
+EXPORT int FMI3(fmi3SetDebugLogging)(void *handle, boolean on, size_t n, const string names[]) {
+    call this = begin(handle, "fmi3SetDebugLogging", ALWAYS);
+    if (GOES_ON(this, wrong_texts(n, names))) switch_categories(&this, on, n, names);
+    return end(&this);
+}
+
+/* Making and freeing */
+
+EXPORT string FMI3(fmi3GetVersion)(void) { return "3.0"; }
+
+EXPORT void *FMI3(fmi3InstantiateCoSimulation)(
+    string name, string token, string resources, boolean visible, boolean logging,
+    boolean event_mode_used, boolean early_return_allowed, const uint32_t intermediate[],
+    size_t n_intermediate, void *environment, log_message log, void (*update)(void)) {
+    return instantiate("fmi3InstantiateCoSimulation",
+                       event_mode_used ? "this FMU has no event mode" : NULL, name, token,
+                       (logger){(void (*)(void))log, environment}, logging != 0);
+}
+
+static const char ANOTHER_TYPE[] = "this FMU is for co-simulation only";
+
+EXPORT void *FMI3(fmi3InstantiateModelExchange)(string name, string token, string resources,
+                                                boolean visible, boolean logging,
+                                                void *environment, log_message log) {
+    return instantiate("fmi3InstantiateModelExchange", ANOTHER_TYPE, name, token,
+                       (logger){(void (*)(void))log, environment}, logging != 0);
+}
+
+EXPORT void *FMI3(fmi3InstantiateScheduledExecution)(
+    string name, string token, string resources, boolean visible, boolean logging,
+    void *environment, log_message log, void (*update)(void *), void (*lock)(void),
+    void (*unlock)(void)) {
+    return instantiate("fmi3InstantiateScheduledExecution", ANOTHER_TYPE, name, token,
+                       (logger){(void (*)(void))log, environment}, logging != 0);
+}
+
+EXPORT void FMI3(fmi3FreeInstance)(void *handle) { free_instance(handle, "fmi3FreeInstance"); }
+
+/* Modes */
+
+EXPORT int FMI3(fmi3EnterInitializationMode)(void *handle, boolean has_tolerance, double tolerance,
+                                             double start, boolean has_stop, double stop) {
+    call this = begin(handle, "fmi3EnterInitializationMode", NOT_AFTER_ERROR);
+    if (GOES_ON(this, NULL) && set_experiment(&this, start, has_stop != 0, stop)) {
+        enter_initialisation(&this);
+    }
+    return end(&this);
+}
+
+#define MODE(name, when, action)                                                                 \
+    EXPORT int FMI3(name)(void *handle) {                                                        \
+        call this = begin(handle, #name, when);                                                  \
+        if (GOES_ON(this, NULL)) action(&this);                                                  \
+        return end(&this);                                                                       \
+    }
+
+MODE(fmi3ExitInitializationMode, NOT_AFTER_ERROR, exit_initialisation)
+MODE(fmi3Terminate, NOT_AFTER_ERROR, terminate)
+MODE(fmi3Reset, ALWAYS, reset)
+
+/* Steps */
+
+EXPORT int FMI3(fmi3DoStep)(void *handle, double time, double step, boolean no_set,
+                            boolean *event_handling_needed, boolean *terminate_simulation,
+                            boolean *early_return, double *last_successful_time) {
+    call this = begin(handle, "fmi3DoStep", NOT_AFTER_ERROR);
+    int complete = event_handling_needed && terminate_simulation && early_return &&
+                   last_successful_time;
+    if (GOES_ON(this, complete ? NULL : "NULL")) {
+        this.status = take_step(this.instance, time, step);
+        *event_handling_needed = *terminate_simulation = *early_return = 0;
+        *last_successful_time = this.instance->run.time;
+    }
+    return end(&this);
+}
+
+/* Values. All variables are scalars: there are as many values as references. */
+
+static string wrong_numbers(size_t n, const uint32_t r[], const void *values, size_t n_values) {
+    return n == n_values ? wrong_values(n, r, values) : "not as many values as references";
+}
+
+#define GET(name, type, get)                                                                     \
+    EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, type v[], size_t n_v) {   \
+        call this = begin(handle, #name, ALWAYS);                                                \
+        if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {                                        \
+            for (size_t i = 0; i < n; i++) v[i] = get(this.instance, r[i]);                      \
+        }                                                                                        \
+        return end(&this);                                                                       \
+    }
+
+#define SET(name, type, wrong, set)                                                              \
+    EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, const type v[],           \
+                          size_t n_v) {                                                          \
+        call this = begin(handle, #name, NOT_AFTER_ERROR);                                       \
+        if (GOES_ON(this, wrong_numbers(n, r, v, n_v)) && GOES_ON(this, wrong)) {                \
+            for (size_t i = 0; i < n; i++) set(this.instance, r[i], v[i]);                       \
+        }                                                                                        \
+        return end(&this);                                                                       \
+    }
+
+GET(fmi3GetInt32, int32_t, get_integer)
+GET(fmi3GetBoolean, boolean, get_boolean)
+GET(fmi3GetString, string, get_string)
+SET(fmi3SetInt32, int32_t, NULL, set_integer)
+SET(fmi3SetBoolean, boolean, NULL, set_boolean)
+SET(fmi3SetString, string, wrong_strings(n, r, v), set_string)
+
+EXPORT int FMI3(fmi3GetFloat64)(void *handle, const uint32_t r[], size_t n, double v[],
+                                size_t n_v) {
+    call this = begin(handle, "fmi3GetFloat64", ALWAYS);
+    if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {
+        for (size_t i = 0, from = 0; i <= n; i++) {
+            if (i < n && r[i] != TIME) continue;
+            if (i > from) get_reals(this.instance, &r[from], i - from, &v[from]);
+            if (i < n) v[i] = this.instance->run.time;
+            from = i + 1;
+        }
+    }
+    return end(&this);
+}
+
+EXPORT int FMI3(fmi3SetFloat64)(void *handle, const uint32_t r[], size_t n, const double v[],
+                                size_t n_v) {
+    call this = begin(handle, "fmi3SetFloat64", NOT_AFTER_ERROR);
+    if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) set_reals(this.instance, r, n, v);
+    return end(&this);
+}
+
+/* Types that no variable has: every reference is a wrong one, for which 0 is given. */
+
+static int refuse_all(void *handle, string function, when when, string kind, const uint32_t r[],
+                      size_t n, string wrong) {
+    call this = begin(handle, function, when);
+    if (GOES_ON(this, wrong)) {
+        for (size_t i = 0; i < n; i++) refuse_reference(this.instance, kind, r[i]);
+    }
+    return end(&this);
+}
+
+#define REFUSE_TO_GET(kind, wrong) refuse_all(handle, "fmi3Get" kind, ALWAYS, kind, r, n, wrong)
+#define REFUSE_TO_SET(kind, wrong)                                                               \
+    refuse_all(handle, "fmi3Set" kind, NOT_AFTER_ERROR, kind, r, n, wrong)
+
+#define NO_VARIABLE(kind, type)                                                                  \
+    EXPORT int FMI3(fmi3Get##kind)(void *handle, const uint32_t r[], size_t n, type v[],         \
+                                   size_t n_v) {                                                 \
+        int status = REFUSE_TO_GET(#kind, wrong_numbers(n, r, v, n_v));                          \
+        for (size_t i = 0; i < n && status == FMI_OK; i++) v[i] = 0;                             \
+        return status;                                                                           \
+    }                                                                                            \
+    EXPORT int FMI3(fmi3Set##kind)(void *handle, const uint32_t r[], size_t n, const type v[],   \
+                                   size_t n_v) {                                                 \
+        return REFUSE_TO_SET(#kind, wrong_numbers(n, r, v, n_v));                                \
+    }
+
+NO_VARIABLE(Float32, float)
+NO_VARIABLE(Int8, int8_t)
+NO_VARIABLE(UInt8, uint8_t)
+NO_VARIABLE(Int16, int16_t)
+NO_VARIABLE(UInt16, uint16_t)
+NO_VARIABLE(UInt32, uint32_t)
+NO_VARIABLE(Int64, int64_t)
+NO_VARIABLE(UInt64, uint64_t)
+
+static string wrong_binaries(size_t n, const uint32_t r[], const size_t sizes[], const void *values,
+                             size_t n_values) {
+    string wrong = wrong_numbers(n, r, values, n_values);
+    return wrong != NULL ? wrong : wrong_values(n, r, sizes);
+}
+
+EXPORT int FMI3(fmi3GetBinary)(void *handle, const uint32_t r[], size_t n, size_t sizes[],
+                               const uint8_t *v[], size_t n_v) {
+    int status = REFUSE_TO_GET("Binary", wrong_binaries(n, r, sizes, v, n_v));
+    for (size_t i = 0; i < n && status == FMI_OK; i++) {
+        v[i] = NULL;
+        sizes[i] = 0;
+    }
+    return status;
+}
+
+EXPORT int FMI3(fmi3SetBinary)(void *handle, const uint32_t r[], size_t n, const size_t sizes[],
+                               const uint8_t *const v[], size_t n_v) {
+    return REFUSE_TO_SET("Binary", wrong_binaries(n, r, sizes, v, n_v));
+}
+
+EXPORT int FMI3(fmi3GetClock)(void *handle, const uint32_t r[], size_t n, boolean v[]) {
+    int status = REFUSE_TO_GET("Clock", wrong_values(n, r, v));
+    for (size_t i = 0; i < n && status == FMI_OK; i++) v[i] = 0;
+    return status;
+}
+
+EXPORT int FMI3(fmi3SetClock)(void *handle, const uint32_t r[], size_t n, const boolean v[]) {
+    return REFUSE_TO_SET("Clock", wrong_values(n, r, v));
+}
+
+/* States */
+
+#define STATE_FUNCTION(name, parameters, action)                                                 \
+    EXPORT int FMI3(name) parameters {                                                           \
+        call this = begin(handle, #name, ALWAYS);                                                \
+        if (GOES_ON(this, NULL)) action;                                                         \
+        return end(&this);                                                                       \
+    }
+
+STATE_FUNCTION(fmi3GetFMUState, (void *handle, void **state), get_state(&this, state))
+STATE_FUNCTION(fmi3SetFMUState, (void *handle, void *state), set_state(&this, state))
+STATE_FUNCTION(fmi3FreeFMUState, (void *handle, void **state), free_state(&this, state))
+STATE_FUNCTION(fmi3SerializedFMUStateSize, (void *handle, void *state, size_t *size),
+               size_of_state(&this, state, size))
+STATE_FUNCTION(fmi3SerializeFMUState, (void *handle, void *state, uint8_t bytes[], size_t size),
+               serialise_state(&this, state, bytes, size))
+STATE_FUNCTION(fmi3DeserializeFMUState,
+               (void *handle, const uint8_t bytes[], size_t size, void **state),
+               deserialise_state(&this, bytes, size, state))
+
+/* What is not supported */
+
+static int unsupported(void *handle, string function) {
+    call this = begin(handle, function, NOT_AFTER_ERROR);
+    if (GOES_ON(this, NULL)) {
+        message why;
+        compose(&why, "FMI function not supported: %s", function);
+        tell(this.instance, FMI_ERROR, why.text);
+        this.status = FMI_ERROR;
+    }
+    return end(&this);
+}
+
+#define UNSUPPORTED(name, ...)                                                                   \
+    EXPORT int FMI3(name)(void *handle, __VA_ARGS__) { return unsupported(handle, #name); }
+#define UNSUPPORTED_MODE(name)                                                                   \
+    EXPORT int FMI3(name)(void *handle) { return unsupported(handle, #name); }
+
+UNSUPPORTED_MODE(fmi3EnterEventMode)
+UNSUPPORTED_MODE(fmi3EnterStepMode)
+UNSUPPORTED_MODE(fmi3EnterContinuousTimeMode)
+UNSUPPORTED_MODE(fmi3EnterConfigurationMode)
+UNSUPPORTED_MODE(fmi3ExitConfigurationMode)
+UNSUPPORTED_MODE(fmi3EvaluateDiscreteStates)
+UNSUPPORTED(fmi3UpdateDiscreteStates, boolean *needed, boolean *terminate, boolean *nominals,
+            boolean *values, boolean *defined, double *next)
+UNSUPPORTED(fmi3GetNumberOfVariableDependencies, uint32_t variable, size_t *n)
+UNSUPPORTED(fmi3GetVariableDependencies, uint32_t variable, size_t elements[],
+            uint32_t independents[], size_t independent_elements[], int kinds[], size_t n)
+UNSUPPORTED(fmi3GetOutputDerivatives, const uint32_t r[], size_t n, const int32_t orders[],
+            double v[], size_t n_v)
+UNSUPPORTED(fmi3GetDirectionalDerivative, const uint32_t unknowns[], size_t n_unknowns,
+            const uint32_t knowns[], size_t n_knowns, const double seed[], size_t n_seed,
+            double sensitivity[], size_t n_sensitivity)
+UNSUPPORTED(fmi3GetAdjointDerivative, const uint32_t unknowns[], size_t n_unknowns,
+            const uint32_t knowns[], size_t n_knowns, const double seed[], size_t n_seed,
+            double sensitivity[], size_t n_sensitivity)
+UNSUPPORTED(fmi3GetIntervalDecimal, const uint32_t r[], size_t n, double intervals[],
+            int qualifiers[])
+UNSUPPORTED(fmi3GetIntervalFraction, const uint32_t r[], size_t n, uint64_t counters[],
+            uint64_t resolutions[], int qualifiers[])
+UNSUPPORTED(fmi3GetShiftDecimal, const uint32_t r[], size_t n, double shifts[])
+UNSUPPORTED(fmi3GetShiftFraction, const uint32_t r[], size_t n, uint64_t counters[],
+            uint64_t resolutions[])
+UNSUPPORTED(fmi3SetIntervalDecimal, const uint32_t r[], size_t n, const double intervals[])
+UNSUPPORTED(fmi3SetIntervalFraction, const uint32_t r[], size_t n, const uint64_t counters[],
+            const uint64_t resolutions[])
+UNSUPPORTED(fmi3SetShiftDecimal, const uint32_t r[], size_t n, const double shifts[])
+UNSUPPORTED(fmi3SetShiftFraction, const uint32_t r[], size_t n, const uint64_t counters[],
+            const uint64_t resolutions[])
+UNSUPPORTED(fmi3ActivateModelPartition, uint32_t clock, double time)
+UNSUPPORTED(fmi3CompletedIntegratorStep, boolean no_set, boolean *event, boolean *terminate)
+UNSUPPORTED(fmi3SetTime, double time)
+UNSUPPORTED(fmi3SetContinuousStates, const double states[], size_t n)
+UNSUPPORTED(fmi3GetContinuousStateDerivatives, double derivatives[], size_t n)
+UNSUPPORTED(fmi3GetEventIndicators, double indicators[], size_t n)
+UNSUPPORTED(fmi3GetContinuousStates, double states[], size_t n)
+UNSUPPORTED(fmi3GetNominalsOfContinuousStates, double nominals[], size_t n)
+UNSUPPORTED(fmi3GetNumberOfEventIndicators, size_t *n)
+UNSUPPORTED(fmi3GetNumberOfContinuousStates, size_t *n)

@@ -1,0 +1,147 @@
+/* Making and freeing instances, and what every call begins and ends with. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* More values in one call than any FMU has. */
+enum { MOST_VALUES = 1 << 20 };
+
+static string wrong_size(size_t n, const void *array) {
+    if (n > MOST_VALUES) return "more values than there can be";
+    return n > 0 && array == NULL ? "no array" : NULL;
+}
+
+static string wrong_values(size_t n, const uint32_t *references, const void *values) {
+    return references == NULL ? wrong_size(n, NULL) : wrong_size(n, values);
+}
+
+static string wrong_texts(size_t n, const string *texts) {
+    string wrong = wrong_size(n, texts);
+    for (size_t i = 0; i < n && wrong == NULL; i++) {
+        if (texts[i] == NULL) {
+            wrong = "a string is NULL";
+        } else if (!is_utf8(texts[i])) {
+            wrong = "a string is not UTF-8";
+        }
+    }
+    return wrong;
+}
+
+static string wrong_strings(size_t n, const uint32_t *references, const string *texts) {
+    return references == NULL ? wrong_size(n, NULL) : wrong_texts(n, texts);
+}
+
+/* Calls */
+
+static call begin(void *handle, string function, when when) {
+    call this = {NULL, function, FMI_ERROR, NULL};
+    int inside;
+    entry *it = hold(handle, INSTANCE, &inside);
+    if (it == NULL) {
+        /* There is nobody else to tell: a logger that calls would do so again. */
+        fprintf(stderr, "%s: %s\n", function,
+                inside ? "called by the logger" : "not a live instance of this FMU");
+        return this;
+    }
+    this.entry = it;
+    this.instance = it->thing;
+    if (!this.instance->in_error || when == ALWAYS) this.status = FMI_OK;
+    return this;
+}
+
+static int sound(call *this, string wrong) {
+    if (wrong == NULL) return 1;
+    message why;
+    compose(&why, "%s: %s", this->function, wrong);
+    this->status = FMI_ERROR;
+    this->instance->in_error = 1;
+    tell(this->instance, FMI_ERROR, why.text);
+    return 0;
+}
+
+static int end(call *this) {
+    instance *it = this->instance;
+    if (it == NULL) return this->status;
+    if (it->no_memory) {
+        it->no_memory = 0;
+        sound(this, "no memory");
+    }
+    let_go(this->entry);
+    return this->status;
+}
+
+static void choose_messages(call *this, int logging, size_t n, const string categories[]) {
+    if (!sound(this, wrong_texts(n, categories))) return;
+    if (!choose(&this->instance->host, logging, n, categories)) this->instance->no_memory = 1;
+}
+
+/* Instances */
+
+/* Whether two GUIDs are the same, with or without braces. */
+static int same_token(string one, string other) {
+    static const char braces[] = "{}";
+    one += strspn(one, braces);
+    other += strspn(other, braces);
+    size_t length = strcspn(one, braces);
+    return strcspn(other, braces) == length && strncmp(one, other, length) == 0;
+}
+
+static int can_be_made(string wrong, string name, string token, message *why) {
+    if (name == NULL) {
+        compose(why, "the instance has no name");
+    } else if (!is_utf8(name)) {
+        compose(why, "the name of the instance is not UTF-8");
+    } else if (wrong != NULL) {
+        compose(why, "%s", wrong);
+    } else if (token != NULL && !is_utf8(token)) {
+        compose(why, "the %s is not UTF-8", version.token);
+    } else if (token != NULL && token[0] != '\0' && !same_token(token, MODEL_GUID)) {
+        compose(why, "%s %s is not that of this FMU, %s", version.token, token, MODEL_GUID);
+    } else {
+        return 1;
+    }
+    return 0;
+}
+
+static void release_instance(instance *it) {
+    release_run(&it->run);
+    release_listener(&it->host);
+    free(it);
+}
+
+static void *instantiate(string function, string wrong, string name, string token, logger host,
+                         int logging) {
+    message why;
+    instance *it = calloc(1, sizeof *it);
+    void *handle = NULL;
+    if (it == NULL) return NULL;
+    if (!listen(&it->host, name != NULL && is_utf8(name) ? name : "?", host, logging)) {
+        free(it);
+        return NULL;
+    }
+    if (can_be_made(wrong, name, token, &why)) {
+        renew(it);
+        it->last_successful_time = NAN;
+        handle = new_handle(INSTANCE, it, NULL);
+        if (handle == NULL) compose(&why, "no memory");
+    }
+    if (handle == NULL) {
+        message said;
+        compose(&said, "%s: %s", function, why.text);
+        tell(it, FMI_ERROR, said.text);
+        release_instance(it);
+    }
+    return handle;
+}
+
+static void free_instance(void *handle, string function) {
+    if (handle == NULL) return;
+    call this = begin(handle, function, ALWAYS);
+    void *state;
+    int inside;
+    if (this.instance == NULL) return;
+    while ((state = state_of(this.entry)) != NULL) release_state(hold(state, STATE, &inside));
+    drop(this.entry);
+    release_instance(this.instance);
+}

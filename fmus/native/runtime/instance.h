@@ -1,0 +1,146 @@
+/* What the parts of the component know of each other.
+ *
+ * utf8.c       which bytes are text
+ * text.c       texts of messages, with numbers as Python writes them
+ * messages.c   what the host is told
+ * handles.c    tells what is alive from what is not
+ * noise.c      Python's random numbers
+ * store.c      values of ports, and what may be done with them
+ * run.c        modes and steps
+ * state.c      the state as bytes, and what is checked before one is taken
+ * guard.c      making and freeing instances, and what every call begins and ends with
+ *
+ * A function that can fail writes a reason into `why`, and gives 0.
+ */
+#ifndef INSTANCE_H
+#define INSTANCE_H
+
+#include "component.h"
+
+/* Text */
+
+/* Some hosts have a buffer of 1 or 2 kB for a message. No character has more than four bytes. */
+enum { MOST_CHARACTERS = 500, MOST_TEXT = 4 * MOST_CHARACTERS };
+
+typedef struct {
+    int characters;
+    size_t length; /* in bytes */
+    char text[MOST_TEXT + 1];
+} message;
+
+/* Different messages that an instance logs: a host may step on after a refusal for ever. */
+enum { MOST_MESSAGES = 100 };
+
+typedef struct {
+    logger host;
+    char *name;
+    int logging;
+    size_t n;
+    char **categories;
+} listener;
+
+/* Ports */
+
+typedef enum { INPUT, OUTPUT, PARAMETER } causality;
+typedef enum { CONTINUOUS, DISCRETE, TUNABLE, FIXED } variability;
+
+/* A text that a port takes, and what stands for it in the equations. */
+typedef struct {
+    string text;
+    int number;
+} choice;
+
+typedef struct {
+    string name;
+    kind kind;
+    causality causality;
+    variability variability;
+    size_t place; /* among the inputs or outputs, or of a parameter in its structure */
+    double start, minimum, maximum; /* as numbers that stand for them */
+    const choice *choices;
+    size_t n_choices;
+} port;
+
+/* An array of n elements, where C has none without elements. */
+#define AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)
+
+typedef struct {
+    model_parameters model;
+    double h_max; /* largest internal step [s] */
+} parameter_values;
+
+typedef union {
+    model_inputs groups;
+    double values[AT_LEAST_ONE(MODEL_INPUTS)];
+} input_values;
+
+typedef union {
+    model_outputs groups;
+    double values[AT_LEAST_ONE(MODEL_OUTPUTS)];
+} output_values;
+
+typedef union {
+    model_state groups;
+    double values[AT_LEAST_ONE(MODEL_STATE)];
+} state_values;
+
+/* A run */
+
+enum { GENERATOR_WORDS = 624 };
+
+/* Python's random.Random. */
+typedef struct {
+    uint32_t words[GENERATOR_WORDS];
+    uint32_t place; /* of the next word; GENERATOR_WORDS: all are used up */
+    int has_next;
+    double next; /* normal numbers come in pairs */
+} generator;
+
+typedef enum { INSTANTIATED, INITIALISING, STEPPING, TERMINATED } mode;
+
+/* Why steps are refused: a port, a call, or another thing was, and has not been mended since. */
+typedef struct refusal refusal;
+struct refusal {
+    refusal *next;
+    string why;
+    char what[1]; /* and `why` behind it */
+};
+
+/* State and outputs at a communication point. */
+typedef struct {
+    state_values state;
+    output_values outputs;
+} moment;
+
+/* Everything that the rest of a run depends on. */
+typedef struct {
+    mode mode;
+    double start_time, time; /* where it has begun, and where it is */
+    parameter_values parameters; /* as they were set */
+    input_values inputs;
+    int begun;         /* whether there is a state */
+    moment moments[2]; /* one is now; the other takes the next, which may be refused */
+    int now;
+    generator noise;
+    int fault;
+    refusal *refused; /* in order of the first refusal */
+} run;
+
+struct instance {
+    listener host;
+    int in_error;
+    int no_memory; /* which the end of the call tells */
+    run run;
+    parameter_values meant; /* the parameters that steps are taken with */
+    double longest_step;
+    int stale; /* whether a value has changed that state and outputs at the start time depend on */
+    size_t n_said;
+    uint64_t said[MOST_MESSAGES];
+    double last_successful_time;
+    int wants_to_terminate;
+};
+
+/* What is refused, where it is neither a port nor a call. */
+static const char REFERENCE[] = "value reference", INITIALISATION[] = "initialisation";
+
+#endif

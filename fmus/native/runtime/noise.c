@@ -1,0 +1,68 @@
+/* Python's random numbers: random.Random(seed).gauss(0.0, 1.0), bit for bit.
+ *
+ * The Mersenne Twister MT19937 of Matsumoto and Nishimura, seeded as Python seeds it with an integer
+ * of one word; https://doi.org/10.1145/272991.272995
+ */
+#include <math.h>
+
+enum { SHIFT = 397 };
+
+static void seed_generator(generator *it, uint32_t seed) {
+    uint32_t *x = it->words, i;
+    x[0] = 19650218;
+    for (i = 1; i < GENERATOR_WORDS; i++) x[i] = 1812433253 * (x[i - 1] ^ x[i - 1] >> 30) + i;
+    for (i = 1; i < GENERATOR_WORDS; i++) {
+        x[i] = (x[i] ^ (x[i - 1] ^ x[i - 1] >> 30) * 1664525) + seed;
+    }
+    x[0] = x[GENERATOR_WORDS - 1];
+    x[1] = (x[1] ^ (x[0] ^ x[0] >> 30) * 1664525) + seed;
+    for (i = 2; i < GENERATOR_WORDS; i++) {
+        x[i] = (x[i] ^ (x[i - 1] ^ x[i - 1] >> 30) * 1566083941) - i;
+    }
+    x[0] = x[GENERATOR_WORDS - 1];
+    x[1] = (x[1] ^ (x[0] ^ x[0] >> 30) * 1566083941) - 1;
+    x[0] = 0x80000000;
+    it->place = GENERATOR_WORDS;
+    it->has_next = 0;
+    it->next = 0.0;
+}
+
+static void renew_words(uint32_t x[]) {
+    for (uint32_t i = 0; i < GENERATOR_WORDS; i++) {
+        uint32_t both = (x[i] & 0x80000000) | (x[(i + 1) % GENERATOR_WORDS] & 0x7fffffff);
+        x[i] = x[(i + SHIFT) % GENERATOR_WORDS] ^ both >> 1 ^ (both & 1 ? 0x9908b0df : 0);
+    }
+}
+
+static uint32_t next_word(generator *it) {
+    if (it->place >= GENERATOR_WORDS) {
+        renew_words(it->words);
+        it->place = 0;
+    }
+    uint32_t x = it->words[it->place++];
+    x ^= x >> 11;
+    x ^= x << 7 & 0x9d2c5680;
+    x ^= x << 15 & 0xefc60000;
+    return x ^ x >> 18;
+}
+
+/* Uniform in [0, 1), with 53 bits. */
+static double uniform(generator *it) {
+    uint32_t upper = next_word(it) >> 5, lower = next_word(it) >> 6;
+    return (upper * 67108864.0 + lower) * (1.0 / 9007199254740992.0);
+}
+
+static double standard_normal(generator *it) {
+    double z = it->next;
+    if (it->has_next) {
+        it->has_next = 0;
+    } else {
+        double angle = uniform(it) * (2.0 * 3.141592653589793);
+        double radius = sqrt(-2.0 * log(1.0 - uniform(it)));
+        z = cos(angle) * radius;
+        it->next = sin(angle) * radius;
+        it->has_next = 1;
+    }
+    /* Python gives mean + z * deviation: it has no negative zero. */
+    return 0.0 + z;
+}

@@ -1,0 +1,228 @@
+/* Modes and steps.
+ *
+ * A step is a transaction: state and outputs change together, after everything was computed and found
+ * finite.
+ */
+#include <math.h>
+
+/* A step may exceed `h_max` by this share without being split: hosts round their time. */
+static const double ROUNDING = 1e-9;
+
+/* Longest step of a component that has no internal steps [s]. */
+static const double NO_LIMIT = 1e300;
+
+/* Largest norm of a state. No vehicle comes near it, and from a state below it a step with sane inputs
+ * is always finite: one wild sample must not be the end of a run. */
+static const double LARGEST_STATE = 1e100;
+
+/* More internal steps than this in one communication step are taken for a mistake. */
+static const double MOST_INTERNAL_STEPS = 1e6;
+
+/* A run as it is after instantiation. */
+static run new_run(void) {
+    run it = {.parameters.h_max = NO_LIMIT};
+    for (int i = 0; i < N_PORTS; i++) {
+        if (ports[i].causality == PARAMETER) put_parameter(&it.parameters, &ports[i], ports[i].start);
+    }
+    return it;
+}
+
+/* Makes everything what it is after instantiation. */
+static void renew(instance *it) {
+    release_run(&it->run);
+    it->run = new_run();
+    it->stale = 0;
+    it->in_error = 0;
+    it->n_said = 0;
+}
+
+static int adopt(instance *it, const parameter_values *values, message *why) {
+    Error error = {0};
+    model_check(&values->model, &error);
+    if (error.raised) return compose(why, "%s", error.why);
+    it->meant = *values;
+    it->longest_step = values->h_max * (1.0 + ROUNDING);
+    return 1;
+}
+
+static int bounded(const state_values *state) {
+    double sum = 0.0;
+    for (int i = 0; i < MODEL_STATE; i++) sum += state->values[i] * state->values[i];
+    return sum <= LARGEST_STATE * LARGEST_STATE;
+}
+
+/* Takes over what was computed for the next moment, if no number of it is out of bounds. */
+static int accept(instance *it, const Error *error, message *why) {
+    run *run = &it->run;
+    moment *next = &run->moments[!run->now];
+    double draws[AT_LEAST_ONE(MODEL_DRAWS)];
+    if (error->raised) return compose(why, "%s", error->why);
+    if (!bounded(&next->state)) {
+        return compose(why, "the state is not finite, or beyond %g", LARGEST_STATE);
+    }
+    for (int i = 0; i < MODEL_OUTPUTS; i++) {
+        if (!isfinite(next->outputs.values[i])) {
+            return in_range(&ports[output_references[i]], next->outputs.values[i], why);
+        }
+    }
+    if (MODEL_DRAWS > 0) {
+        for (int i = 0; i < MODEL_DRAWS; i++) draws[i] = standard_normal(&run->noise);
+        model_measure(&it->meant.model, draws, &next->outputs.groups);
+        if (!all_finite(next->outputs.values, MODEL_OUTPUTS)) {
+            return compose(why, "a sampled output is not finite");
+        }
+    }
+    run->now = !run->now;
+    run->begun = 1;
+    return 1;
+}
+
+/* Initialisation and end */
+
+/* State and outputs at the start time. */
+static int start(instance *it, message *why) {
+    run *run = &it->run;
+    moment *next = &run->moments[!run->now];
+    Error error = {0};
+    if (!adopt(it, &run->parameters, why)) return 0;
+    if (MODEL_DRAWS > 0) seed_generator(&run->noise, (uint32_t)model_seed(&it->meant.model));
+    model_begin(&it->meant.model, &run->inputs.groups, run->start_time, &next->state.groups,
+                &next->outputs.groups, &error);
+    return accept(it, &error, why);
+}
+
+/* Refuses something, or mends it. */
+static void settle(instance *it, string what, string refused, int settled, const message *why) {
+    message said;
+    if (settled) {
+        mend(&it->run, what);
+    } else {
+        compose(&said, "%s refused: %s", refused, why->text);
+        refuse(it, what, &said);
+    }
+}
+
+static void refresh(instance *it) {
+    message why;
+    if (!it->stale) return;
+    it->stale = 0;
+    settle(it, INITIALISATION, "initialisation", start(it, &why), &why);
+}
+
+/* Whether a call comes in the one mode that it is allowed in; else it is refused. */
+static int follows(call *this, mode mode) {
+    static const string names[] = {"instantiated", "initialising", "stepping", "terminated"};
+    instance *it = this->instance;
+    message why;
+    if (it->run.mode == mode) return 1;
+    compose(&why, "%s is not allowed when %s", this->function, names[it->run.mode]);
+    refuse(it, this->function, &why);
+    return 0;
+}
+
+static int set_experiment(call *this, double start, int has_stop, double stop) {
+    instance *it = this->instance;
+    message why;
+    int good = 0;
+    if (!follows(this, INSTANTIATED)) return 0;
+    if (!isfinite(start)) {
+        compose(&why, "start time %r: must be finite", start);
+    } else if (has_stop && !(stop >= start)) {
+        compose(&why, "stop time %r: must not be before %r", stop, start);
+    } else {
+        it->run.start_time = it->run.time = start;
+        good = 1;
+    }
+    settle(it, this->function, "experiment", good, &why);
+    return good;
+}
+
+static void enter_initialisation(call *this) {
+    if (!follows(this, INSTANTIATED)) return;
+    this->instance->run.mode = INITIALISING;
+    this->instance->stale = 1;
+}
+
+static void exit_initialisation(call *this) {
+    if (!follows(this, INITIALISING)) return;
+    refresh(this->instance);
+    this->instance->run.mode = STEPPING;
+}
+
+static void terminate(call *this) {
+    if (follows(this, STEPPING)) this->instance->run.mode = TERMINATED;
+}
+
+static void reset(call *this) { renew(this->instance); }
+
+/* Steps */
+
+/* What keeps steps from being taken; 0: something does. */
+static int may_step(const run *it, message *why) {
+    if (it->refused == NULL && it->mode == STEPPING) return 1;
+    clear(why);
+    for (const refusal *one = it->refused; one != NULL; one = one->next) {
+        append_text(why, one->why);
+        append_text(why, one->next != NULL ? "; " : "");
+    }
+    if (it->refused == NULL) {
+        append_text(why, it->mode == TERMINATED ? "terminated" : "not initialised");
+    }
+    return 0;
+}
+
+/* The number of internal steps that a step is split into; -1: it is refused. */
+static int internal_steps(double time, double step, double longest, message *why) {
+    double n = ceil(step / longest);
+    if (!isfinite(time) || !isfinite(step)) {
+        compose(why, "time %r and step %r must be finite", time, step);
+    } else if (step < 0.0) {
+        compose(why, "step %g s is negative", step);
+    } else if (isinf(n)) {
+        compose(why, "OverflowError: cannot convert float infinity to integer");
+    } else if (n > MOST_INTERNAL_STEPS) {
+        compose(why, "step %g s needs %f internal steps; raise h_max", step, n);
+    } else {
+        return (int)n;
+    }
+    return -1;
+}
+
+static int advance(instance *it, double time, double step, message *why) {
+    run *run = &it->run;
+    const moment *now = &run->moments[run->now];
+    moment *next = &run->moments[!run->now];
+    const model_parameters *parameters = &it->meant.model;
+    const model_inputs *inputs = &run->inputs.groups;
+    message said;
+    Error error;
+    int n = 1;
+    if (!may_step(run, why)) return 0;
+    if (!(step > 0.0 && step <= it->longest_step && isfinite(time))) {
+        n = internal_steps(time, step, it->longest_step, why);
+        if (n <= 0) return n == 0;
+    }
+    error.raised = 0;
+    next->state = now->state;
+    if (!model_credible(parameters, &now->state.groups, inputs, &error)) {
+        compose(&said, MODEL_RESTARTED, time);
+        say(it, &said, FMI_WARNING, "observer restarted");
+        model_restart(parameters, &next->state.groups, inputs, &error);
+    }
+    model_advance(parameters, &next->state.groups, inputs, time, step / n, n,
+                  &next->outputs.groups, &error);
+    if (!accept(it, &error, why)) return 0;
+    run->time = time + step;
+    return 1;
+}
+
+static int take_step(instance *it, double time, double step) {
+    message why, said;
+    int taken = advance(it, time, step, &why);
+    it->last_successful_time = taken ? time + step : time;
+    if (taken) return FMI_OK;
+    it->wants_to_terminate = 1;
+    compose(&said, "step refused at t = %g s: %s", time, why.text);
+    report(it, &said, why.text);
+    return FMI_DISCARD;
+}

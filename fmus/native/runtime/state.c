@@ -1,0 +1,469 @@
+/* The state of an FMU: complete, exact, as bytes, and checked before it is taken.
+ *
+ * It is held in memory as the bytes that it is serialised to. All numbers are little-endian; Reals are
+ * IEEE 754 doubles, all others have four bytes:
+ *
+ *     MAGIC, identity, mode, start time, time,
+ *     parameters and inputs in the order of their ports, outputs,
+ *     whether there is a state, and if so: the numbers of the state, and of the noise the words of
+ *     the generator, the place of the next, whether there is a next number, and it;
+ *     fault, the number of refusals, of each what and why;
+ *     the CRC-32 of all that.
+ *
+ * A text is its length and its bytes.
+ */
+#include <limits.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char MAGIC[] = "FMU state 1";
+
+/* Tells states of one model and version from all others. */
+static const char IDENTITY[] = MODEL_NAME " " MODEL_GUID;
+
+/* More bytes than any state has. */
+static const size_t MOST_BYTES = (size_t)1 << 30;
+
+/* Difference of what was computed from the same numbers on two machines. */
+static const double NEAR = 1e-9;
+
+enum { CHECKSUM_SIZE = 4 };
+
+typedef struct {
+    size_t size;
+    int sealed; /* whether the checksum stands where it belongs: it is computed when it is needed */
+    unsigned char bytes[1];
+} saved;
+
+/* Writing */
+
+/* Where bytes are written to; NULL: they are only counted. */
+typedef struct {
+    unsigned char *bytes;
+    size_t size;
+} writer;
+
+static void put_bytes(writer *to, const void *bytes, size_t n) {
+    if (to->bytes != NULL) memcpy(to->bytes + to->size, bytes, n);
+    to->size += n;
+}
+
+static void put_word(writer *to, uint32_t word) {
+    const unsigned char bytes[] = {(unsigned char)word, (unsigned char)(word >> 8),
+                                   (unsigned char)(word >> 16), (unsigned char)(word >> 24)};
+    put_bytes(to, bytes, sizeof bytes);
+}
+
+static void put_real(writer *to, double real) {
+    uint64_t bits;
+    memcpy(&bits, &real, sizeof bits);
+    put_word(to, (uint32_t)bits);
+    put_word(to, (uint32_t)(bits >> 32));
+}
+
+static void put_reals(writer *to, const double reals[], size_t n) {
+    for (size_t i = 0; i < n; i++) put_real(to, reals[i]);
+}
+
+static void put_text(writer *to, string text) {
+    put_word(to, (uint32_t)strlen(text));
+    put_bytes(to, text, strlen(text));
+}
+
+static void put_noise(writer *to, const generator *noise) {
+    for (int i = 0; i < GENERATOR_WORDS; i++) put_word(to, noise->words[i]);
+    put_word(to, noise->place);
+    put_word(to, (uint32_t)noise->has_next);
+    put_real(to, noise->has_next ? noise->next : 0.0);
+}
+
+static void put_run(writer *to, const run *it) {
+    const moment *now = &it->moments[it->now];
+    uint32_t n_refused = 0;
+    put_text(to, MAGIC);
+    put_text(to, IDENTITY);
+    put_word(to, it->mode);
+    put_real(to, it->start_time);
+    put_real(to, it->time);
+    for (int i = 0; i < N_PORTS; i++) {
+        if (ports[i].causality != PARAMETER) continue;
+        double number = parameter(&it->parameters, &ports[i]);
+        if (ports[i].kind == REAL) {
+            put_real(to, number);
+        } else {
+            put_word(to, (uint32_t)(int32_t)number);
+        }
+    }
+    put_reals(to, it->inputs.values, MODEL_INPUTS);
+    put_reals(to, now->outputs.values, MODEL_OUTPUTS);
+    put_word(to, (uint32_t)it->begun);
+    if (it->begun) {
+        put_reals(to, now->state.values, MODEL_STATE);
+        if (MODEL_DRAWS > 0) put_noise(to, &it->noise);
+    }
+    put_word(to, (uint32_t)it->fault);
+    for (const refusal *one = it->refused; one != NULL; one = one->next) n_refused++;
+    put_word(to, n_refused);
+    for (const refusal *one = it->refused; one != NULL; one = one->next) {
+        put_text(to, one->what);
+        put_text(to, one->why);
+    }
+}
+
+static uint32_t crc32(const unsigned char *bytes, size_t n) {
+    /* Of the half bytes 0 to 15. */
+    static const uint32_t sums[] = {
+        0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4,
+        0x4db26158, 0x5005713c, 0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c,
+        0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c,
+    };
+    uint32_t sum = 0xffffffff;
+    for (size_t i = 0; i < n; i++) {
+        sum ^= bytes[i];
+        sum = sum >> 4 ^ sums[sum & 15];
+        sum = sum >> 4 ^ sums[sum & 15];
+    }
+    return ~sum;
+}
+
+static size_t content_size(const saved *state) {
+    return state->size < CHECKSUM_SIZE ? 0 : state->size - CHECKSUM_SIZE;
+}
+
+static void seal(saved *state) {
+    writer to = {state->bytes, content_size(state)};
+    put_word(&to, crc32(state->bytes, to.size));
+    state->sealed = 1;
+}
+
+/* Reading */
+
+typedef struct {
+    const unsigned char *bytes;
+    size_t left;
+    int short_of; /* more was wanted than there is */
+} reader;
+
+/* The next bytes; NULL if there are not as many. */
+static const unsigned char *take_bytes(reader *from, size_t n) {
+    const unsigned char *bytes = from->bytes;
+    from->short_of |= n > from->left;
+    if (from->short_of) return NULL;
+    from->bytes += n;
+    from->left -= n;
+    return bytes;
+}
+
+static uint32_t take_word(reader *from) {
+    const unsigned char *b = take_bytes(from, 4);
+    if (b == NULL) return 0;
+    return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
+}
+
+static int has_its_checksum(const saved *state) {
+    size_t size = content_size(state);
+    reader from = {.bytes = state->bytes + size, .left = CHECKSUM_SIZE};
+    return take_word(&from) == crc32(state->bytes, size);
+}
+
+static double take_real(reader *from) {
+    uint64_t lower = take_word(from), bits = lower | (uint64_t)take_word(from) << 32;
+    double real;
+    memcpy(&real, &bits, sizeof real);
+    return real;
+}
+
+static void take_reals(reader *from, double reals[], size_t n) {
+    for (size_t i = 0; i < n; i++) reals[i] = take_real(from);
+}
+
+/* A text that messages have room for, without a zero in it. */
+static int take_text(reader *from, char text[MOST_TEXT + 1]) {
+    uint32_t length = take_word(from);
+    const unsigned char *bytes = length <= MOST_TEXT ? take_bytes(from, length) : NULL;
+    if (bytes == NULL) return 0;
+    memcpy(text, bytes, length);
+    text[length] = '\0';
+    return strlen(text) == length && is_utf8(text);
+}
+
+/* Whether the next is a text. */
+static int take_this(reader *from, string text) {
+    char found[MOST_TEXT + 1];
+    return take_text(from, found) && strcmp(found, text) == 0;
+}
+
+/* What is saved in the place of a truth value, which is -1 if it is none. */
+static int take_truth(reader *from) {
+    uint32_t word = take_word(from);
+    return word <= 1 ? (int)word : -1;
+}
+
+static int good_values(const double values[], size_t n, const uint32_t references[],
+                       message *why) {
+    for (size_t i = 0; i < n; i++) {
+        if (!in_range(&ports[references[i]], values[i], why)) return 0;
+    }
+    return 1;
+}
+
+static int take_parameter(reader *from, parameter_values *values, const port *port, message *why) {
+    double number = port->kind == REAL ? take_real(from) : (int32_t)take_word(from);
+    if (port->kind == BOOLEAN && number != 0.0 && number != 1.0) {
+        return compose(why, "%s: must be a Boolean", port->name);
+    }
+    if (port->kind == STRING && text_of(port, number) == NULL) {
+        return compose(why, "%s: is none of the choices", port->name);
+    }
+    if (port->kind != STRING && !in_range(port, number, why)) return 0;
+    put_parameter(values, port, number);
+    return 1;
+}
+
+static int take_noise(reader *from, generator *noise, message *why) {
+    for (int i = 0; i < GENERATOR_WORDS; i++) noise->words[i] = take_word(from);
+    noise->place = take_word(from);
+    noise->has_next = take_truth(from);
+    noise->next = take_real(from);
+    if (noise->place > GENERATOR_WORDS || noise->has_next < 0) {
+        return compose(why, "its noise generator is in no state that it can be in");
+    }
+    return isfinite(noise->next) || compose(why, "its noise is not finite");
+}
+
+static int take_refusals(reader *from, run *it, message *why) {
+    char what[MOST_TEXT + 1], text[MOST_TEXT + 1];
+    for (uint32_t n = take_word(from); n > 0; n--) {
+        if (!take_text(from, what) || !take_text(from, text) ||
+            *find_refusal(it, what) != NULL) {
+            return compose(why, "what it refused is no text");
+        }
+        if (!note_refusal(it, what, text)) return compose(why, "no memory");
+    }
+    if (it->refused != NULL && !it->fault) {
+        return compose(why, "it refused something without a fault");
+    }
+    if (!it->begun && it->mode != INSTANTIATED && *find_refusal(it, INITIALISATION) == NULL) {
+        return compose(why, "it is initialised and has no state");
+    }
+    return 1;
+}
+
+static int are_zero(const double values[], size_t n) {
+    for (size_t i = 0; i < n; i++) {
+        if (values[i] != 0.0) return 0;
+    }
+    return 1;
+}
+
+/* A run that was saved, as far as a look at each of its parts can tell what is wrong with it. */
+static int take_run(reader *from, run *it, message *why) {
+    moment *now = &it->moments[it->now];
+    uint32_t number = take_word(from);
+    if (number > TERMINATED) return compose(why, "no mode is %u", number);
+    it->mode = (mode)number;
+    it->start_time = take_real(from);
+    it->time = take_real(from);
+    if (!isfinite(it->start_time) || isnan(it->time)) {
+        return compose(why, "a value is not finite");
+    }
+    if (it->mode < STEPPING && it->time != it->start_time) {
+        return compose(why, "it has another time than that of its start");
+    }
+    for (int i = 0; i < N_PORTS; i++) {
+        if (ports[i].causality == PARAMETER &&
+            !take_parameter(from, &it->parameters, &ports[i], why)) {
+            return 0;
+        }
+    }
+    take_reals(from, it->inputs.values, MODEL_INPUTS);
+    take_reals(from, now->outputs.values, MODEL_OUTPUTS);
+    if (!good_values(it->inputs.values, MODEL_INPUTS, input_references, why) ||
+        !good_values(now->outputs.values, MODEL_OUTPUTS, output_references, why)) {
+        return 0;
+    }
+    it->begun = take_truth(from);
+    if (it->mode == INSTANTIATED &&
+        (it->begun || !are_zero(now->outputs.values, MODEL_OUTPUTS))) {
+        return compose(why, "it has a state, or outputs, before the initialisation");
+    }
+    if (it->begun) {
+        take_reals(from, now->state.values, MODEL_STATE);
+        if (!all_finite(now->state.values, MODEL_STATE)) {
+            return compose(why, "a value is not finite");
+        }
+        if (MODEL_DRAWS > 0 && !take_noise(from, &it->noise, why)) return 0;
+    }
+    it->fault = take_truth(from);
+    if (it->fault < 0) return compose(why, "its fault is neither true nor false");
+    if (!take_refusals(from, it, why)) return 0;
+    return (!from->short_of && from->left == 0 && it->begun >= 0) ||
+           compose(why, "it has other parts");
+}
+
+static int nearly_equal(const double one[], const double other[], size_t n) {
+    for (size_t i = 0; i < n; i++) {
+        double larger = fmax(fabs(one[i]), fabs(other[i]));
+        if (!(fabs(one[i] - other[i]) <= NEAR * fmax(larger, 1.0))) return 0;
+    }
+    return 1;
+}
+
+/* Whether a run can have led to a state and outputs, all of them finite; what follows from the state
+ * is computed. */
+static int can_be_reached(run *it, message *why) {
+    const model_parameters *parameters = &it->parameters.model;
+    moment *now = &it->moments[it->now];
+    output_values expected;
+    Error error = {0};
+    model_check(parameters, &error);
+    if (!error.raised && !bounded(&now->state)) return compose(why, "beyond %g", LARGEST_STATE);
+    model_derive(parameters, &now->state.groups, &error);
+    model_expected(parameters, &now->state.groups, &now->outputs.groups, &expected.groups, &error);
+    if (error.raised) return compose(why, "%s", error.why);
+    if (MODEL_EXPECTS &&
+        !nearly_equal(expected.values, now->outputs.values, MODEL_OUTPUTS)) {
+        return compose(why, "its outputs are not those of its state");
+    }
+    return 1;
+}
+
+static int can_be_restored(const saved *state, run *it, message *why) {
+    reader from = {.bytes = state->bytes, .left = content_size(state)};
+    if (!take_this(&from, MAGIC)) return compose(why, "the bytes are not those of a state");
+    if (state->sealed && !has_its_checksum(state)) {
+        return compose(why, "the bytes were changed since they were written");
+    }
+    if (!take_this(&from, IDENTITY)) return compose(why, "not a state of %s", IDENTITY);
+    return take_run(&from, it, why) && (!it->begun || can_be_reached(it, why));
+}
+
+static int restore(instance *it, const saved *state, message *why) {
+    run wanted = new_run();
+    if (!can_be_restored(state, &wanted, why) ||
+        (wanted.begun && !adopt(it, &wanted.parameters, why))) {
+        release_run(&wanted);
+        return 0;
+    }
+    release_run(&it->run);
+    it->run = wanted;
+    /* Before the first step all follows from parameters and inputs, and is computed once more. */
+    it->stale = it->run.mode == INITIALISING;
+    return 1;
+}
+
+/* What the host does with states */
+
+/* The entry of a state, held; NULL: there is none, which is told. */
+static entry *held_state(call *this, void *state) {
+    int inside;
+    entry *it = hold(state, STATE, &inside);
+    if (it == NULL) sound(this, "not a live state of this FMU");
+    return it;
+}
+
+static void release_state(entry *it) {
+    if (it == NULL) return;
+    free(it->thing);
+    drop(it);
+}
+
+/* Whether there is a place for a state; `before` is the one that is there, held, or NULL. */
+static int has_place(call *this, void **state, entry **before) {
+    *before = NULL;
+    if (!sound(this, state == NULL ? "NULL" : NULL)) return 0;
+    return *state == NULL || (*before = held_state(this, *state)) != NULL;
+}
+
+/* Hands a state over to the host, in the place of one that it has had. */
+static void hand_over(call *this, saved *made, void **state, entry *before) {
+    if (before != NULL && made != NULL) {
+        free(before->thing);
+        before->thing = made;
+        give(before, this->entry);
+    } else if (made != NULL) {
+        *state = new_handle(STATE, made, this->entry);
+    }
+    if (before != NULL) let_go(before);
+    if (made == NULL || *state == NULL) {
+        free(made);
+        this->instance->no_memory = 1;
+    }
+}
+
+/* A state with room for some bytes; NULL: no memory. */
+static saved *new_saved(size_t size) {
+    saved *made = malloc(sizeof *made + size);
+    if (made != NULL) *made = (saved){.size = size};
+    return made;
+}
+
+static void get_state(call *this, void **state) {
+    writer to = {NULL, 0};
+    entry *before;
+    refresh(this->instance);
+    if (!has_place(this, state, &before)) return;
+    put_run(&to, &this->instance->run);
+    saved *made = new_saved(to.size + CHECKSUM_SIZE);
+    if (made != NULL) {
+        to = (writer){made->bytes, 0};
+        put_run(&to, &this->instance->run);
+    }
+    hand_over(this, made, state, before);
+}
+
+static void set_state(call *this, void *state) {
+    message why, said;
+    entry *held = held_state(this, state);
+    if (held == NULL) return;
+    int restored = restore(this->instance, held->thing, &why);
+    let_go(held);
+    this->instance->in_error = 0;
+    if (restored) return;
+    compose(&said, "state refused: %s", why.text);
+    refuse(this->instance, this->function, &said);
+}
+
+static void free_state(call *this, void **state) {
+    entry *before;
+    if (!has_place(this, state, &before)) return;
+    release_state(before);
+    *state = NULL;
+}
+
+static void size_of_state(call *this, void *state, size_t *size) {
+    if (!sound(this, size == NULL ? "NULL" : NULL)) return;
+    entry *held = held_state(this, state);
+    if (held == NULL) return;
+    *size = ((const saved *)held->thing)->size;
+    let_go(held);
+}
+
+static void serialise_state(call *this, void *state, unsigned char bytes[], size_t size) {
+    if (!sound(this, bytes == NULL ? "NULL" : NULL)) return;
+    entry *held = held_state(this, state);
+    if (held == NULL) return;
+    saved *it = held->thing;
+    int fits = size == it->size;
+    if (fits) {
+        if (!it->sealed) seal(it);
+        memcpy(bytes, it->bytes, size);
+    }
+    let_go(held);
+    sound(this, fits ? NULL : "the size is not that of the state");
+}
+
+static void deserialise_state(call *this, const unsigned char bytes[], size_t size, void **state) {
+    string wrong = bytes == NULL                     ? "NULL"
+                   : size == 0 || size > MOST_BYTES ? "no state has that size"
+                                                    : NULL;
+    entry *before;
+    if (!sound(this, wrong) || !has_place(this, state, &before)) return;
+    saved *made = new_saved(size);
+    if (made != NULL) {
+        memcpy(made->bytes, bytes, size);
+        made->sealed = 1;
+    }
+    hand_over(this, made, state, before);
+}

@@ -1,0 +1,111 @@
+"""C compilers, and what they make of the sources of an FMU."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+from fmus.packaging.loader import compiler
+from fmus.packaging.platforms import TARGETS, Platform, this_machine
+from fmus.packaging.universal import universal
+
+#: How sources are compiled. Contracted or reordered operations would change numbers.
+FLAGS = (
+    "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared", "-s",
+)  # fmt: skip
+
+#: Nothing here unwinds the stack, but for the C library of Windows, half of a library there, which
+#: is compiled with the same options: those for a small one.
+_NO_TABLES = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
+_SMALL = ("-Os",)
+
+#: For the linker of Linux: no trace of when and where, and no padding to whole pages.
+_LINUX = ("-Wl,--build-id=none", "-Wl,-z,noseparate-code")
+
+
+class Compiler(NamedTuple):
+    """A C compiler.
+
+    Attributes:
+        name: with its version.
+        command: that runs it, with options of its own.
+        targets: whether it makes libraries for all machines, and is told for which.
+
+    """
+
+    name: str
+    command: Sequence[str]
+    targets: bool
+
+
+def compiler_for(platforms: Sequence[Platform]) -> Compiler:
+    """The one that makes the libraries of all platforms: this machine's own if it can.
+
+    Raises:
+        OSError: there is none.
+
+    """
+    own = compiler()
+    others = [platform.name for platform in platforms if platform.machines != (this_machine(),)]
+    if own is not None and not others:
+        return Compiler(_version_of(own), [own, *_LINUX], targets=False)
+    if find_spec("ziglang") is not None:
+        command = [sys.executable, "-m", "ziglang", "cc"]
+        return Compiler(f"ziglang {version('ziglang')}", command, targets=True)
+    need = f"for {', '.join(others)}" if own is not None else "on this machine"
+    raise OSError(f"there is no C compiler {need}: pip install 'auv-fmu[native]' brings one")
+
+
+def _version_of(command: str) -> str:
+    process = subprocess.run([command, "--version"], capture_output=True, text=True, check=False)
+    return process.stdout.partition("\n")[0] or command
+
+
+def library(
+    compiler: Compiler, platform: Platform, name: str, sources: Mapping[str, bytes], main: str
+) -> bytes:
+    """The library of a platform.
+
+    Args:
+        compiler: that can make it.
+        platform: that it is for.
+        name: of the library, without its ending.
+        sources: by the names of their files.
+        main: the one that is compiled and includes the others.
+
+    Raises:
+        OSError: the compiler fails.
+
+    """
+    with TemporaryDirectory(prefix="auv_fmu_native_") as folder:
+        for file, content in sources.items():
+            Path(folder, file).write_bytes(content)
+        # A name without a folder, because the library may hold it.
+        made = Path(folder, f"{name}{platform.ending}")
+        libraries = []
+        for machine in platform.machines:
+            target = ("-target", TARGETS[machine]) if compiler.targets else ()
+            size = _SMALL if machine.endswith("-windows") else _NO_TABLES
+            options = [*target, *FLAGS, *size, "-o", made.name, main, "-lm"]
+            process = subprocess.run(
+                [*compiler.command, *options],
+                cwd=folder, capture_output=True, text=True, check=False,
+            )  # fmt: skip
+            if process.returncode != 0:
+                raise OSError(
+                    f"{compiler.name} makes no {name} for {machine}: {_complaint(process)}"
+                )
+            libraries.append(made.read_bytes())
+    return libraries[0] if len(libraries) == 1 else universal(libraries)
+
+
+def _complaint(process: subprocess.CompletedProcess[str]) -> str:
+    """The first thing that a compiler complains of."""
+    lines = process.stderr.strip().splitlines() or [f"exit status {process.returncode}"]
+    return next((line for line in lines if "error" in line), lines[0])

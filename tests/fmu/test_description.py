@@ -1,0 +1,208 @@
+"""What hosts read of the native kind, in both versions of FMI, beside the Python kind."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import attrs
+import fmpy
+import pytest
+from fmpy import read_model_description
+from fmpy.model_description import ModelDescription
+from fmpy.validation import validate_fmu
+from lxml import etree
+
+from fmus.packaging.discovery import components, package_folder
+from fmus.ports.description_fmi2 import fmi2_description
+from fmus.ports.description_fmi3 import fmi3_build_description, fmi3_description
+from fmus.ports.terminals import terminals_and_icons
+
+GUID = "{00000000-0000-0000-0000-000000000000}"
+
+MEMBER = "TerminalMemberVariable"
+SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
+
+#: Types of FMI 3.0 by the names of FMI 2.0, and what both versions say of a variable.
+TYPES = {"Float64": "Real", "Int32": "Integer"}
+SAID = (
+    "name", "valueReference", "description", "causality", "variability", "initial", "type",
+    "declaredType", "unit", "start", "min", "max",
+)  # fmt: skip
+
+#: In what the kinds differ.
+ITS_OWN = {"instantiationToken", "generationTool", "buildConfigurations"}
+
+
+def declared(name: str) -> ModuleType:
+    """The ports of a component, and what it is."""
+    return import_module(components()[name].replace(".slave", ".ports"))
+
+
+def everything(description: ModelDescription) -> dict[str, Any]:
+    """All that a host reads, without what depends on the layout of the file."""
+    return attrs.asdict(description, filter=lambda field, _: field.name != "sourceline")
+
+
+@pytest.fixture(scope="module", params=components())
+def python(request, dist: Path) -> ModelDescription:
+    return read_model_description(str(dist / f"{request.param}.fmu"))
+
+
+@pytest.fixture(scope="module")
+def fmi2(python: ModelDescription, tmp_path_factory) -> Path:
+    """A folder with what the native kind says of itself in FMI 2.0."""
+    name, path = python.modelName, tmp_path_factory.mktemp("fmi2")
+    content = fmi2_description(name, declared(name).DESCRIPTION, GUID, declared(name).PORTS)
+    (path / "modelDescription.xml").write_bytes(content)
+    return path
+
+
+@pytest.fixture(scope="module")
+def fmi3(python: ModelDescription, tmp_path_factory) -> Path:
+    """A folder with what the native kind says of itself in FMI 3.0."""
+    name, path = python.modelName, tmp_path_factory.mktemp("fmi3")
+    content = fmi3_description(name, declared(name).DESCRIPTION, GUID, declared(name).PORTS)
+    (path / "modelDescription.xml").write_bytes(content)
+    (path / "sources").mkdir()
+    (path / "sources" / "buildDescription.xml").write_bytes(fmi3_build_description(name))
+    (path / "terminalsAndIcons").mkdir()
+    terminals = path / "terminalsAndIcons" / "terminalsAndIcons.xml"
+    terminals.write_bytes(terminals_and_icons(declared(name).PORTS))
+    return path
+
+
+def test_description_of_fmi2_is_valid(fmi2: Path):
+    assert validate_fmu(str(fmi2)) == []
+
+
+def test_both_kinds_say_the_same(python: ModelDescription, fmi2: Path):
+    one, other = everything(python), everything(read_model_description(str(fmi2)))
+    assert len(one["modelVariables"]) == len(declared(python.modelName).PORTS) + 1
+    for variable, twin in zip(one["modelVariables"], other["modelVariables"], strict=True):
+        assert variable == twin
+    assert other.keys() == one.keys()
+    assert {key for key in other if other[key] != one[key]} == ITS_OWN
+
+
+def test_native_kind_tells_what_it_is(fmi2: Path):
+    native = read_model_description(str(fmi2))
+    assert native.guid == GUID
+    assert native.generationTool == f"auv-fmu {version('auv-fmu')}"
+    assert native.generationDateAndTime is None
+    [[sources]] = [build.sourceFileSets for build in native.buildConfigurations]
+    assert sources.sourceFiles == ["fmi2.c"]
+
+
+def test_description_of_fmi3_is_valid(fmi3: Path):
+    # Reads buildDescription.xml as well, against its schema.
+    assert validate_fmu(str(fmi3)) == []
+
+
+def test_sources_of_fmi3_are_one_file(fmi3: Path):
+    description = read_model_description(str(fmi3))
+    assert description.buildConfigurations
+    for build in description.buildConfigurations:
+        assert build.modelIdentifier == description.modelName
+        assert [files.sourceFiles for files in build.sourceFileSets] == [["fmi3.c"]]
+
+
+def values_of(variable: dict[str, Any]) -> dict[str, Any]:
+    """What both versions of FMI say of a variable, in the words of FMI 2.0."""
+    variable = {key: variable[key] for key in SAID}
+    variable["type"] = TYPES.get(variable["type"], variable["type"])
+    variable["declaredType"] = (variable["declaredType"] or {}).get("name")
+    return variable
+
+
+def test_both_versions_have_the_same_variables(fmi2: Path, fmi3: Path):
+    one, other = (
+        everything(read_model_description(str(p)))["modelVariables"] for p in (fmi2, fmi3)
+    )
+    *twins, time = other
+    assert (time["causality"], time["variability"], time["unit"], time["start"]) == (
+        "independent", "continuous", "s", None
+    )  # fmt: skip
+    for variable, twin in zip(one, twins, strict=True):
+        assert values_of(variable) == values_of(twin)
+
+
+def edges(description: ModelDescription, part: str) -> dict[str, set[str]]:
+    """What each unknown depends on, but for the time."""
+    return {
+        unknown.variable.name: {v.name for v in unknown.dependencies} - {"time"}
+        for unknown in getattr(description, part)
+    }
+
+
+@pytest.mark.parametrize("part", ["outputs", "initialUnknowns"])
+def test_both_versions_have_the_same_dependencies(fmi2: Path, fmi3: Path, part: str):
+    one, other = (edges(read_model_description(str(path)), part) for path in (fmi2, fmi3))
+    assert one
+    assert one == other
+
+
+def test_only_the_disturbance_depends_on_the_time(fmi3: Path):
+    description = read_model_description(str(fmi3))
+    found = {
+        unknown.variable.name.split(".")[0]
+        for unknown in (*description.outputs, *description.initialUnknowns)
+        if "time" in {known.name for known in unknown.dependencies}
+    }
+    assert found == ({"tau_w"} if description.modelName == "DisturbanceGenerator" else set())
+
+
+def terminals(name: str) -> dict[str, tuple[str, dict[str, str]]]:
+    """The rule of each terminal of a component, and the variables of its members."""
+    root = etree.fromstring(terminals_and_icons(declared(name).PORTS))
+    etree.XMLSchema(file=str(SCHEMA)).assertValid(root)
+    return {
+        terminal.get("name"): (
+            terminal.get("matchingRule"),
+            {
+                m.get("memberName"): m.get("variableName")
+                for m in terminal
+                if "memberName" in m.attrib
+            },
+        )
+        for terminal in root.iter("Terminal")
+    }
+
+
+def test_terminals_are_the_groups_of_inputs_and_outputs(fmi3: Path):
+    description = read_model_description(str(fmi3))
+    causality = {variable.name: variable.causality for variable in description.modelVariables}
+    joined = []
+    for name, (_, members) in terminals(description.modelName).items():
+        assert len({causality[variable] for variable in members.values()}) == 1
+        for member, variable in members.items():
+            assert variable in (f"{name}.{member}", f"{name}[{member}]")
+        joined += members.values()
+    connectable = [name for name in causality if causality[name] in ("input", "output")]
+    assert sorted([*joined, "fault"]) == sorted(connectable)
+
+
+def test_connecting_terminals_by_name_wires_the_closed_loop():
+    content = (package_folder("orchestrator") / "experiments" / "closed_loop.toml").read_text()
+    loop = tomllib.loads(content)
+    components_of = loop["components"]
+    fed = set()
+    for sink, source in loop["wires"].items():
+        (component, group), (other, origin) = sink.split("."), source.split(".")
+        assert group == origin
+        rule, members = terminals(components_of[component])[group]
+        _, offered = terminals(components_of[other])[group]
+        # A plug needs all of its members.
+        assert rule == "plug"
+        assert members.keys() <= offered.keys()
+        fed |= {(component, variable) for variable in members.values()}
+    assert fed == {
+        (component, port.name)
+        for component, name in components_of.items()
+        for port in declared(name).PORTS
+        if port.causality == "input"
+    }

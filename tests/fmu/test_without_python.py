@@ -1,0 +1,197 @@
+"""The FMUs in C where there is no Python: a bare root folder, Windows, ARM, and other builders."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from zipfile import ZipFile
+
+import fmpy
+import numpy as np
+import pytest
+
+from orchestrator.exchange import c_host
+from orchestrator.exchange.verify import verify
+from orchestrator.experiments.scenario import read_scenario
+from orchestrator.experiments.wiring import closed_loop
+from orchestrator.master.experiment import Experiment
+from orchestrator.system.component import Component
+from orchestrator.system.structure import System
+from support.instances import NAMES
+from support.runs import run
+
+#: Both controllers, so that all five FMUs are run.
+SCENARIOS = ("fig4", "fig5-pd")
+WHOLE, SHORT = Experiment(100.0, 0.02), Experiment(20.0, 0.02)
+
+#: What the linker and the C runtime put into every library.
+_OF_THE_RUNTIME = {"__gmon_start__", "_ITM_registerTMCloneTable", "_ITM_deregisterTMCloneTable"}
+
+NM, CMAKE, QEMU, WINE = map(shutil.which, ("nm", "cmake", "qemu-aarch64", "wine"))
+ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")
+
+needs_compiler = pytest.mark.skipif(c_host.compiler() is None, reason="there is no C compiler")
+needs_zig = pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
+each_scenario = pytest.mark.parametrize("scenario", SCENARIOS)
+
+
+def in_root() -> list[str]:
+    """What runs a command in another root folder; skips where that is not allowed."""
+    command = ["chroot"] if os.geteuid() == 0 else ["unshare", "-r", "chroot"]
+    if subprocess.run([*command, "/", "true"], capture_output=True, check=False).returncode != 0:
+        pytest.skip("the root folder may not be changed here")
+    return command
+
+
+def system_of(folder: Path, scenario: str) -> System:
+    return closed_loop(folder, read_scenario(scenario))
+
+
+def symbols(library: Path, option: str) -> set[str]:
+    """Names of dynamic symbols, without their versions."""
+    command = [str(NM), "-D", option, library]
+    said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    return {line.split()[-1].partition("@")[0] for line in said.splitlines()}
+
+
+def libraries_of(binary: Path) -> Iterator[Path]:
+    """The shared libraries that a binary is linked against, the loader too."""
+    said = subprocess.run(["ldd", binary], check=True, capture_output=True, text=True).stdout
+    return (Path(word) for word in said.split() if word.startswith("/"))
+
+
+@pytest.fixture(scope="module")
+def unpacked(native: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a folder of each FMU."""
+    folder = tmp_path_factory.mktemp("unpacked")
+    for name in NAMES:
+        fmpy.extract(native / f"{name}.fmu", unzipdir=folder / name)
+    return folder
+
+
+def place(folder: Path, platform: str, ending: str) -> c_host.Library:
+    """Where the libraries of a platform are below a folder."""
+
+    def library(component: Component) -> Path:
+        name = component.fmu.stem
+        return folder / name / "binaries" / platform / f"{name}{ending}"
+
+    return library
+
+
+@pytest.mark.skipif(NM is None, reason="there is no nm")
+@pytest.mark.parametrize("name", NAMES)
+def test_library_needs_the_c_library_and_its_mathematics_alone(unpacked: Path, name: str):
+    library = place(unpacked, "linux64", ".so")(Component(name, Path(name), None))
+    found = {path.name: path for path in libraries_of(library)}
+    given = {s for n, path in found.items() if n.startswith(("libc.", "libm."))
+             for s in symbols(path, "--defined-only")}  # fmt: skip
+    assert symbols(library, "--undefined-only") <= given | _OF_THE_RUNTIME
+    assert all(symbol.startswith("fmi2") for symbol in symbols(library, "--defined-only"))
+
+
+@needs_compiler
+@each_scenario
+def test_host_runs_where_there_is_nothing_but_a_c_library(
+    dist: Path, native: Path, unpacked: Path, tmp_path: Path, scenario: str
+):
+    """5,000 steps; the table is that of the FMUs in Python, with tolerance 0."""
+    root = in_root()
+    host = c_host.compiled(tmp_path)
+    system = system_of(native, scenario)
+    for component in system.components.values():
+        shutil.copytree(unpacked / component.fmu.stem, tmp_path / component.fmu.stem)
+    binaries = [host, *tmp_path.glob("*/binaries/linux64/*.so")]
+    for library in {found for binary in binaries for found in libraries_of(binary)}:
+        target = tmp_path / library.relative_to("/")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(library, target)
+    plan = c_host.plan(system, WHOLE, place(Path("/"), "linux64", ".so"))
+    c_host.run([*root, tmp_path, "/host"], tmp_path, plan, [])
+    said = verify(tmp_path / c_host.TABLE, system_of(dist, scenario), 0.0)
+    assert "to 100 s, in gauss-seidel order" in said
+
+
+def compiled_by_zig(target: str, ending: str, unpacked: Path, folder: Path, platform: str) -> Path:
+    """The host for another machine, with the libraries of all FMUs for it."""
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", target]
+    flags = ["-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "fmi2.c", "-lm"]
+    for name in NAMES:
+        made = folder / name / "binaries" / platform / f"{name}{ending}"
+        made.parent.mkdir(parents=True)
+        sources = unpacked / name / "sources"
+        subprocess.run([*command, *flags, "-o", made], cwd=sources, check=True)
+    return c_host.compiled(folder, command, f"host.{platform}")
+
+
+def run_elsewhere(
+    native: Path,
+    folder: Path,
+    scenario: str,
+    command: Sequence[str | Path],
+    library: c_host.Library,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of all Reals on another machine, and here."""
+    system = system_of(native, scenario)
+    here = run(system, SHORT.stop_time, SHORT.step)
+    names = [name for name in here.header.columns if not name.endswith(".fault")]
+    rows, _ = c_host.run(command, folder, c_host.plan(system, SHORT, library), names)
+    return rows, here.group(*names)
+
+
+@pytest.fixture(scope="module")
+def windows(unpacked: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("windows")
+    compiled_by_zig("x86_64-windows-gnu", ".dll", unpacked, folder, "win64")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def arm(unpacked: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("arm")
+    compiled_by_zig("aarch64-linux-gnu", ".so", unpacked, folder, "aarch64-linux")
+    return folder
+
+
+@needs_zig
+@pytest.mark.skipif(WINE is None, reason="there is no wine")
+@each_scenario
+def test_windows_gives_the_same_but_for_rounding(native: Path, windows: Path, scenario: str):
+    """Its C library has another sine."""
+    command = [str(WINE), windows / "host.win64"]
+    library = place(windows, "win64", ".dll")
+    there, here = run_elsewhere(system_of(native, scenario), windows, command, library)
+    np.testing.assert_allclose(there, here, rtol=0.0, atol=1e-9)
+
+
+@needs_zig
+@pytest.mark.skipif(QEMU is None, reason="there is no qemu-aarch64")
+@pytest.mark.skipif(not ARM_LIBRARIES.is_dir(), reason="there is no C library for ARM")
+@each_scenario
+def test_arm_gives_the_same_bit_for_bit(native: Path, arm: Path, scenario: str):
+    command = [str(QEMU), "-L", ARM_LIBRARIES, arm / "host.aarch64-linux"]
+    library = place(arm, "aarch64-linux", ".so")
+    there, here = run_elsewhere(system_of(native, scenario), arm, command, library)
+    np.testing.assert_array_equal(there, here)
+
+
+@pytest.mark.skipif(CMAKE is None, reason="there is no cmake")
+@each_scenario
+def test_fmpy_builds_the_same_from_the_sources_alone(native: Path, tmp_path: Path, scenario: str):
+    build = pytest.importorskip("fmpy.build").build_platform_binary
+    for name in NAMES:
+        folder = tmp_path / name
+        fmpy.extract(native / f"{name}.fmu", unzipdir=folder)
+        shutil.rmtree(folder / "binaries")
+        build(folder)
+        with ZipFile(tmp_path / f"{name}.fmu", "w") as archive:
+            for path in folder.rglob("*"):
+                archive.write(path, path.relative_to(folder))
+    ours, theirs = (run(system_of(folder, scenario), 20.0, 0.02) for folder in (native, tmp_path))
+    columns = ours.header.columns
+    np.testing.assert_array_equal(ours.group(*columns), theirs.group(*columns))

@@ -1,0 +1,89 @@
+"""The equations keep to the language that every kind of FMU can run: docs/language.md."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+from fmus.native.language import MATHEMATICS, OUTSIDE, foreign
+
+ROOT = Path(__file__).parents[2]
+EQUATIONS = [
+    *sorted((ROOT / "src/auv_fmu").glob("*.py")),
+    *sorted((ROOT / "fmus").glob("*/behaviour.py")),
+]
+
+
+@pytest.mark.parametrize("path", EQUATIONS, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_equations_keep_to_their_language(path):
+    assert [str(one) for one in foreign(path)] == []
+
+
+def test_what_stands_outside_is_there():
+    for name in OUTSIDE:
+        module, function = name.split(".")
+        tree = ast.parse((ROOT / f"src/auv_fmu/{module}.py").read_text(encoding="utf-8"))
+        assert function in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+
+def test_page_names_the_functions_and_what_stands_outside():
+    page = (ROOT / "docs/language.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"`math\.(\w+)`", page)) == MATHEMATICS | {"hypot"}
+    assert all(f"`{name}`" in page for name in OUTSIDE)
+
+
+@pytest.mark.parametrize(
+    ("line", "what"),
+    [
+        ("    return max(x, 1.0)", "the name max"),
+        ("    return hypot(x, 1.0)", "the name hypot"),
+        ("    return x**2", "the operator Pow"),
+        ("    return x // 2.0", "the operator FloorDiv"),
+        ("    return x % 2.0", "the operator Mod"),
+        ("    return sum(a * x for a in (1.0, 2.0))", "GeneratorExp"),
+        ("    return [x][0]", "List"),
+        ("    return (x, 1.0)[0:1]", "a subscript that is not a constant"),
+        ("    return x if x is x else 1.0", "a comparison other than of size"),
+        ("    return cos(x=x)", "a call with names of arguments"),
+        ("    return (lambda y: y)(x)", "Lambda"),
+        ("    return 1j", "the constant 1j"),
+        ("    for _ in (1, 2):\n        x = x + 1.0\n    return x", "For"),
+        ("    try:\n        return x\n    finally:\n        pass", "Try"),
+        ("    with x:\n        return x", "With"),
+        ("    x.y = 1.0\n    return x", "an assignment to Attribute"),
+        ("    global y\n    return x", "Global"),
+        ("    raise ValueError", "a raise without a text"),
+        ("    x: float = 1.0\n    return x", "AnnAssign"),
+    ],
+)  # fmt: skip
+def test_what_is_foreign_is_named_with_its_line(tmp_path, line, what):
+    path = tmp_path / "equation.py"
+    head = "from math import cos, hypot\n\n\ndef equation(x: float) -> float:\n"
+    path.write_text(head + line + "\n")
+    first, *_ = foreign(path)
+    assert str(first) == f"{path}:5: {what} is not in the language of equations"
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "what"),
+    [
+        ("def f(x=1.0):\n    return x\n", 1, "more than plain arguments of f"),
+        ("def f(x):\n    return x\n", 1, "an argument or a result of f without a type"),
+        ("class A:\n    x: float\n", 1, "the class A"),
+        ("x = 1.0\nfor y in (1, 2):\n    x = y\n", 2, "For at the level of the module"),
+        (
+            "from typing import NamedTuple\nclass A(NamedTuple):\n    x: float\n"
+            "    def f(self) -> float:\n        return self.x\n",
+            4,
+            "FunctionDef in the class A",
+        ),
+    ],
+)
+def test_what_is_foreign_in_a_module_is_named_with_its_line(tmp_path, text, line, what):
+    path = tmp_path / "equation.py"
+    path.write_text(text)
+    first, *_ = foreign(path)
+    assert str(first) == f"{path}:{line}: {what} is not in the language of equations"

@@ -1,0 +1,148 @@
+"""The equations of a component, compiled from their translation and called from Python."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Sequence
+from ctypes import CDLL, Structure, byref, c_char, c_char_p, c_double, c_int
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from tempfile import mkdtemp
+from types import ModuleType
+from typing import Any, get_args, get_origin, get_type_hints
+
+from fmus.native.translator import translated
+
+ROOT = Path(__file__).parents[2]
+RUNTIME = ROOT / "fmus/native/runtime"
+
+_SHIM = """
+#include "equations.c"
+#define OUT __attribute__((visibility("default")))
+OUT void check(model_parameters *p, Error *e) { model_check(p, e); }
+OUT void begin(model_parameters *p, model_inputs *i, double t, model_state *s, model_outputs *o,
+               Error *e) { model_begin(p, i, t, s, o, e); }
+OUT void advance(model_parameters *p, model_state *s, model_inputs *i, double t, double h, int n,
+                 model_outputs *o, Error *e) { model_advance(p, s, i, t, h, n, o, e); }
+OUT void derive(model_parameters *p, model_state *s, Error *e) { model_derive(p, s, e); }
+OUT void expected(model_parameters *p, model_state *s, model_outputs *o, model_outputs *x, Error *e)
+{ model_expected(p, s, o, x, e); }
+OUT int credible(model_parameters *p, model_state *s, model_inputs *i, Error *e)
+{ return model_credible(p, s, i, e); }
+OUT void restart(model_parameters *p, model_state *s, model_inputs *i, Error *e)
+{ model_restart(p, s, i, e); }
+OUT void measure(model_parameters *p, double *n, model_outputs *o) { model_measure(p, n, o); }
+OUT unsigned long seed(model_parameters *p) { return model_seed(p); }
+OUT const char *restarted(void) { return MODEL_RESTARTED; }
+"""
+
+FLAGS = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-Wno-unused-function")
+
+
+class Error(Structure):
+    """The Error of arithmetic.h."""
+
+    _fields_ = (("raised", c_int), ("why", c_char * 256))
+
+
+@cache
+def structure(kind: Any) -> Any:
+    """A type of the equations as ctypes has it."""
+    if kind is float:
+        return c_double
+    if kind in (int, bool):
+        return c_int
+    if get_origin(kind) is tuple:
+        parts = [(f"x{i}", structure(k)) for i, k in enumerate(get_args(kind))]
+    else:
+        parts = [(name, structure(k)) for name, k in get_type_hints(kind).items()]
+    return type("Part", (Structure,), {"_fields_": parts})
+
+
+def filled(kind: Any, value: Any) -> Any:
+    """A value in a structure of its type."""
+    made = structure(kind)
+    if not issubclass(made, Structure):
+        return made(value)
+    kinds = get_args(kind) if get_origin(kind) is tuple else get_type_hints(kind).values()
+    values = value.values() if isinstance(value, dict) else value
+    return made(*(filled(k, v) for k, v in zip(kinds, values, strict=True)))
+
+
+def flat(value: Any) -> list[float]:
+    """All numbers of a value, of a structure of ctypes or of a tuple."""
+    if isinstance(value, Structure):
+        value = [getattr(value, name) for name, *_ in value._fields_]
+    elif isinstance(value, dict):
+        value = value.values()
+    if isinstance(value, (float, int)):
+        return [value]
+    return [number for part in value for number in flat(part)]
+
+
+class Equations:
+    """A component's functions in both languages."""
+
+    def __init__(self, package: str) -> None:
+        self.behaviour: ModuleType = import_module(f"{package}.behaviour")
+        folder = Path(mkdtemp(prefix="auv_fmu_equations_"))
+        (folder / "equations.c").write_text(translated(package))
+        (folder / "shim.c").write_text(_SHIM)
+        command = ["cc", *FLAGS, "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-I", str(RUNTIME)]
+        library = folder / "equations.so"
+        subprocess.run([*command, "-o", library, folder / "shim.c", "-lm"], check=True)
+        self.library = CDLL(str(library))
+        self.library.restarted.restype = c_char_p
+        hints = {
+            **get_type_hints(self.behaviour.begin),
+            **get_type_hints(self.behaviour.advance),
+        }
+        self.parameters, self.state = hints["parameters"], hints["state"]
+        self.inputs = hints.get("inputs", tuple[()])
+        self.derived = hints.get("derived")
+        self.outputs = self.behaviour.Outputs
+        kinds = [self.state, self.derived] if self.derived else [self.state]
+        parts = [(f"x{i}", structure(kind)) for i, kind in enumerate(kinds)]
+        self._kept = type("Kept", (Structure,), {"_fields_": parts})
+
+    def kept(self, state: Any = None) -> Any:
+        """The state as the component keeps it: what is derived from it is not filled in."""
+        made = self._kept()
+        if state is not None:
+            made.x0 = filled(self.state, state)
+        return made
+
+    def result(self, name: str, *arguments: Any) -> int:
+        """What a function gives that raises nothing."""
+        error = Error()
+        result: int = getattr(self.library, name)(*_passed(arguments), byref(error))
+        assert not error.raised
+        return result
+
+    def call(self, name: str, *arguments: Any) -> str:
+        """Call a function with structures and numbers; what it raised."""
+        error = Error()
+        getattr(self.library, name)(*_passed(arguments), byref(error))
+        return error.why.decode() if error.raised else ""
+
+    def python(self, name: str, **given: Any) -> Any:
+        """Call the function of the same name with those arguments that it has."""
+        function = getattr(self.behaviour, name)
+        return function(**{n: given[n] for n in get_type_hints(function) if n != "return"})
+
+
+def _passed(arguments: Sequence[Any]) -> list[Any]:
+    kinds = {float: c_double, int: c_int}
+    return [kinds[type(a)](a) if type(a) in kinds else byref(a) for a in arguments]
+
+
+@cache
+def equations(package: str) -> Equations:
+    """Compiled once a run of the tests."""
+    return Equations(package)
+
+
+def bits(numbers: Sequence[float]) -> list[str]:
+    """Numbers by their bits, but for NaN, of which there is one."""
+    return [float(number).hex() for number in numbers]

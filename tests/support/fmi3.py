@@ -1,0 +1,153 @@
+"""An FMU of FMI 3.0 behind the functions of FMI 2.0.
+
+Most of what docs/status.md says holds under the names of both versions; so what is tried on an FMU
+of FMI 2.0 is tried on one of FMI 3.0 by the same tests.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from ctypes import CDLL, byref, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint8, c_void_p
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import fmpy
+
+from support.raw import Description, Library, Variable
+from support.raw_fmi import MODEL_EXCHANGE
+from support.status_table import names_in_fmi3
+
+Logger = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
+
+_KINDS = {"Float64": "Real", "Int32": "Integer", "Boolean": "Boolean", "String": "String"}
+
+#: Start time, whether there is a stop time, and which, as fmi2SetupExperiment takes them.
+_NO_EXPERIMENT = (0, c_double(0.0), c_double(0.0), 0, c_double(0.0))
+
+
+def read_description(folder: Path) -> Description:
+    """modelDescription.xml in the words of FMI 2.0; the time is one more variable."""
+    root = ElementTree.parse(folder / "modelDescription.xml").getroot()
+    implementation, variables = root.find("CoSimulation"), root.find("ModelVariables")
+    assert implementation is not None and variables is not None
+    return Description(
+        root.attrib["modelName"],
+        root.attrib["instantiationToken"],
+        implementation.attrib["modelIdentifier"],
+        tuple(map(_variable, variables)),
+    )
+
+
+def _variable(element: ElementTree.Element) -> Variable:
+    kind = _KINDS[element.tag]
+    text = element.find("Start")
+    start = element.get("start") if text is None else text.get("value")
+    convert = {"Real": float, "Integer": int, "Boolean": "true".__eq__, "String": str}[kind]
+    limits = [element.get("min"), element.get("max")]
+    return Variable(
+        element.attrib["name"],
+        int(element.attrib["valueReference"]),
+        kind,
+        element.attrib["causality"],
+        element.attrib["variability"],
+        None if start is None else convert(start),
+        *(None if limit is None else float(limit) for limit in limits),
+    )
+
+
+class Fmi3Library(Library):
+    """The functions of an unpacked FMU of FMI 3.0, as those of FMI 2.0."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.description = read_description(folder)
+        library = f"{self.description.identifier}{fmpy.sharedLibraryExtension}"
+        self.own = CDLL(str(folder / "binaries" / fmpy.platform_tuple / library))
+        for name in ("CoSimulation", "ModelExchange", "ScheduledExecution"):
+            getattr(self.own, f"fmi3Instantiate{name}").restype = c_void_p
+        self.own.fmi3FreeInstance.restype = None
+        self.own.fmi3GetVersion.restype = c_char_p
+        self.functions: Any = _Functions(self.own)
+
+
+class _Functions:
+    """Has fmi2DoStep and the others as attributes."""
+
+    def __init__(self, library: CDLL) -> None:
+        self._library = library
+        self._loggers: list[Any] = []
+        self._experiments: dict[Any, tuple[Any, ...]] = {}
+
+    def fmi2Instantiate(
+        self, name: c_char_p, kind: int, guid: c_char_p, _location: c_char_p,
+        callbacks: Any, visible: int, logging: int,
+    ) -> Any:  # fmt: skip
+        logger = self._logger(callbacks)
+        before = (name, guid, None, c_bool(visible), c_bool(logging))
+        if kind == MODEL_EXCHANGE:
+            return self._library.fmi3InstantiateModelExchange(*before, None, logger)
+        no_events = (c_bool(False), c_bool(False), None, c_size_t(0))
+        return self._library.fmi3InstantiateCoSimulation(*before, *no_events, None, logger, None)
+
+    def _logger(self, callbacks: Any) -> Any:
+        told = callbacks._obj.logger if callbacks is not None else None
+        if not told:
+            return Logger()
+        logger = Logger(
+            lambda environment, status, category, text: told(
+                environment, None, status, category, text
+            )
+        )
+        self._loggers.append(logger)
+        return logger
+
+    def fmi2FreeInstance(self, component: c_void_p) -> None:
+        self._library.fmi3FreeInstance(component)
+
+    # FMI 3.0 has one function for both.
+
+    def fmi2SetupExperiment(self, component: c_void_p, *experiment: Any) -> int:
+        self._experiments[component.value] = experiment
+        return 0
+
+    def fmi2EnterInitializationMode(self, component: c_void_p) -> int:
+        has_tolerance, tolerance, start, has_stop, stop = self._experiments.pop(
+            component.value, _NO_EXPERIMENT
+        )
+        entered: int = self._library.fmi3EnterInitializationMode(
+            component, c_bool(has_tolerance), tolerance, start, c_bool(has_stop), stop
+        )
+        return entered
+
+    def fmi2DoStep(self, component: c_void_p, time: c_double, h: c_double, no_set: int) -> int:
+        told = [c_bool(True) for _ in range(3)]
+        reached = c_double()
+        status: int = self._library.fmi3DoStep(
+            component, time, h, c_bool(no_set), *map(byref, told), byref(reached)
+        )
+        assert status or not any(told), "events, an end or an early return, which there are none of"
+        return status
+
+    # A boolean has one byte.
+
+    def fmi2SetBoolean(self, component: c_void_p, references: Any, n: c_size_t, values: Any) -> int:
+        given = None if values is None else (c_uint8 * len(values))(*(v & 0xFF for v in values))
+        status: int = self._library.fmi3SetBoolean(component, references, n, given, n)
+        return status
+
+    def fmi2GetBoolean(self, component: c_void_p, references: Any, n: c_size_t, values: Any) -> int:
+        got = None if values is None else (c_uint8 * len(values))(*(v & 0xFF for v in values))
+        status: int = self._library.fmi3GetBoolean(component, references, n, got, n)
+        for i in range(len(got or ())):
+            values[i] = got[i]
+        return status
+
+    def __getattr__(self, name: str) -> Callable[..., int]:
+        function = getattr(self._library, names_in_fmi3()[name])
+        if name.endswith(("Real", "Integer", "String")):
+            return lambda component, references, n, values: function(
+                component, references, n, values, n
+            )
+        return function  # type: ignore[no-any-return]

@@ -1,0 +1,186 @@
+"""Serialised states of FMUs in C, read as what the JSON of the Python kind says, and written."""
+
+from __future__ import annotations
+
+import struct
+from binascii import crc32
+from collections.abc import Sequence
+from functools import cache
+from importlib import import_module
+from typing import Any, NamedTuple
+
+from fmus.packaging.discovery import components
+from fmus.ports.port import Port
+from support.status_table import MODES
+
+CHECKSUM = "checksum"
+
+MAGIC = "FMU state 1"
+
+#: Lengths of the groups of numbers that a state consists of, 0: of a number in no group.
+_SHAPES = {
+    "AuvPlant": (3, 4, 6),
+    "DisturbanceGenerator": (),
+    "MotionPlanner": (3, 0, 0, 5),
+    "ObserverController": (3, 3, 4),
+    "PdController": (4,),
+}
+
+#: Which keep a generator of noise: words of its state and the place of the next, of its kind.
+_NOISY, _WORDS, _VERSION = "AuvPlant", 625, 3
+
+
+class NativeState(dict[str, Any]):
+    """What a state of an FMU in C says."""
+
+
+class Unwritable(ValueError):
+    """What a state of this kind has no place for."""
+
+
+class _Layout(NamedTuple):
+    name: str
+    parameters: Sequence[Port]
+    inputs: int
+    outputs: int
+
+
+@cache
+def _layout(name: str) -> _Layout:
+    ports: Sequence[Port] = import_module(f"{components()[name].rpartition('.')[0]}.ports").PORTS
+    of = {
+        causality: [port for port in ports if port.causality == causality]
+        for causality in ("input", "output", "parameter")
+    }
+    return _Layout(name, of["parameter"], len(of["input"]), len(of["output"]))
+
+
+class _Reader:
+    def __init__(self, content: bytes) -> None:
+        self.content, self.place = content, 0
+
+    def bytes(self, n: int) -> bytes:
+        found = self.content[self.place : self.place + n]
+        if len(found) != n:
+            raise ValueError("too short")
+        self.place += n
+        return found
+
+    def words(self, n: int) -> list[int]:
+        return [*struct.unpack(f"<{n}I", self.bytes(4 * n))]
+
+    def word(self) -> int:
+        return self.words(1)[0]
+
+    def reals(self, n: int) -> list[float]:
+        return [*struct.unpack(f"<{n}d", self.bytes(8 * n))]
+
+    def real(self) -> float:
+        return self.reals(1)[0]
+
+    def text(self) -> str:
+        return self.bytes(self.word()).decode()
+
+
+def read(content: bytes) -> NativeState | None:
+    """What a state says, if these are the bytes of one; the checksum is not held against them."""
+    try:
+        return _read(_Reader(content))
+    except (ValueError, LookupError):
+        return None
+
+
+def _read(source: _Reader) -> NativeState | None:
+    if source.text() != MAGIC:
+        return None
+    identity = source.text()
+    layout = _layout(identity.split()[0])
+    mode, start_time, time = source.word(), source.real(), source.real()
+    parameters = {port.name: _parameter(source, port) for port in layout.parameters}
+    said = NativeState(
+        identity=identity,
+        mode=MODES[mode],
+        start_time=start_time,
+        time=time,
+        parameters=parameters,
+        inputs=source.reals(layout.inputs),
+        outputs=source.reals(layout.outputs),
+        state=None,
+        hidden=None,
+    )
+    if source.word():
+        said["state"] = [source.reals(n) if n else source.real() for n in _SHAPES[layout.name]]
+        if layout.name == _NOISY:
+            words, has_next, following = source.words(_WORDS), source.word(), source.real()
+            said["hidden"] = [_VERSION, words, following if has_next else None]
+    said["fault"] = bool(source.word())
+    said["refused"] = {source.text(): source.text() for _ in range(source.word())}
+    said[CHECKSUM] = source.word()
+    return said
+
+
+def _parameter(source: _Reader, port: Port) -> Any:
+    if port.kind == "Real":
+        return source.real()
+    [number] = struct.unpack("<i", source.bytes(4))
+    if port.kind == "String":
+        return [*port.choices][number]
+    return bool(number) if port.kind == "Boolean" else number
+
+
+def resealed(content: bytes) -> bytes:
+    """Bytes with a checksum that fits in the place of the one that they have."""
+    rest = content[:-4]
+    return rest + struct.pack("<I", crc32(rest))
+
+
+def written(said: NativeState) -> bytes:
+    """Bytes that say something.
+
+    Raises:
+        Unwritable: there is no place for it.
+
+    """
+    try:
+        return _written(said)
+    except (struct.error, ValueError, LookupError, TypeError, AttributeError) as error:
+        raise Unwritable(str(error)) from error
+
+
+def _written(said: NativeState) -> bytes:
+    identity, refused = said["identity"], said["refused"]
+    layout = _layout(identity.split()[0])
+    parts = [
+        _text(MAGIC),
+        _text(identity),
+        _words(MODES.index(said["mode"])),
+        _reals(said["start_time"], said["time"]),
+    ]
+    for port in layout.parameters:
+        value = said["parameters"][port.name]
+        if port.kind == "String":
+            value = [*port.choices].index(value)
+        parts.append(_reals(value) if port.kind == "Real" else struct.pack("<i", value))
+    parts += [_reals(*said["inputs"]), _reals(*said["outputs"]), _words(said["state"] is not None)]
+    if said["state"] is not None:
+        for group in said["state"]:
+            parts.append(_reals(*group) if isinstance(group, list) else _reals(group))
+        if layout.name == _NOISY:
+            _, words, following = said["hidden"]
+            parts += [_words(*words, following is not None), _reals(following or 0.0)]
+    parts += [_words(said["fault"], len(refused))]
+    parts += [_text(text) for item in refused.items() for text in item]
+    return b"".join(parts) + _words(said[CHECKSUM])
+
+
+def _text(text: str) -> bytes:
+    content = text.encode()
+    return _words(len(content)) + content
+
+
+def _words(*words: int) -> bytes:
+    return struct.pack(f"<{len(words)}I", *words)
+
+
+def _reals(*reals: float) -> bytes:
+    return struct.pack(f"<{len(reals)}d", *reals)

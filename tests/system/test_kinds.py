@@ -1,0 +1,184 @@
+"""Both kinds of FMUs are one: the same rows to the bit, the same refusals at the same time."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import auv_fmu
+import fmus
+from fmus.ports.port import Port
+from orchestrator.experiments.scenario import names, read_scenario
+from orchestrator.master.experiment import ORDERS, Experiment
+from support.instances import component
+from support.kinds import Outcome, difference, outcome
+
+STEP = 0.02
+
+#: Scenarios with each of the controllers, and the FMUs of their components.
+FMUS_OF = {
+    "fig4": {
+        "plant": "AuvPlant",
+        "controller": "ObserverController",
+        "disturbance": "DisturbanceGenerator",
+        "planner": "MotionPlanner",
+    },
+    "fig5-pd": {
+        "plant": "AuvPlant",
+        "controller": "PdController",
+        "disturbance": "DisturbanceGenerator",
+        "planner": "MotionPlanner",
+    },
+}
+each_controller = pytest.mark.parametrize("scenario", FMUS_OF)
+
+
+def both(
+    dist: Path,
+    native: Path,
+    scenario: str,
+    experiment: Experiment,
+    values: dict[str, object] | None = None,
+) -> Outcome:
+    """What a run comes to on either kind of FMUs."""
+    ours, theirs = (
+        outcome(folder, scenario, values or {}, experiment) for folder in (dist, native)
+    )
+    assert difference(ours, theirs) == ""
+    return ours
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("scenario", names())
+def test_scenario_is_the_same_to_its_end(dist: Path, native: Path, scenario: str, order: str):
+    stop_time = read_scenario(scenario).stop_time
+    assert stop_time is not None
+    both(dist, native, scenario, Experiment(stop_time, STEP, order))
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize(
+    ("scenario", "values"),
+    [
+        ("fig4", {"controller.saturation": "algebraic"}),
+        ("fig5", {"controller.saturation": "algebraic"}),
+        ("fig4", {"controller.printed_jacobian": True}),
+        ("fig5-pd", {"controller.printed_jacobian": True}),
+        ("fig4", {"controller.innovation_gate": 0.0}),
+        ("fig4", {"plant.noise.std": 0.0}),
+    ],
+    ids=str,
+)
+def test_choices_are_the_same(dist: Path, native: Path, scenario, values, order):
+    assert both(dist, native, scenario, Experiment(10.0, STEP, order), values).failure is None
+
+
+@pytest.mark.parametrize("seed", [-(2**31), -1, 0, 2, 2**31 - 1])
+def test_noise_of_other_seeds_is_the_same(dist: Path, native: Path, seed: int):
+    values = {"plant.noise.seed": seed, "plant.noise.std": 0.01}
+    both(dist, native, "fig4", Experiment(10.0, STEP), values)
+
+
+@each_controller
+@pytest.mark.parametrize("step", [0.001, 0.0137, 0.04, 0.1, 0.33])
+def test_other_steps_are_the_same(dist: Path, native: Path, scenario: str, step: float):
+    """Above 0.02 s, h_max, components split them."""
+    both(dist, native, scenario, Experiment(min(2000 * step, 20.0), step))
+
+
+def varied(scenario: str) -> st.SearchStrategy[dict[str, float]]:
+    """Values of some parameters, most about as large as they are, some as no vehicle has them."""
+    ports = [
+        (f"{instance}.{port.name}", port)
+        for instance, name in FMUS_OF[scenario].items()
+        for port in component(name).ports
+        if port.causality == "parameter" and port.kind == "Real"
+    ]
+    factors = st.floats(0.3, 3.0) | st.floats(0.9, 1.1) | st.sampled_from([1e-9, 1e6, 1e150, 1e300])
+    chosen = st.lists(st.tuples(st.sampled_from(ports), factors), min_size=1, max_size=6)
+    return chosen.map(lambda all_: {name: scaled(port, f) for (name, port), f in all_})
+
+
+def scaled(port: Port, factor: float) -> float:
+    assert isinstance(port.start, float)
+    value = (port.start or 0.5) * factor
+    value = value if port.minimum is None else max(value, port.minimum)
+    return value if port.maximum is None else min(value, port.maximum)
+
+
+@each_controller
+def test_runs_with_any_parameters_are_the_same(dist: Path, native: Path, scenario: str):
+    @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
+    @given(varied(scenario), st.sampled_from([STEP, 0.05]))
+    def hold(values: dict[str, float], step: float) -> None:
+        both(dist, native, scenario, Experiment(40 * step, step), dict(values))
+
+    hold()
+
+
+#: Parameters that end in a refusal, and when [s]; None: before the first step.
+REFUSED = [
+    ("fig4", {"plant.m11": 1e-9}, 0.1),
+    ("fig4", {"plant.righting.pitch": 1e12}, 0.18),
+    ("fig4", {"controller.gamma": 1e6}, 1.5),
+    ("fig4", {"controller.sigma": 1e300}, 0.02),
+    ("fig4", {"controller.lambda": 1e300}, None),
+    ("fig4", {"disturbance.omega_d": 1e308}, 1.8),
+    ("fig4", {"planner.righting.pitch": -1e3}, 1.34),
+    ("fig4", {"planner.d55": 1e5}, 0.08),
+    ("fig4", {"plant.ell": 1e200}, None),
+    ("fig5-pd", {"controller.gamma": 1e200}, 0.0),
+]
+
+
+@pytest.mark.parametrize(("scenario", "values", "time"), REFUSED, ids=str)
+def test_refusals_are_the_same(dist: Path, native: Path, scenario, values, time):
+    failure = both(dist, native, scenario, Experiment(3.0, STEP), values).failure
+    expected = "initialisation refused" if time is None else f"stopped at t = {time:g} s: "
+    assert failure is not None
+    assert expected in failure
+
+
+# One text for both
+
+
+def build(folder: Path, packages: Path, kind: str) -> Path:
+    """Build FMUs of a kind from the sources in a folder, in a process of its own."""
+    subprocess.run(
+        [sys.executable, "-m", "fmus.packaging.build", "--kind", kind, "--out", str(folder)],
+        env={**os.environ, "PYTHONPATH": str(packages)},
+        check=True, capture_output=True, cwd=packages,
+    )  # fmt: skip
+    return folder
+
+
+def test_constant_that_is_changed_in_one_equation_changes_both_kinds(dist, native, tmp_path):
+    packages = tmp_path / "packages"
+    for package in (auv_fmu, fmus):
+        [folder] = package.__path__
+        ignored = shutil.ignore_patterns("dist", "*.pyc")
+        shutil.copytree(folder, packages / package.__name__, ignore=ignored)
+    equations = packages / "auv_fmu" / "disturbance.py"
+    text = equations.read_text()
+    assert text.count("A_f * sign(u)") == 1
+    equations.write_text(text.replace("A_f * sign(u)", "1.0000001 * A_f * sign(u)"))
+    runs = {
+        (kind, what): outcome(folder, "fig4", {}, Experiment(0.2, STEP))
+        for kind, what, folder in (
+            ("python", "as it is", dist),
+            ("native", "as it is", native),
+            ("python", "changed", build(tmp_path / "python", packages, "python")),
+            ("native", "changed", build(tmp_path / "native", packages, "native")),
+        )
+    }
+    assert difference(runs["python", "changed"], runs["native", "changed"]) == ""
+    for one, other in (("python", "native"), ("native", "python"), ("python", "python")):
+        found = difference(runs[one, "as it is"], runs[other, "changed"])
+        assert found.startswith("disturbance.tau_w.u at t = 0")

@@ -1,0 +1,105 @@
+"""The translation as a text: complete, reproducible, and refused where it cannot be made."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fmus.native.shapes import plain
+from fmus.native.translator import translated
+from fmus.packaging.discovery import components
+from support.equations import FLAGS, ROOT, RUNTIME
+
+PACKAGES = [module.removesuffix(".slave") for module in components().values()]
+
+every = pytest.mark.parametrize("package", PACKAGES)
+
+
+@every
+def test_every_process_writes_the_same(package):
+    process = subprocess.run(
+        [sys.executable, "-m", "fmus.native.translator", package],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={"PYTHONHASHSEED": "7"},
+    )
+    assert process.stdout == translated(package)
+
+
+@every
+def test_it_has_no_memory_and_no_variable_outside_of_functions(package):
+    text = translated(package)
+    assert not re.search(r"\b(malloc|calloc|realloc|free|alloca)\b", text)
+    outside = [
+        line for line in text.splitlines() if re.match(r"static (?!const\b).*[^{;]*=.*;", line)
+    ]
+    assert outside == []
+
+
+@every
+def test_lines_can_be_read(package):
+    """But for texts, which are not broken."""
+    long = [line for line in translated(package).splitlines() if len(line) > 100]
+    assert all('"' in line for line in long)
+
+
+@every
+@pytest.mark.parametrize("standard", ["c99", "c11", "gnu17"])
+def test_it_is_c_without_warnings(package, standard, tmp_path):
+    path = tmp_path / "equations.c"
+    path.write_text(translated(package))
+    flags = [f"-std={standard}", *FLAGS[1:], "-Wshadow=local", "-Wconversion"]
+    subprocess.run(["cc", *flags, "-I", str(RUNTIME), "-fsyntax-only", str(path)], check=True)
+
+
+@every
+def test_each_function_has_its_docstring_above_it(package):
+    text, seen = translated(package), 0
+    for path in (ROOT / "src/auv_fmu").glob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if not isinstance(node, ast.FunctionDef) or node.name.startswith("_"):
+                continue
+            head = re.search(rf"\n\n(/\*[^\0]*?\*/)\nstatic \w+ {path.stem}_{node.name}\(", text)
+            if head:
+                first, *_ = (ast.get_docstring(node) or "").splitlines()
+                above = head[1].rpartition("\n\n")[2]
+                assert above.startswith(f"/* {plain(first)}"), node.name
+                seen += 1
+    assert seen > 0
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("def begin(parameters: A) -> A:\n    return begin(parameters)\n", "begin calls itself"),
+        ("def begin(t: int, h: int) -> A:\n    return A(t / h)\n", "a division of whole numbers"),
+        ("def begin(parameters: A) -> A:\n    return A(parameters.y)\n", "10: y is no field here"),
+        ("def begin(parameters: A) -> A:\n    return A(1.0, 2.0)\n", "10: 2 values for 1 fields"),
+        ("def begin(state: A) -> A:\n    x, y = state\n    return A(x)\n", "2 names for 1 values"),
+        ("def begin(parameters: A) -> A:\n    return A(max(1.0, 2.0))\n", "10: the name max"),
+        ("def begin(parameters: list[float]) -> A:\n    return A(1.0)\n", "is no type"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_translated_is_named(tmp_path: Path, text, why):
+    package = tmp_path / "own"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    head = "from __future__ import annotations\n\nfrom typing import NamedTuple\n\n\n"
+    head += "class A(NamedTuple):\n    x: float\n\n"
+    advance = "\n\ndef advance(parameters: A, state: A) -> A:\n    return A(1.0)\n"
+    (package / "behaviour.py").write_text(head + text + advance)
+    code = "from fmus.native.translator import translated; translated('own')"
+    process = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert why in process.stderr.splitlines()[-1]

@@ -1,0 +1,102 @@
+"""What FMI 3.0 asks for, beside what is written of a few ports."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+from auv_fmu import __version__
+from fmus.ports.description_fmi3 import fmi3_build_description, fmi3_description
+from fmus.ports.port import FAULT, TIME, Port, inputs, outputs, parameter
+
+A = inputs("a", {"x": "m"}, "Place")[0]
+PORTS = (
+    A,
+    *outputs("y", {"x": "m"}, "Output", (A, TIME)),
+    parameter("k", 0.25, "1", "Gain", 0.0, 1e3, tunable=True),
+    Port("n", "parameter", "fixed", "Integer", "Number", start=-3),
+    Port("on", "parameter", "fixed", "Boolean", "Switch", start=True),
+    Port("kind", "parameter", "fixed", "String", "Kind", start="Soft", choices={"Soft": 1}),
+)
+
+DESCRIPTION = """
+<fmiModelDescription fmiVersion="3.0" modelName="It" instantiationToken="{1}" description="A thing"
+  author="auv-fmu" version="VERSION" license="MIT" generationTool="auv-fmu VERSION"
+  variableNamingConvention="structured">
+  <CoSimulation modelIdentifier="It" needsExecutionTool="false"
+    canBeInstantiatedOnlyOncePerProcess="false" canHandleVariableCommunicationStepSize="true"
+    canGetAndSetFMUState="true" canSerializeFMUState="true"/>
+  <UnitDefinitions>
+    <Unit name="1"><BaseUnit/></Unit>
+    <Unit name="m"><BaseUnit m="1"/></Unit>
+    <Unit name="s"><BaseUnit s="1"/></Unit>
+  </UnitDefinitions>
+  <TypeDefinitions>
+    <Float64Type name="Dimensionless" quantity="Dimensionless" unit="1"/>
+    <Float64Type name="Length" quantity="Length" unit="m"/>
+    <Float64Type name="Time" quantity="Time" unit="s"/>
+  </TypeDefinitions>
+  <LogCategories>
+    <Category name="logStatusWarning" description="Log messages with fmi3Warning status."/>
+    <Category name="logStatusDiscard" description="Log messages with fmi3Discard status."/>
+    <Category name="logStatusError" description="Log messages with fmi3Error status."/>
+    <Category name="logStatusFatal" description="Log messages with fmi3Fatal status."/>
+    <Category name="logAll" description="Log all messages."/>
+  </LogCategories>
+  <DefaultExperiment startTime="0.0" stopTime="100.0" stepSize="0.02"/>
+  <ModelVariables>
+    <Float64 name="a.x" valueReference="0" description="Place: x" causality="input"
+      variability="continuous" declaredType="Length" unit="m" start="0"/>
+    <Float64 name="y.x" valueReference="1" description="Output: x" causality="output"
+      variability="continuous" initial="calculated" declaredType="Length" unit="m"/>
+    <Float64 name="k" valueReference="2" description="Gain" causality="parameter"
+      variability="tunable" initial="exact" declaredType="Dimensionless" unit="1" start="0.25"
+      min="0" max="1000"/>
+    <Int32 name="n" valueReference="3" description="Number" causality="parameter"
+      variability="fixed" initial="exact" start="-3"/>
+    <Boolean name="on" valueReference="4" description="Switch" causality="parameter"
+      variability="fixed" initial="exact" start="true"/>
+    <String name="kind" valueReference="5" description="Kind" causality="parameter"
+      variability="fixed" initial="exact"><Start value="Soft"/></String>
+    <Boolean name="fault" valueReference="6" description="FAULT" causality="output"
+      variability="discrete" initial="calculated"/>
+    <Float64 name="time" valueReference="7" description="Time" causality="independent"
+      variability="continuous" declaredType="Time" unit="s"/>
+  </ModelVariables>
+  <ModelStructure>
+    <Output valueReference="1" dependencies="0 7" dependenciesKind="dependent dependent"/>
+    <Output valueReference="6" dependencies="" dependenciesKind=""/>
+    <InitialUnknown valueReference="1" dependencies="0 7 2 3 4 5"
+      dependenciesKind="dependent dependent dependent dependent dependent dependent"/>
+    <InitialUnknown valueReference="6" dependencies="" dependenciesKind=""/>
+  </ModelStructure>
+</fmiModelDescription>
+""".replace("FAULT", FAULT.description).replace("VERSION", __version__)
+
+BUILD = """
+<fmiBuildDescription fmiVersion="3.0">
+  <BuildConfiguration modelIdentifier="It">
+    <SourceFileSet language="C99"><SourceFile name="fmi3.c"/></SourceFileSet>
+  </BuildConfiguration>
+  <BuildConfiguration modelIdentifier="It" platform="x86_64-linux">
+    <SourceFileSet language="C99"><SourceFile name="fmi3.c"/></SourceFileSet>
+    <Library name="m" external="true"/>
+  </BuildConfiguration>
+  <BuildConfiguration modelIdentifier="It" platform="aarch64-linux">
+    <SourceFileSet language="C99"><SourceFile name="fmi3.c"/></SourceFileSet>
+    <Library name="m" external="true"/>
+  </BuildConfiguration>
+</fmiBuildDescription>
+"""
+
+
+def canonical(content: str | bytes) -> str:
+    return ElementTree.canonicalize(content, strip_text=True)
+
+
+def test_description_says_what_the_ports_are():
+    found = fmi3_description("It", "A thing", "{1}", PORTS)
+    assert canonical(found) == canonical(DESCRIPTION)
+
+
+def test_build_description_names_the_one_file():
+    assert canonical(fmi3_build_description("It")) == canonical(BUILD)
