@@ -150,9 +150,14 @@ static double number_of(instance *it, uint32_t reference, kind kind) {
     return it->run.moments[it->run.now].outputs.values[port->place];
 }
 
+/* Whether references are those of all inputs, or outputs, in their order. */
+static int are_all(const uint32_t references[], const uint32_t all[], size_t n) {
+    return n > 0 && memcmp(references, all, n * sizeof *all) == 0;
+}
+
 static void get_reals(instance *it, const uint32_t references[], size_t n, double values[]) {
     if (it->stale) refresh(it);
-    if (n == MODEL_OUTPUTS && memcmp(references, output_references, n * sizeof *references) == 0) {
+    if (n == MODEL_OUTPUTS && are_all(references, output_references, n)) {
         memcpy(values, it->run.moments[it->run.now].outputs.values, n * sizeof *values);
         return;
     }
@@ -223,8 +228,7 @@ static int all_finite(const double values[], size_t n) {
 static void set_reals(instance *it, const uint32_t references[], size_t n, const double values[]) {
     run *run = &it->run;
     if (n == MODEL_INPUTS && run->mode == STEPPING && run->refused == NULL &&
-        memcmp(references, input_references, n * sizeof *references) == 0 &&
-        all_finite(values, n)) {
+        are_all(references, input_references, n) && all_finite(values, n)) {
         memcpy(run->inputs.values, values, n * sizeof *values);
         return;
     }
