@@ -75,7 +75,7 @@ def interpreted(
 
 
 #: The loop that is always there.
-INTERPRETED = Loop("python", interpreted)
+PYTHON_LOOP = Loop("python", interpreted)
 
 
 def chosen(wanted: str, experiment: Experiment, isolation: Isolation | None = None) -> Loop:
@@ -102,7 +102,7 @@ def chosen(wanted: str, experiment: Experiment, isolation: Isolation | None = No
         if experiment.rows > _MANY_STEPS:
             with suppress(InputError):
                 return _compiled(made(in_no_time=True))
-    return INTERPRETED
+    return PYTHON_LOOP
 
 
 def _compiled(library: CDLL) -> Loop:

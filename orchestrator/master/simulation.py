@@ -14,7 +14,7 @@ from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.isolated import Isolation, isolated
 from orchestrator.master.loaded import all_loaded
 from orchestrator.master.log import Log
-from orchestrator.master.loop import INTERPRETED, Loop
+from orchestrator.master.loop import PYTHON_LOOP, Loop
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import schedule, stages
@@ -27,7 +27,7 @@ def simulate(
     experiment: Experiment,
     observers: Sequence[Observer] = (),
     isolation: Isolation | None = None,
-    loop: Loop = INTERPRETED,
+    loop: Loop = PYTHON_LOOP,
 ) -> Ending:
     """Run a system from t = 0.
 
