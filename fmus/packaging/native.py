@@ -94,9 +94,8 @@ def fmu_entries(
     package = module.rpartition(".")[0]
     declared = import_module(f"{package}.ports")
     version = _VERSIONS[fmi]
-    sources = {
-        name: content.encode() for name, content in native.sources(package, int(fmi)).items()
-    }
+    written = native.sources(package, int(fmi))
+    sources = {name: content.encode() for name, content in written.items()}
 
     def description(guid: str) -> bytes:
         return version.describe(component, declared.DESCRIPTION, guid, declared.PORTS)

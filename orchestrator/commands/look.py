@@ -21,6 +21,7 @@ from orchestrator.experiments.folder import whole
 from orchestrator.experiments.preparation import loaded, prepare
 from orchestrator.experiments.record import add_to_record
 from orchestrator.experiments.stored import read_record, read_result, table_in
+from orchestrator.master.observer import Observer
 from orchestrator.master.progress import Progress
 from orchestrator.master.simulation import simulate
 
@@ -109,7 +110,8 @@ def _animate(options: argparse.Namespace) -> int:
     check_film(out, options.fps)
     prepared = prepare(scenario, system, request(options))
     seen = VisibleRows()
-    ending = simulate(prepared.system, prepared.experiment, [seen, Progress(scenario.name)])
+    observers: list[Observer] = [seen, Progress(scenario.name)]
+    ending = simulate(prepared.system, prepared.experiment, observers, loop=prepared.loop)
     if missing := seen.missing(*CONTROL_POINT):
         raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
     title = scenario.title or scenario.name

@@ -85,13 +85,13 @@ class Experiment:
         """The time after k steps [s]."""
         return k * self.step if k <= self.full_steps else self.stop_time
 
-    def steps(self) -> Iterator[tuple[float, float, float]]:
-        """Beginning, length and end of every step [s]: t_k = k h, never accumulated."""
+    def steps(self) -> Iterator[tuple[int, float, float, float]]:
+        """Number, beginning, length and end of every step [s]: t_k = k h, never accumulated."""
         step = self.step
-        t = 0.0
+        k, t = 0, 0.0
         for k in range(1, self.full_steps + 1):
             end = k * step
-            yield t, step, end
+            yield k, t, step, end
             t = end
         if self.has_short_step:
-            yield t, self.stop_time - t, self.stop_time
+            yield k + 1, t, self.stop_time - t, self.stop_time

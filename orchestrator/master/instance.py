@@ -55,12 +55,11 @@ class Instance(Protocol):
     get_outputs: list[Callable[[], int]]
 
     @property
-    def pointers(self) -> Callable[[], layout.Member] | None:
-        """The same calls for the compiled loop; None: they are no functions in this process."""
-
-    @property
     def do_step(self) -> Callable[[float, float, int], int]:
         """FMI's doStep, to be called with time, step size and one."""
+
+    def pointers(self) -> layout.Member:
+        """The same calls as pointers, for an FMU in this process."""
 
     def failed(self, status: int, function: str) -> ComponentFailed:
         """What to raise after a call that has ended with a status."""

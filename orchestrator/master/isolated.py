@@ -22,6 +22,7 @@ import numpy as np
 from fmpy.fmi2 import fmi2Warning
 
 from orchestrator.errors import InputError, StartError, reason
+from orchestrator.master import layout
 from orchestrator.master.channel import Channel, sizes
 from orchestrator.master.instance import ComponentFailed, Instance, Part
 from orchestrator.master.interrupts import Interrupts
@@ -92,8 +93,6 @@ class IsolatedInstance:
     A step is one message there, with the inputs, and one back, with the outputs.
     """
 
-    pointers = None
-
     def __init__(
         self,
         component: Component,
@@ -162,6 +161,10 @@ class IsolatedInstance:
         if not isinstance(values, dict):
             raise self._nonsense()
         return values
+
+    def pointers(self) -> layout.Member:
+        """There are none: its calls are messages to another process."""
+        raise NotImplementedError
 
     def failed(self, status: int, function: str) -> ComponentFailed:
         """What to raise after a call that has ended with a status; its own calls raise at once."""

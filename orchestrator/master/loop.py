@@ -15,6 +15,7 @@ import numpy as np
 
 from orchestrator.errors import InputError
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.isolated import Isolation
 from orchestrator.master.library import kept, made
 from orchestrator.master.observer import Blocks
 from orchestrator.master.schedule import Stage, step
@@ -57,42 +58,13 @@ class Loop(NamedTuple):
     steps: Steps
 
 
-def chosen(wanted: str, experiment: Experiment, stages: Sequence[Stage]) -> Loop:
-    """The loop for a run.
-
-    Args:
-        wanted: one of :data:`LOOPS`.
-        experiment, stages: of the run.
-
-    Raises:
-        InputError: there is no such loop, or the compiled one cannot be had.
-
-    """
-    if wanted not in LOOPS:
-        raise InputError(f"loop {wanted!r}: use one of {', '.join(LOOPS)}")
-    if wanted == "python":
-        return _PYTHON
-    isolated = any(member.pointers is None for stage in stages for member in stage.members)
-    if wanted == "compiled":
-        if isolated:
-            raise InputError("the compiled loop steps no isolated FMUs: leave one of the two out")
-        return _compiled(kept() or made())
-    if not isolated:
-        if library := kept():
-            return _compiled(library)
-        if experiment.rows > _MANY_STEPS:
-            with suppress(InputError):
-                return _compiled(made(in_no_time=True))
-    return _PYTHON
-
-
 def interpreted(
     experiment: Experiment, stages: Sequence[Stage], values: np.ndarray, blocks: Blocks
 ) -> Iterator[int]:
     """Make the steps in Python, and look after each."""
     # Times zero, what is finite is zero and what is not is nan: the cheapest way to see it.
-    is_not_finite = partial(np.vdot, values, np.zeros_like(values))
-    for k, (t, h, end) in enumerate(experiment.steps(), start=1):
+    is_not_finite = partial(values.dot, np.zeros_like(values))
+    for k, t, h, end in experiment.steps():
         for targets, sources, members in stages:
             values[targets] = values[sources]
             step(members, t, h)
@@ -102,7 +74,35 @@ def interpreted(
         yield k
 
 
-_PYTHON = Loop("python", interpreted)
+#: The loop that is always there.
+PYTHON_LOOP = Loop("python", interpreted)
+
+
+def chosen(wanted: str, experiment: Experiment, isolation: Isolation | None = None) -> Loop:
+    """The loop for a run.
+
+    Args:
+        wanted: one of :data:`LOOPS`.
+        experiment: to be run.
+        isolation: of the FMUs: none of their calls is then a function of this process.
+
+    Raises:
+        InputError: there is no such loop, or the compiled one cannot be had.
+
+    """
+    if wanted not in LOOPS:
+        raise InputError(f"loop {wanted!r}: use one of {', '.join(LOOPS)}")
+    if wanted == "compiled":
+        if isolation:
+            raise InputError("the compiled loop steps no isolated FMUs: leave one of the two out")
+        return _compiled(kept() or made())
+    if wanted == "auto" and not isolation:
+        if library := kept():
+            return _compiled(library)
+        if experiment.rows > _MANY_STEPS:
+            with suppress(InputError):
+                return _compiled(made(in_no_time=True))
+    return PYTHON_LOOP
 
 
 def _compiled(library: CDLL) -> Loop:

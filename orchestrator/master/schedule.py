@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 from fmpy.fmi2 import fmi2Warning
 
-from orchestrator.master import layout
 from orchestrator.master.instance import Instance
 from orchestrator.master.row import Row
 from orchestrator.system.graph import feedthrough_stages, has_feedthrough
@@ -33,8 +32,7 @@ class Member(NamedTuple):
     set_inputs: list[Callable[[], int]]
     do_step: Callable[[float, float, int], int]
     get_outputs: list[Callable[[], int]]
-    failed: Callable[[int, str], Exception]
-    pointers: Callable[[], layout.Member] | None = None
+    instance: Instance
 
 
 class Stage(NamedTuple):
@@ -81,24 +79,18 @@ def schedule(
 
 def member(instance: Instance) -> Member:
     """The calls of an instance that is tied to a row."""
-    return Member(
-        instance.set_inputs,
-        instance.do_step,
-        instance.get_outputs,
-        instance.failed,
-        instance.pointers,
-    )
+    return Member(instance.set_inputs, instance.do_step, instance.get_outputs, instance)
 
 
 def step(members: Sequence[Member], t: float, h: float) -> None:
     """Step the components of a stage, which may run side by side until their outputs are asked."""
-    for set_inputs, do_step, _, failed, _ in members:
+    for set_inputs, do_step, _, instance in members:
         for call in set_inputs:
             if (status := call()) > fmi2Warning:
-                raise failed(status, SET_INPUTS)
+                raise instance.failed(status, SET_INPUTS)
         if (status := do_step(t, h, 1)) > fmi2Warning:
-            raise failed(status, DO_STEP)
-    for _, _, get_outputs, failed, _ in members:
+            raise instance.failed(status, DO_STEP)
+    for _, _, get_outputs, instance in members:
         for call in get_outputs:
             if (status := call()) > fmi2Warning:
-                raise failed(status, GET_OUTPUTS)
+                raise instance.failed(status, GET_OUTPUTS)

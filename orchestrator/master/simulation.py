@@ -14,7 +14,7 @@ from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.isolated import Isolation, isolated
 from orchestrator.master.loaded import all_loaded
 from orchestrator.master.log import Log
-from orchestrator.master.loop import LOOPS, chosen
+from orchestrator.master.loop import PYTHON_LOOP, Loop
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import schedule, stages
@@ -27,7 +27,7 @@ def simulate(
     experiment: Experiment,
     observers: Sequence[Observer] = (),
     isolation: Isolation | None = None,
-    loop: str = LOOPS[0],
+    loop: Loop = PYTHON_LOOP,
 ) -> Ending:
     """Run a system from t = 0.
 
@@ -36,13 +36,13 @@ def simulate(
         experiment: until when, in which steps and which order.
         observers: take the rows.
         isolation: run each FMU in a process of its own; None: all in this one.
-        loop: one of :data:`.loop.LOOPS`.
+        loop: makes the steps.
 
     Returns:
         How the run has ended: after a failure the observers have the rows before it.
 
     Raises:
-        InputError: system, parameters or loop are not usable; nothing was stepped.
+        InputError: system or parameters are not usable; nothing was stepped.
         KeyboardInterrupt: somebody wants it to stop, and an FMU does not come to its first step.
 
     """
@@ -59,15 +59,14 @@ def simulate(
             )
             row = Row(system, instances)
             _initialise(system, instances, row, experiment, log)
-            parameters = _parameters(instances)
+            names = tuple(map(str, row.columns))
+            header = Header(names, experiment, _parameters(instances), loop.name)
         scheduled = schedule(system, plan, instances, row)
-        taken = chosen(loop, experiment, scheduled)
-        header = Header(tuple(map(str, row.columns)), experiment, parameters, taken.name)
         with _told(header, observers) as tell:
             blocks = Blocks(len(row.values), observers)
             interrupts.hand_over = blocks.hand_over
             blocks.append(0.0, row.values)
-            steps = taken.steps(experiment, scheduled, row.values, blocks)
+            steps = loop.steps(experiment, scheduled, row.values, blocks)
             order = [name for names in plan for name in names]
             try:
                 failure = _advance(experiment, steps, row, order, blocks, interrupts)

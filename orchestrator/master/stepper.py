@@ -10,7 +10,7 @@ import numpy as np
 from orchestrator.master import layout
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observer import Blocks
-from orchestrator.master.schedule import CALLS, Member, Stage
+from orchestrator.master.schedule import CALLS, Stage
 
 #: Longest time until Python looks whether somebody wants the run to stop [s].
 _GLANCE = 0.1
@@ -54,11 +54,11 @@ def stepped(
         yield k
     if outcome == layout.FAILED:
         member = stages[failure.stage].members[failure.member]
-        raise member.failed(failure.status, CALLS[failure.call])
+        raise member.instance.failed(failure.status, CALLS[failure.call])
 
 
 def _laid_out(stage: Stage) -> layout.Stage:
-    members = [_pointers(member) for member in stage.members]
+    members = [member.instance.pointers() for member in stage.members]
     return layout.Stage(
         stage.targets.ctypes.data,
         stage.sources.ctypes.data,
@@ -66,8 +66,3 @@ def _laid_out(stage: Stage) -> layout.Stage:
         len(stage.targets),
         len(members),
     )
-
-
-def _pointers(member: Member) -> layout.Member:
-    assert member.pointers is not None
-    return member.pointers()

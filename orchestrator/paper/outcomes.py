@@ -160,7 +160,7 @@ def _make(run: Run, file: Path) -> Outcome:
     try:
         prepared = run.prepared()
         metrics, seen = Metrics(), VisibleRows()
-        simulate(prepared.system, prepared.experiment, [metrics, seen])
+        simulate(prepared.system, prepared.experiment, [metrics, seen], loop=prepared.loop)
     except InputError as error:
         return Outcome({"failure": str(error)}, Table())
     outcome = Outcome(

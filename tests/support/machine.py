@@ -20,6 +20,9 @@ import pytest
 _PR_CAPBSET_DROP = 24
 _CAP_DAC_OVERRIDE, _CAP_DAC_READ_SEARCH, _CAP_FOWNER, _CAP_SYS_RESOURCE = 1, 2, 3, 24
 
+#: The loops, each of which has to do as the other.
+LOOPS = ("python", "compiled")
+
 #: How long processes may take to notice that they are to end [s].
 PATIENCE = 20.0
 

@@ -176,7 +176,7 @@ def systems(draw: st.DrawFn) -> dict[str, dict]:
         for kind in KINDS
     }
     connections = {}
-    for i, (name, shape) in enumerate(shapes.items()):
+    for name, shape in shapes.items():
         for port, kind, _ in shape.ports("input"):
             sources = [
                 source

@@ -9,15 +9,22 @@ import numpy as np
 from orchestrator.analysis.metrics import indices
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.files import CsvFile
+from orchestrator.master.loop import chosen
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
 from orchestrator.system.structure import System
 
 
-def run(system: System, stop_time: float, step: float, order: str = "gauss-seidel") -> Table:
+def run(
+    system: System,
+    stop_time: float,
+    step: float,
+    order: str = "gauss-seidel",
+    loop: str = "python",
+) -> Table:
     """All rows of a run."""
-    table = Table()
-    simulate(system, Experiment(stop_time, step, order), [table])
+    table, experiment = Table(), Experiment(stop_time, step, order)
+    simulate(system, experiment, [table], loop=chosen(loop, experiment))
     return table
 
 

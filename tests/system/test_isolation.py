@@ -23,6 +23,7 @@ from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.files import read_rows
 from orchestrator.master.isolated import Isolation
+from orchestrator.master.loop import chosen
 from orchestrator.master.observer import Header
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
@@ -30,6 +31,7 @@ from orchestrator.system.component import read_component
 from orchestrator.system.ssp.writing import write_ssp
 from orchestrator.system.structure import System
 from support.foreign import build_c_fmu, build_raising_fmu, foreign_system
+from support.machine import LOOPS
 
 STEP = 0.02
 
@@ -181,11 +183,14 @@ def test_an_isolated_fmu_that_fails_at_the_end_loses_nothing(c_fmu, mark, phase,
     assert left_over(mark) == []
 
 
-@pytest.mark.parametrize("isolation", [None, Isolation(20.0)])
+@pytest.mark.parametrize(
+    ("isolation", "loop"), [(None, "python"), (None, "compiled"), (Isolation(20.0), "auto")]
+)
 @pytest.mark.parametrize(("act", "value"), [("NOT_A_NUMBER", "nan"), ("INFINITE", "-inf")])
-def test_a_value_that_is_not_finite_is_named_with_its_time(c_fmu, act, value, isolation):
-    table = Table()
-    simulate(foreign_system(c_fmu, act), Experiment(0.5, STEP), [table], isolation)
+def test_a_value_that_is_not_finite_is_named_with_its_time(c_fmu, act, value, isolation, loop):
+    table, experiment = Table(), Experiment(0.5, STEP)
+    steps = chosen(loop, experiment, isolation)
+    simulate(foreign_system(c_fmu, act), experiment, [table], isolation, steps)
     assert table.failure == f"stopped at t = 0.12 s: bad.y is {value}"
     assert rows_until(table, 0.1)
     assert np.isfinite(table.rows).all()
@@ -244,7 +249,8 @@ def test_runs_in_several_threads(c_fmu: Path):
     assert len({table.rows.tobytes() for table in tables}) == 1
 
 
-def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path):
+@pytest.mark.parametrize("loop", LOOPS)
+def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path, loop: str):
     """A run that ends while another one goes on takes no messages with it, nor the process."""
     begun, go_on = threading.Event(), threading.Event()
 
@@ -257,10 +263,11 @@ def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path):
     table = Waits()
     system, experiment = foreign_system(c_fmu, "SILENT_ERROR"), Experiment(0.5, STEP)
     talkative = foreign_system(c_fmu, "LOGS", at=0.0)
-    thread = threading.Thread(target=simulate, args=(system, experiment, [table]))
+    steps = chosen(loop, experiment)
+    thread = threading.Thread(target=simulate, args=(system, experiment, [table], None, steps))
     thread.start()
     begun.wait()
-    assert len(simulate(talkative, Experiment(STEP, STEP)).messages) == 101
+    assert len(simulate(talkative, Experiment(STEP, STEP), loop=steps).messages) == 101
     gc.collect()
     go_on.set()
     thread.join()
@@ -294,8 +301,10 @@ def command(*arguments: object, folder: Path) -> subprocess.Popen[str]:
 @pytest.mark.parametrize(
     ("name", "options", "last_time", "words"),
     [
-        ("FATAL", [], 0.1, "bad: beyond repair"),
-        ("raises", [], 0.12, "first: Fatal py exception encountered: [doStep] "),
+        ("FATAL", ["--loop", "python"], 0.1, "bad: beyond repair"),
+        ("FATAL", ["--loop", "compiled"], 0.1, "bad: beyond repair"),
+        ("raises", ["--loop", "python"], 0.12, "first: Fatal py exception encountered: [doStep] "),
+        ("raises", ["--loop", "compiled"], 0.12, "first: Fatal py exception encountered: [doStep]"),
         ("CRASHES", ["--isolate"], 0.1, "bad: its process was ended by SIGSEGV"),
         ("HANGS", ["--isolate", "--step-timeout", 1], 0.1, "bad: doStep has not ended within"),
     ],
@@ -356,13 +365,14 @@ def test_nothing_is_left_of_a_run_that_hangs_and_is_ended(archives, tmp_path, ma
     assert list(temporary.iterdir()) == []
 
 
-def test_an_fmu_that_ended_fatally_is_loaded_anew(archives: Path, tmp_path: Path):
+@pytest.mark.parametrize("loop", LOOPS)
+def test_an_fmu_that_ended_fatally_is_loaded_anew(archives: Path, loop: str):
     """The C library remembers, as any may, that it must not be called."""
     [archive] = (archives / "FATAL").iterdir()
     code = (
         "from orchestrator import simulate\n"
         f"for parameters in ({{}}, {{'bad.at': 0.2}}, {{'bad.act': 0}}):\n"
-        f"    print(simulate({str(archive)!r}, parameters, stop_time=0.5).failure)\n"
+        f"    print(simulate({str(archive)!r}, parameters, stop_time=0.5, loop={loop!r}).failure)\n"
     )
     process = subprocess.run(
         [sys.executable, "-P", "-c", code], capture_output=True, text=True, check=False

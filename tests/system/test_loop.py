@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import errno
+import json
 from pathlib import Path
 from unittest.mock import patch
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from orchestrator.commands.main import main
+from orchestrator.errors import InputError
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.isolated import Isolation
+from orchestrator.master.loop import chosen
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
 from orchestrator.system.structure import System
-from support.mixed import system_of, systems
+from support.machine import LOOPS
+from support.mixed import ACTS, CALLS, Shape, system_of, systems
+
+#: Step [s].
+H = 0.5
 
 
 @pytest.fixture(scope="module")
@@ -24,14 +35,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def run(system: System, experiment: Experiment, loop: str) -> Table:
     table = Table()
-    simulate(system, experiment, [table], None, loop)
+    simulate(system, experiment, [table], None, chosen(loop, experiment))
     assert table.header.loop == loop
     return table
 
 
 def same(system: System, experiment: Experiment) -> Table:
     """What both loops make of a run."""
-    python, compiled = (run(system, experiment, loop) for loop in ("python", "compiled"))
+    python, compiled = (run(system, experiment, loop) for loop in LOOPS)
     assert compiled.rows.tobytes() == python.rows.tobytes()
     assert compiled.ending == python.ending
     assert compiled.header == python.header
@@ -58,3 +69,123 @@ def test_random_systems_give_the_same_rows_and_the_same_failures(
 @pytest.mark.parametrize("step", [0.02, 0.03])
 def test_the_bundle_gives_the_same_rows(dist: Path, order: str, step: float):
     assert len(same(closed_loop(dist), Experiment(20.0, step, order))) > 600
+
+
+#: A component that feeds another one, by which it is fed.
+PAIR = {
+    "shapes": {name: Shape((1, 0, 0, 1), (1, 1, 0, 1)) for name in ("bad", "good")},
+    "connections": {
+        "bad.input.Real0": "good.output.Real0",
+        "good.input.Real0": "bad.output.Real0",
+        "good.input.Boolean0": "bad.output.Boolean0",
+    },
+}
+
+
+def pair(folder: Path, act: str, call: str = "STEP", at: int = 7, milliseconds: int = 0) -> System:
+    """The two, of which the first misbehaves in its seventh step."""
+    values = {"act": ACTS[act], "call": CALLS[call], "at": at, "milliseconds": milliseconds}
+    return system_of(folder, **PAIR, parameters={f"bad.{k}": v for k, v in values.items()})
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+@pytest.mark.parametrize(
+    ("act", "call", "rows", "words"),
+    [
+        ("DISCARD", "SET", 8, "3.5 s: bad: setting inputs failed with status 2 (discard)."),
+        ("DISCARD", "STEP", 7, "3 s: bad: fmi2DoStep failed with status 2 (discard)."),
+        ("DISCARD", "GET", 7, "3 s: bad: getting outputs failed with status 2 (discard)."),
+        ("FAIL", "STEP", 7, "3 s: bad: fmi2DoStep failed with status 3 (error)."),
+        ("FATAL", "SET", 8, "3.5 s: bad: setting inputs failed with status 4 (fatal)."),
+        ("FATAL", "STEP", 7, "3 s: bad: fmi2DoStep failed with status 4 (fatal)."),
+        ("FATAL", "GET", 7, "3 s: bad: getting outputs failed with status 4 (fatal)."),
+        ("SAYS", "STEP", 7, "3 s: bad: tired"),
+        ("NOT_A_NUMBER", "STEP", 7, "3.5 s: bad.output.Real0 is nan"),
+        ("INFINITE", "STEP", 7, "3.5 s: bad.output.Real0 is inf"),
+    ],
+)
+def test_a_step_that_fails_is_named_and_the_rows_before_it_kept(
+    folder, loop, act, call, rows, words
+):
+    table = run(pair(folder, act, call), Experiment(100.0, H), loop)
+    assert table.failure == f"stopped at t = {words}"
+    assert np.array_equal(table.time, np.arange(rows) * H)
+    assert table.ending.messages == (("bad: step 7", "bad: tired") if act == "SAYS" else ())
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_a_warning_is_no_failure(folder, loop):
+    assert len(run(pair(folder, "WARN"), Experiment(100.0, H), loop)) == 201
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_an_interrupt_ends_a_run_of_slow_steps_soon(folder, loop):
+    """It comes in the seventh step; more than three of 40 ms do not follow within 0.1 s."""
+    system = pair(folder, "INTERRUPT", milliseconds=40)
+    table = run(system, Experiment(100.0, H), loop)
+    assert 8 <= len(table) <= 11
+    assert table.failure == f"interrupted at t = {table.time[-1]:g} s"
+    assert np.array_equal(table.time, np.arange(len(table)) * H)
+    assert len(table.ending.signals) == 1
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_observers_of_slow_steps_are_told_meanwhile(folder, loop):
+    """Steps of 40 ms: at least every eighth."""
+    told = []
+
+    class Counts(Table):
+        def take(self, rows: np.ndarray) -> None:
+            super().take(rows)
+            told.append(len(rows))
+
+    table, experiment = Counts(), Experiment(10.0, H)
+    system = pair(folder, "BEHAVE", milliseconds=40)
+    simulate(system, experiment, [table], None, chosen(loop, experiment))
+    assert len(table) == 21
+    assert max(told) <= 8
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_rows_that_cannot_be_kept_end_a_run(folder, loop):
+    class Full(Table):
+        def take(self, rows: np.ndarray) -> None:
+            if len(self) > 1000:
+                raise OSError(errno.ENOSPC, "No space left on device")
+            super().take(rows)
+
+    whole, full = Table(), Full()
+    system, experiment = pair(folder, "BEHAVE"), Experiment(1000.0, H)
+    ending = simulate(system, experiment, [full, whole], None, chosen(loop, experiment))
+    assert ending.failure is not None
+    assert ending.failure == (
+        f"stopped at t = {whole.time[-1]:g} s: [Errno 28] No space left on device"
+    )
+    assert 1000 < len(full) < len(whole) < 2001
+    assert np.array_equal(whole.time, np.arange(len(whole)) * H)
+
+
+def test_auto_takes_no_compiled_loop_for_isolated_fmus():
+    experiment = Experiment(H, H)
+    assert chosen("compiled", experiment).name == "compiled"
+    assert chosen("auto", experiment).name == "compiled"
+    assert chosen("auto", experiment, Isolation()).name == "python"
+
+
+def test_the_compiled_loop_and_isolation_are_one_too_many(workplace, capsys):
+    assert main(["run", "fig4", "--stop-time", "0.1", "--isolate", "--loop", "compiled"]) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert line == ("auv-fmu: the compiled loop steps no isolated FMUs: leave one of the two out")
+    assert list(workplace.iterdir()) == []
+
+
+def test_a_loop_that_there_is_not_is_refused():
+    with pytest.raises(InputError, match="loop 'fast': use one of auto, python, compiled"):
+        chosen("fast", Experiment(H, H))
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_the_record_says_which_loop_has_run(workplace, loop):
+    options = ["--stop-time", "0.1", "--no-figures", "--out", "r", "--loop", loop]
+    assert main(["run", "fig4", *options]) == 0
+    assert json.loads(Path("r/run.json").read_text())["loop"] == loop

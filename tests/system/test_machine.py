@@ -28,6 +28,7 @@ from orchestrator.experiments.stored import read_result
 from orchestrator.master.files import read_rows
 from orchestrator.system.leftovers import claimed
 from support.machine import (
+    LOOPS,
     called,
     contents,
     eventually,
@@ -61,13 +62,15 @@ def failure(folder: Path) -> str:
 RUN = ["run", "fig4", "--no-figures", "--stop-time"]
 
 
-@pytest.mark.parametrize("ending", ["csv", "parquet"])
-def test_full_disk_ends_a_run_early_and_keeps_the_rows(workplace, capsys, ending):
+@pytest.mark.parametrize(
+    ("ending", "loop"), [("csv", "python"), ("csv", "compiled"), ("parquet", "auto")]
+)
+def test_full_disk_ends_a_run_early_and_keeps_the_rows(workplace, capsys, ending, loop):
     """There is room for some thousand of a million."""
     if ending == "parquet":
         pytest.importorskip("pyarrow")
     with small_disk(workplace / "disk", 14_000_000) as disk:
-        out = ["--out", str(disk / "r"), "--format", ending]
+        out = ["--out", str(disk / "r"), "--format", ending, "--loop", loop]
         assert main([*RUN, "0.1", *out]) == 0
         before = contents(disk)
         capsys.readouterr()
@@ -217,19 +220,20 @@ def under_way(folder: Path) -> bool:
     return any(path.stat().st_size > 1e5 for path in folder.glob(".unfinished-*/result.csv"))
 
 
-def running() -> subprocess.Popen[str]:
+def running(loop: str = "auto") -> subprocess.Popen[str]:
     """A run of hours that has begun to write rows."""
-    process = start("run", "fig4", "--stop-time", "200000")
+    process = start("run", "fig4", "--stop-time", "200000", "--loop", loop)
     assert eventually(lambda: under_way(Path("results/fig4"))), process.communicate()[1]
     return process
 
 
+@pytest.mark.parametrize("loop", LOOPS)
 @pytest.mark.parametrize(
     "signals",
     [[signal.SIGTERM], [signal.SIGHUP], [signal.SIGINT] * 5],
 )
-def test_signals_end_a_run_and_lose_nothing(workplace, temporary, signals):
-    process = running()
+def test_signals_end_a_run_and_lose_nothing(workplace, temporary, signals, loop):
+    process = running(loop)
     for number in signals:
         process.send_signal(number)
         time.sleep(0.05)
@@ -279,14 +283,15 @@ class Hanging(Fmi2Slave):
 """
 
 
+@pytest.mark.parametrize("loop", LOOPS)
 @pytest.mark.parametrize(
     "hang", ["pass", "import ctypes; ctypes.CDLL(None).poll(None, 0, -1)"], ids=["Python", "C"]
 )
-def test_the_third_signal_ends_an_fmu_that_hangs_and_keeps_the_rows(workplace, hang):
+def test_the_third_signal_ends_an_fmu_that_hangs_and_keeps_the_rows(workplace, hang, loop):
     Path("hanging.py").write_text(HANGING.format(hang=hang))
     assert main(["build", "hanging.py"]) == 0
     Path("hanging.toml").write_text('stop_time = 20.0\n[components]\nhanging = "Hanging.fmu"\n')
-    process = start("run", "hanging.toml", "--no-figures")
+    process = start("run", "hanging.toml", "--no-figures", "--loop", loop)
     folder = workplace / "results" / "hanging"
     assert eventually(Path("hangs").exists)
     for _ in range(3):

@@ -27,6 +27,7 @@ from orchestrator.system.ssp.reading import read_ssp
 from orchestrator.system.ssp.writing import ssp_bytes
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.unpacking import check_place, unpacked
+from support.machine import LOOPS
 from support.runs import run, write
 
 
@@ -111,25 +112,28 @@ def test_impossible_experiment_is_refused(system, experiment):
         run(system, *experiment)
 
 
-def test_time_is_computed_and_the_last_step_ends_at_the_stop_time(system: System):
-    result = run(system, 1.0, 0.03)
+@pytest.mark.parametrize("loop", LOOPS)
+def test_time_is_computed_and_the_last_step_ends_at_the_stop_time(system: System, loop: str):
+    result = run(system, 1.0, 0.03, loop=loop)
     assert np.array_equal(result.time[:-1], np.arange(34) * 0.03)
     assert result.time[-1] == 1.0
-    assert len(run(system, 0.3, 0.1).time) == 4
+    assert len(run(system, 0.3, 0.1, loop=loop).time) == 4
 
 
-def test_an_open_component_runs_with_inputs_that_were_set(system: System):
+@pytest.mark.parametrize("loop", LOOPS)
+def test_an_open_component_runs_with_inputs_that_were_set(system: System, loop: str):
     """One FMU, no connections: 10 N against 30 kg/s settle at 1/3 m/s."""
     alone = replace(system, components={"plant": system.components["plant"]}, connections=())
-    result = run(alone.with_parameters({port("plant.tau.u"): 10.0}), 20.0, 0.02)
+    result = run(alone.with_parameters({port("plant.tau.u"): 10.0}), 20.0, 0.02, loop=loop)
     assert result["plant.nu.u"][-1] == pytest.approx(1 / 3, rel=1e-9)
     assert (result["plant.tau.u"] == 10.0).all()
 
 
-def test_failure_keeps_the_rows_before_it_and_says_why(system: System):
+@pytest.mark.parametrize("loop", LOOPS)
+def test_failure_keeps_the_rows_before_it_and_says_why(system: System, loop: str):
     """h d11 / m11 = 8: Euler's scheme multiplies the surge velocity by -7 in every step."""
     broken = system.with_parameters({port("plant.d11"): 1e4})
-    result = run(broken, 100.0, 0.02)
+    result = run(broken, 100.0, 0.02, loop=loop)
     assert result.failure is not None
     assert "stopped at t =" in result.failure
     assert "refused" in result.failure
@@ -137,11 +141,12 @@ def test_failure_keeps_the_rows_before_it_and_says_why(system: System):
     assert np.isfinite(result.rows).all()
 
 
-def test_interrupt_keeps_the_rows_and_does_not_reach_the_fmus(system: System):
+@pytest.mark.parametrize("loop", LOOPS)
+def test_interrupt_keeps_the_rows_and_does_not_reach_the_fmus(system: System, loop: str):
     """Ctrl-C after half a second of a run that would take minutes."""
     timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
-    result = run(system, 1e4, 0.02)
+    result = run(system, 1e4, 0.02, loop=loop)
     assert result.failure is not None
     assert "interrupted at t =" in result.failure
     assert len(result) > 100
@@ -170,7 +175,8 @@ def python(code: str, *arguments: object, folder: Path) -> subprocess.CompletedP
     )  # fmt: skip
 
 
-def test_runs_in_several_threads_share_what_is_loaded(dist: Path, tmp_path: Path):
+@pytest.mark.parametrize("loop", LOOPS)
+def test_runs_in_several_threads_share_what_is_loaded(dist: Path, tmp_path: Path, loop: str):
     """Six threads from a cold start; one folder for each FMU and the archive."""
     code = """
 import sys
@@ -180,26 +186,27 @@ from tempfile import gettempdir
 from orchestrator import load, simulate
 system = load(sys.argv[1])
 with ThreadPoolExecutor(6) as pool:
-    runs = list(pool.map(lambda _: simulate(system, stop_time=0.5), range(6)))
+    runs = list(pool.map(lambda _: simulate(system, stop_time=0.5, loop=sys.argv[2]), range(6)))
 assert all((run.rows == runs[0].rows).all() for run in runs)
 [folder] = Path(gettempdir()).iterdir()
 print(len(list(folder.iterdir())))
 """
-    process = python(code, dist / "auv.ssp", folder=tmp_path)
+    process = python(code, dist / "auv.ssp", loop, folder=tmp_path)
     assert process.stdout == "5\n", process.stderr
     assert list(tmp_path.iterdir()) == []
 
 
-def test_ctrl_c_ends_a_script_that_simulates(dist: Path, tmp_path: Path):
+@pytest.mark.parametrize("loop", LOOPS)
+def test_ctrl_c_ends_a_script_that_simulates(dist: Path, tmp_path: Path, loop: str):
     code = """
 import os, signal, sys, threading
 from orchestrator import load, simulate
 system = load(sys.argv[1])
 threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
 for _ in range(1000):
-    simulate(system, stop_time=20.0)
+    simulate(system, stop_time=20.0, loop=sys.argv[2])
 """
-    process = python(code, dist / "auv.ssp", folder=tmp_path)
+    process = python(code, dist / "auv.ssp", loop, folder=tmp_path)
     assert "KeyboardInterrupt" in process.stderr
     assert process.returncode != 0
 

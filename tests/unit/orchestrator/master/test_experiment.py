@@ -18,11 +18,13 @@ def test_steps_follow_each_other_and_end_at_the_stop_time(step, n, rest):
     experiment = Experiment((n + rest) * step, step)
     steps = list(experiment.steps())
     assert len(steps) == experiment.rows - 1
-    for k, (t, h, end) in enumerate(steps):
-        assert t == k * step
-        assert end == (k + 1) * step or k == len(steps) - 1
+    for i, (k, t, h, end) in enumerate(steps):
+        assert k == i + 1
+        assert t == experiment.time(i) == i * step
+        assert end == experiment.time(k)
+        assert end == k * step or k == len(steps)
         assert h == pytest.approx(end - t, rel=1e-9)
-    assert steps[-1][2] == pytest.approx(experiment.stop_time, rel=1e-9)
+    assert steps[-1][3] == pytest.approx(experiment.stop_time, rel=1e-9)
 
 
 @given(stop_time=st.floats(5e-324, 1.7e308), step=st.floats(5e-324, 1.7e308))
@@ -47,7 +49,7 @@ def test_the_number_of_steps_is_that_of_exact_arithmetic(stop_time, step):
     if experiment.rows < 1000:
         steps = list(experiment.steps())
         assert len(steps) == experiment.rows - 1
-        assert all(h > 0.0 and t + h > 0.0 for t, h, _ in steps)
+        assert all(h > 0.0 and t + h > 0.0 for _, t, h, _ in steps)
 
 
 def test_a_rest_within_rounding_is_no_step():
