@@ -5,7 +5,8 @@ Every repetition times, one after the other in this process:
 - the straight line `auv_fmu.closed_loop`, the same equations without FMI or master;
 - the loop of FMUs, with all checks of the components on;
 - the same FMUs with an empty do_step, set on their loaded classes;
-- the master alone, with every FMI call replaced by nothing.
+- the master alone, with every FMI call replaced by nothing;
+- the loop of FMUs compiled, and the compiled loop alone.
 
 The set-up of a run (unzip, load, initialise) is timed by a run of one step and subtracted.
 Printed are medians of the repetitions, ratios being taken within each repetition.
@@ -14,6 +15,7 @@ Printed are medians of the repetitions, ratios being taken within each repetitio
 from __future__ import annotations
 
 import argparse
+import ctypes
 import platform
 import sys
 from collections import deque
@@ -30,10 +32,16 @@ from auv_fmu.euler import STEP
 from orchestrator.experiments import bundle
 from orchestrator.experiments.wiring import closed_loop as wired
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.instance import Instance
+from orchestrator.master.loaded import LoadedInstance
+from orchestrator.master.loop import PYTHON_LOOP, Loop, chosen
 from orchestrator.master.schedule import Member
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
 from orchestrator.system.structure import System
+
+#: So many times the steps, so that what they cost is not lost in the set-up that is subtracted.
+_TIMES = 30
 
 
 def timed(function: Callable[[], object]) -> float:
@@ -43,11 +51,11 @@ def timed(function: Callable[[], object]) -> float:
     return perf_counter() - start
 
 
-def loop_time(system: System, steps: int) -> float:
+def loop_time(system: System, steps: int, loop: Loop = PYTHON_LOOP) -> float:
     """Seconds of the steps of a run whose rows are kept in memory, without its set-up."""
 
     def run(n: int) -> float:
-        return timed(lambda: simulate(system, Experiment(n * STEP, STEP), [Table()]))
+        return timed(lambda: simulate(system, Experiment(n * STEP, STEP), [Table()], loop=loop))
 
     return run(steps) - run(1)
 
@@ -75,9 +83,19 @@ def master_alone(system: System, steps: int) -> float:
     def nothing(*_: object) -> int:
         return 0
 
-    calls = Member([nothing], nothing, [nothing], lambda *_: RuntimeError())
-    with patch("orchestrator.master.schedule.member", lambda _: calls):
+    def calls(instance: Instance) -> Member:
+        return Member([nothing], nothing, [nothing], instance)
+
+    with patch("orchestrator.master.schedule.member", calls):
         return loop_time(system, steps)
+
+
+def compiled_alone(system: System, steps: int, loop: Loop) -> float:
+    """Seconds of the steps of the compiled loop when every function it calls does nothing."""
+    # One, which is FMI's warning, is all that this one has to say.
+    nothing = ctypes.cast(ctypes.pythonapi.Py_IsInitialized, ctypes.c_void_p).value
+    with patch.object(LoadedInstance, "_address", lambda *_: nothing):
+        return loop_time(system, _TIMES * steps, loop) / _TIMES
 
 
 def main() -> None:
@@ -91,26 +109,32 @@ def main() -> None:
         bundle.build(Path(folder))
         system = wired(Path(folder))
         loop_time(system, 10)
+        fast = chosen("compiled", Experiment(STEP, STEP))
         for _ in range(options.repetitions):
             straight = timed(lambda: deque(closed_loop(options.steps), maxlen=0))
             fmus = loop_time(system, options.steps)
             empty = with_empty_steps(system, options.steps)
             master = master_alone(system, options.steps)
-            rows.append((straight, fmus, empty, master))
+            compiled = loop_time(system, options.steps, fast)
+            stepper = compiled_alone(system, options.steps, fast)
+            rows.append((straight, fmus, empty, master, compiled, stepper))
 
     def per_step(index: int) -> float:
         return 1e6 * median(row[index] for row in rows) / options.steps
 
     def share(part: Callable[[float, float, float], float]) -> float:
-        return 100 * median(part(*row[1:]) / row[1] for row in rows)
+        return 100 * median(part(*row[1:4]) / row[1] for row in rows)
 
     print(f"{platform.python_implementation()} {platform.python_version()}, {platform.machine()}")
     print(f"medians of {options.repetitions} repetitions of {options.steps} steps")
     print(f"straight-line Python loop         {per_step(0):7.1f} us a step")
     print(f"FMU loop                          {per_step(1):7.1f} us a step")
     print(f"FMU loop, empty do_step           {per_step(2):7.1f} us a step")
+    print(f"FMU loop, compiled                {per_step(4):7.1f} us a step")
+    print(f"compiled loop alone               {per_step(5):7.2f} us a step")
     print(f"FMU loop / straight-line loop     {median(b / a for a, b, *_ in rows):7.2f}")
-    print(f"FMU loop / FMUs with empty do_step{median(b / c for _, b, c, _ in rows):7.2f}")
+    print(f"FMU loop / FMUs with empty do_step{median(b / c for _, b, c, *_ in rows):7.2f}")
+    print(f"FMU loop / compiled               {median(row[1] / row[4] for row in rows):7.2f}")
     print(f"share of the master               {share(lambda b, c, d: d):7.0f} %")
     print(f"share of wrapper and FMI calls    {share(lambda b, c, d: c - d):7.0f} %")
     print(f"share of the components' steps    {share(lambda b, c, d: b - c):7.0f} %")

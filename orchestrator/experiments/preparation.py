@@ -14,7 +14,7 @@ from orchestrator.experiments.scenario import Scenario, read_scenario
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.isolated import Isolation
-from orchestrator.master.loop import INTERPRETED, LOOPS, Loop, chosen
+from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
 from orchestrator.system.component import RUNNABLE, WRITABLE
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.reading import read_ssp
@@ -55,7 +55,7 @@ class Prepared:
     system: System
     experiment: Experiment
     isolation: Isolation | None = None
-    loop: Loop = INTERPRETED
+    loop: Loop = PYTHON_LOOP
 
 
 def load(name: str | Path, kind: str = PYTHON) -> System:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from time import monotonic
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.isolated import Isolation, isolated
 from orchestrator.master.loaded import all_loaded
 from orchestrator.master.log import Log
-from orchestrator.master.loop import INTERPRETED, Loop
+from orchestrator.master.loop import PYTHON_LOOP, Loop
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import schedule, stages
@@ -27,7 +28,7 @@ def simulate(
     experiment: Experiment,
     observers: Sequence[Observer] = (),
     isolation: Isolation | None = None,
-    loop: Loop = INTERPRETED,
+    loop: Loop = PYTHON_LOOP,
 ) -> Ending:
     """Run a system from t = 0.
 
@@ -164,7 +165,8 @@ def _advance(
     k, failure = 0, None
     try:
         for k in steps:
-            blocks.look()
+            if monotonic() > blocks.due:
+                blocks.hand_over()
             if interrupts.signals:
                 failure = f"interrupted at t = {experiment.time(k):.12g} s"
                 break

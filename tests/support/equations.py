@@ -43,7 +43,7 @@ FLAGS = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-Wno-unused-fu
 class Error(Structure):
     """The Error of arithmetic.h."""
 
-    _fields_ = (("raised", c_int), ("why", c_char * 256))
+    _fields_ = (("raised", c_int), ("why", c_char * 512))
 
 
 @cache
