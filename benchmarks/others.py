@@ -39,7 +39,7 @@ from fmpy.fmi3 import FMU3Model
 from fmpy.validation import validate_fmu
 
 STEP = 0.02
-STEPS, REPETITIONS = 1000, 5
+STEPS, REPETITIONS = 200, 50
 INSTANCES = 20
 
 #: Steps before a state is saved, and after it.

@@ -114,8 +114,11 @@ def _loaded(place: Path) -> CDLL:
 
 def _place() -> Path:
     """Where the library of this text, these flags and this kind of machine is kept."""
+    return user_cache_path("auv-fmu", appauthor=False) / "loop" / _name()
+
+
+@cache
+def _name() -> str:
     digest = sha256(_SOURCE.read_bytes())
     digest.update("\0".join((*_FLAGS, sysconfig.get_platform())).encode())
-    ending = ".dll" if sys.platform == "win32" else ".so"
-    folder = user_cache_path("auv-fmu", appauthor=False) / "loop"
-    return folder / (digest.hexdigest()[:16] + ending)
+    return digest.hexdigest()[:16] + (".dll" if sys.platform == "win32" else ".so")

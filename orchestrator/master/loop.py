@@ -24,8 +24,9 @@ from orchestrator.master.stepper import stepped
 #: Loops that can be asked for; the first is the default.
 LOOPS = ("auto", "python", "compiled")
 
-#: So many steps take longer than to compile the loop for them.
-_MANY_STEPS = 10_000
+#: To set the compiled loop up takes as long as so many steps in Python, and to compile it as long
+#: as so many.
+_SET_UP, _COMPILED = 20, 10_000
 
 
 class Steps(Protocol):
@@ -63,7 +64,7 @@ def interpreted(
 ) -> Iterator[int]:
     """Make the steps in Python, and look after each."""
     # Times zero, what is finite is zero and what is not is nan: the cheapest way to see it.
-    is_not_finite = partial(values.dot, np.zeros_like(values))
+    is_not_finite = partial(np.vdot, values, np.zeros_like(values))
     for k, t, h, end in experiment.steps():
         for targets, sources, members in stages:
             values[targets] = values[sources]
@@ -96,10 +97,10 @@ def chosen(wanted: str, experiment: Experiment, isolation: Isolation | None = No
         if isolation:
             raise InputError("the compiled loop steps no isolated FMUs: leave one of the two out")
         return _compiled(kept() or made())
-    if wanted == "auto" and not isolation:
+    if wanted == "auto" and not isolation and experiment.rows > _SET_UP:
         if library := kept():
             return _compiled(library)
-        if experiment.rows > _MANY_STEPS:
+        if experiment.rows > _COMPILED:
             with suppress(InputError):
                 return _compiled(made(in_no_time=True))
     return PYTHON_LOOP

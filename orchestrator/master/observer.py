@@ -78,6 +78,7 @@ class Blocks:
 
     Attributes:
         block: the rows that observers do not know yet, as the compiled loop fills them.
+        due: when they have waited long enough, by the clock `monotonic` [s].
 
     """
 
@@ -92,20 +93,18 @@ class Blocks:
         self._rows = np.empty((_ROWS, 1 + width))
         self._times, self._values = self._rows[:, 0], self._rows[:, 1:]
         self.block = layout.Block(self._rows.ctypes.data, _ROWS)
-        self._due = monotonic() + _PATIENCE
+        self.due = monotonic() + _PATIENCE
         self._observers = observers
 
     def append(self, t: float, values: np.ndarray) -> None:
-        """Take a row, for which there is room once somebody has looked at the one before."""
+        """Take a row."""
         n = self.block.n
+        if n == _ROWS:
+            self.hand_over()
+            n = 0
         self._times[n] = t
         self._values[n] = values
         self.block.n = n + 1
-
-    def look(self) -> None:
-        """Tell the observers of rows, if there is no room for more or they have waited enough."""
-        if self.block.n == _ROWS or monotonic() > self._due:
-            self.hand_over()
 
     def hand_over(self) -> None:
         """Tell the observers of the rows that they do not know yet.
@@ -125,4 +124,4 @@ class Blocks:
                     failures.append(error)
             if failures:
                 raise NotKept(f"stopped at t = {rows[-1, 0]:g} s: {reason(failures[0])}")
-        self._due = monotonic() + _PATIENCE
+        self.due = monotonic() + _PATIENCE

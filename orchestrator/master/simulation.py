@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from time import monotonic
 
 import numpy as np
 
@@ -164,7 +165,8 @@ def _advance(
     k, failure = 0, None
     try:
         for k in steps:
-            blocks.look()
+            if monotonic() > blocks.due:
+                blocks.hand_over()
             if interrupts.signals:
                 failure = f"interrupted at t = {experiment.time(k):.12g} s"
                 break

@@ -48,6 +48,8 @@ def stepped(
     block, failure = blocks.block, layout.Failure()
     k, outcome = 0, layout.DUE
     while outcome == layout.DUE and k < run.steps:
+        if block.n == block.most:
+            blocks.hand_over()
         before = block.n
         outcome = advance(run, k, _GLANCE, block, failure)
         k += block.n - before

@@ -41,12 +41,13 @@ def steps(n: int) -> Experiment:
 
 
 @needs_compiler
-def test_auto_compiles_for_many_steps_and_then_takes_it_for_few(cache):
+def test_auto_compiles_for_many_steps_and_then_takes_it_for_fewer(cache):
     assert loop.chosen("auto", steps(100)).name == "python"
     assert not cache.exists()
     assert loop.chosen("auto", steps(100_000)).name == "compiled"
     assert len(list(cache.iterdir())) == 1
     assert loop.chosen("auto", steps(100)).name == "compiled"
+    assert loop.chosen("auto", steps(1)).name == "python"
 
 
 def test_without_a_compiler_auto_is_silent_and_compiled_says_what_to_install(no_compiler):
