@@ -33,6 +33,7 @@ from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.experiments import bundle
 from orchestrator.experiments.wiring import closed_loop as wired
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.loop import chosen
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
 from orchestrator.system.structure import System
@@ -85,7 +86,8 @@ def in_our_master(system: System, loop: str, order: str, steps: int) -> float:
 
     def run(n: int) -> float:
         experiment = Experiment(n * STEP, STEP, order)
-        return timed(lambda: simulate(system, experiment, [Table()], loop=loop))
+        steps_of = chosen(loop, experiment)
+        return timed(lambda: simulate(system, experiment, [Table()], loop=steps_of))
 
     return run(steps) - run(1)
 

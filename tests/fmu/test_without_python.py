@@ -15,8 +15,11 @@ import fmpy
 import numpy as np
 import pytest
 
+from fmus.packaging.compilers import FLAGS
+from fmus.packaging.platforms import TARGETS
 from orchestrator.exchange import c_host
 from orchestrator.exchange.verify import verify
+from orchestrator.experiments import bundle
 from orchestrator.experiments.scenario import read_scenario
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import Experiment
@@ -117,16 +120,8 @@ def test_host_runs_where_there_is_nothing_but_a_c_library(
     assert "to 100 s, in gauss-seidel order" in said
 
 
-def compiled_by_zig(target: str, ending: str, unpacked: Path, folder: Path, platform: str) -> Path:
-    """The host for another machine, with the libraries of all FMUs for it."""
-    command = [sys.executable, "-m", "ziglang", "cc", "-target", target]
-    flags = ["-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "fmi2.c", "-lm"]
-    for name in NAMES:
-        made = folder / name / "binaries" / platform / f"{name}{ending}"
-        made.parent.mkdir(parents=True)
-        sources = unpacked / name / "sources"
-        subprocess.run([*command, *flags, "-o", made], cwd=sources, check=True)
-    return c_host.compiled(folder, command, f"host.{platform}")
+def zig(machine: str) -> list[str]:
+    return [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[machine]]
 
 
 def run_elsewhere(
@@ -140,16 +135,26 @@ def run_elsewhere(
 
 
 @pytest.fixture(scope="module")
-def windows(unpacked: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def windows(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The host for Windows, and the libraries that the build makes for it."""
     folder = tmp_path_factory.mktemp("windows")
-    compiled_by_zig("x86_64-windows-gnu", ".dll", unpacked, folder, "win64")
+    bundle.build(folder, kind="native", platforms="win64")
+    for name in NAMES:
+        fmpy.extract(folder / f"{name}.fmu", unzipdir=folder / name)
+    c_host.compiled(folder, zig("x86_64-windows"), "host.exe")
     return folder
 
 
 @pytest.fixture(scope="module")
 def arm(unpacked: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The host for ARM, and libraries made from the sources: FMI 2.0 has no name for it."""
     folder = tmp_path_factory.mktemp("arm")
-    compiled_by_zig("aarch64-linux-gnu", ".so", unpacked, folder, "aarch64-linux")
+    for name in NAMES:
+        made = folder / name / "binaries" / "arm" / f"{name}.so"
+        made.parent.mkdir(parents=True)
+        command = [*zig("aarch64-linux"), *FLAGS, "-o", made, "fmi2.c", "-lm"]
+        subprocess.run(command, cwd=unpacked / name / "sources", check=True)
+    c_host.compiled(folder, zig("aarch64-linux"), "host")
     return folder
 
 
@@ -158,7 +163,7 @@ def arm(unpacked: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @each_scenario
 def test_windows_gives_the_same_but_for_rounding(native: Path, windows: Path, scenario: str):
     """Its C library has another sine."""
-    command = [str(WINE), windows / "host.win64"]
+    command = [str(WINE), windows / "host.exe"]
     library = place(windows, "win64", ".dll")
     there, here = run_elsewhere(system_of(native, scenario), windows, command, library)
     np.testing.assert_allclose(there, here, rtol=0.0, atol=1e-9)
@@ -169,8 +174,8 @@ def test_windows_gives_the_same_but_for_rounding(native: Path, windows: Path, sc
 @pytest.mark.skipif(not ARM_LIBRARIES.is_dir(), reason="there is no C library for ARM")
 @each_scenario
 def test_arm_gives_the_same_bit_for_bit(native: Path, arm: Path, scenario: str):
-    command = [str(QEMU), "-L", ARM_LIBRARIES, arm / "host.aarch64-linux"]
-    library = place(arm, "aarch64-linux", ".so")
+    command = [str(QEMU), "-L", ARM_LIBRARIES, arm / "host"]
+    library = place(arm, "arm", ".so")
     there, here = run_elsewhere(system_of(native, scenario), arm, command, library)
     np.testing.assert_array_equal(there, here)
 
