@@ -58,10 +58,11 @@ def compiler_for(platforms: Sequence[Platform]) -> Compiler:
     if find_spec("ziglang") is not None:
         command = [sys.executable, "-m", "ziglang", "cc"]
         return Compiler(f"ziglang {version('ziglang')}", command, targets=True)
-    brought = "pip install 'auv-fmu[native]' brings one"
-    if others:
-        raise OSError(f"there is no C compiler for {', '.join(others)}: {brought}")
-    raise OSError(f"there is no C compiler on this machine: install gcc or clang, or {brought}")
+    names = ", ".join(others or [platform.name for platform in platforms])
+    remedy = "pip install 'auv-fmu[native]' brings one"
+    if not others and this_machine().endswith("-linux"):
+        remedy = f"install gcc or clang, or {remedy}"
+    raise OSError(f"there is no C compiler for {names}: {remedy}")
 
 
 def _version_of(command: str) -> str:

@@ -18,6 +18,9 @@ from orchestrator.system.structure import Connection, System
 from orchestrator.system.unpacking import unpacked
 from orchestrator.system.values import real, unit_of
 
+#: How the file of a newer version begins.
+_NEWER = re.compile(rb"<(\w+:)?SystemStructureDescription\b[^>]*\bversion=[\"']2\.")
+
 #: What is not read and would change the numbers, by the names of its elements.
 _UNSUPPORTED = {
     "transformations in connections": {
@@ -39,11 +42,9 @@ def read_ssp(archive: Path) -> System:
     """
     folder = unpacked(archive)
     try:
-        root = ElementTree.parse(folder / STRUCTURE).getroot()
-        _check_version(archive, root)
+        _check_version((folder / STRUCTURE).read_bytes())
         description = fmpy_ssd.read_ssd(str(archive))
-    except InputError:
-        raise
+        root = ElementTree.parse(folder / STRUCTURE).getroot()
     except Exception as error:
         raise InputError(f"{archive}: not a readable SSP: {reason(error)}") from error
     _check_supported(archive, root)
@@ -71,10 +72,10 @@ def read_ssp(archive: Path) -> System:
     return found.with_parameters(_parameters(archive, system, found))
 
 
-def _check_version(archive: Path, root: ElementTree.Element) -> None:
-    version = root.get("version", "")
-    if version.startswith("2."):
-        raise InputError(f"{archive}: is an SSP {version}; this master takes SSP 1.0 with FMI 2.0")
+def _check_version(structure: bytes) -> None:
+    """Refuse what the schema of SSP 1.0 would take many lines to refuse."""
+    if _NEWER.search(structure):
+        raise ValueError("it is an SSP 2.0; this master takes SSP 1.0 with FMUs of FMI 2.0")
 
 
 def _check_supported(archive: Path, root: ElementTree.Element) -> None:

@@ -59,7 +59,7 @@ def test_only_what_cannot_be_made_is_named(machine: pytest.MonkeyPatch):
 def test_machine_without_a_compiler(machine: pytest.MonkeyPatch):
     machine.setattr(compilers, "compiler", lambda: None)
     with pytest.raises(
-        OSError, match="no C compiler on this machine: install gcc or clang, or pip "
+        OSError, match="no C compiler for linux64: install gcc or clang, or pip install"
     ):
         compiler_for(platforms("2", "linux64"))
     with_zig(machine)
