@@ -1,7 +1,8 @@
 /* Values of ports, what may be done with them, and what is refused.
  *
- * A port's value reference is its place in the table. All Real inputs and all Real outputs lie side by
- * side, in their order, so that a host that passes them all in one call costs one comparison.
+ * A port's value reference is its place in the table. All Real inputs and all Real outputs lie
+ * side by side, in their order, so that a host that passes them all in one call costs one
+ * comparison.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -62,13 +63,9 @@ static void refuse(instance *it, string what, message *why) {
 
 /* Ports */
 
-static void no_port(message *why, string kind, uint32_t reference) {
-    compose(why, "no %s has the value reference %u", kind, reference);
-}
-
 static void refuse_reference(instance *it, string kind, uint32_t reference) {
     message why;
-    no_port(&why, kind, reference);
+    compose(&why, "no %s has the value reference %u", kind, reference);
     refuse(it, REFERENCE, &why);
 }
 
@@ -127,17 +124,17 @@ static double parameter(const parameter_values *values, const port *port) {
 
 static void put_parameter(parameter_values *values, const port *port, double number) {
     char *place = (char *)values + port->place;
-    int integer = (int)number;
     if (port->kind == REAL) {
         memcpy(place, &number, sizeof number);
     } else {
+        int integer = (int)number;
         memcpy(place, &integer, sizeof integer);
     }
 }
 
 /* Getting */
 
-/* The value of a port as a number; 0.0, if no port of the type has the reference, which is refused. */
+/* The value of a port as a number; 0.0, and a refusal, if no port of the type has the reference. */
 static double number_of(instance *it, uint32_t reference, kind kind) {
     const port *port = port_of(reference, kind);
     if (port == NULL) {
