@@ -10,8 +10,8 @@ from fmus.ports.port import FAULT, H_MAX, Port, Value
 _HEAD = """\
 /* The ports: a value reference is a place in the first table.
  *
- * Made from the declaration of the ports. The columns are name, type, causality, variability, place of
- * the value, start, minimum, maximum, choices; inputs and outputs lie at their numbers.
+ * Made from the declaration of the ports. The columns are name, type, causality, variability,
+ * place of the value, start, minimum, maximum, choices; inputs and outputs lie at their numbers.
  */
 #include <float.h>
 #include <stddef.h>
