@@ -9,7 +9,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
-from auv_fmu import __version__
 from fmus import native
 from fmus.packaging import documentation
 from fmus.packaging.compilers import Compiler, library
@@ -66,8 +65,6 @@ _IDENTITY = """\
 
 #define MODEL_NAME "{name}"
 #define MODEL_GUID "{guid}"
-#define MODEL_VERSION "{version}"
-#define MODEL_PREFIX {name}_
 
 #endif
 """
@@ -101,7 +98,7 @@ def fmu_entries(
         return version.describe(component, declared.DESCRIPTION, guid, declared.PORTS)
 
     guid = guid_of(digest_of({**sources, "modelDescription.xml": description("")}))
-    identity = _IDENTITY.format(name=component, guid=guid, version=__version__)
+    identity = _IDENTITY.format(name=component, guid=guid)
     sources["identity.h"] = identity.encode()
     page = documentation.html(component, NATIVE, fmi)
     return {

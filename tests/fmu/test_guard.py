@@ -101,6 +101,7 @@ def steps(fmu: RawFmu, component: int) -> int:
         *(("name of the instance is not UTF-8", {"name": b"a" + bad}) for bad in NOT_UTF8),
         ("GUID is not UTF-8", {"guid": b"\xff"}),
         ("is not that of this FMU", {"guid": b"{00000000-0000-0000-0000-000000000000}"}),
+        ("is not that of this FMU", {"guid": b"{}"}),
         ("co-simulation only", {"kind": MODEL_EXCHANGE}),
         ("co-simulation only", {"kind": 77}),
     ],
@@ -136,11 +137,13 @@ def test_place_without_a_slave_is_null_with_one_message(python_fmu, what, locati
 
 def test_guid_is_that_of_the_description_or_not_stated(fmu: RawFmu, folder: Path):
     stated = fmpy.read_model_description(folder).guid.encode()
-    for guid in (None, b"", stated):
+    for guid in (None, b"", stated, stated.strip(b"{}")):
         made = fmu.instantiate(guid=guid)
         assert made
         fmu.FreeInstance(made)
     assert fmu.messages == []
+    for guid in (stated + b"x", b"x" + stated, stated[:-2]):
+        assert fmu.instantiate(guid=guid) is None
 
 
 @pytest.mark.parametrize(

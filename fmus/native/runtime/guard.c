@@ -50,13 +50,17 @@ static void choose_messages(call *this, int logging, size_t n, const string cate
 
 /* Instances */
 
-/* Whether two GUIDs are the same, with or without braces. */
+/* Where a GUID begins and how long it is, without braces. */
+static size_t without_braces(string *token) {
+    *token += strspn(*token, "{}");
+    size_t length = strlen(*token);
+    while (length > 0 && strchr("{}", (*token)[length - 1]) != NULL) length--;
+    return length;
+}
+
 static int same_token(string one, string other) {
-    static const char braces[] = "{}";
-    one += strspn(one, braces);
-    other += strspn(other, braces);
-    size_t length = strcspn(one, braces);
-    return strcspn(other, braces) == length && strncmp(one, other, length) == 0;
+    size_t length = without_braces(&one);
+    return without_braces(&other) == length && memcmp(one, other, length) == 0;
 }
 
 static int can_be_made(string wrong, string name, string token, message *why) {
