@@ -10,8 +10,8 @@ from fmus.ports.port import FAULT, H_MAX, Port, Value
 _HEAD = """\
 /* The ports: a value reference is a place in the first table.
  *
- * Made from the declaration of the ports. The columns are name, type, causality, variability, place of
- * the value, start, minimum, maximum, choices; inputs and outputs lie at their numbers.
+ * Made from the declaration of the ports. The columns are name, type, causality, variability,
+ * place of the value, start, minimum, maximum, choices; inputs and outputs lie at their numbers.
  */
 #include <float.h>
 #include <stddef.h>
@@ -24,7 +24,7 @@ def tables(package: str) -> str:
     """The file ports.h of a component, for example of `fmus.auv_plant`."""
     module = import_module(f"{package}.ports")
     ports: Sequence[Port] = (*module.PORTS, FAULT)
-    places = {H_MAX.name: "PARAMETER_AT(h_max)"}
+    places = {FAULT.name: "0", H_MAX.name: "PARAMETER_AT(h_max)"}
     for name, path in module.PARAMETERS.paths.items():
         places[name] = f"PARAMETER_AT(model.{_member(path)})"
     references = {
@@ -61,7 +61,7 @@ def _row(port: Port, places: Mapping[str, str]) -> str:
             port.kind.upper(),
             port.causality.upper(),
             port.variability.upper(),
-            places.get(port.name, "0"),
+            places[port.name],
             _number(port, port.start or 0.0),
             "-DBL_MAX" if port.minimum is None else _number(port, port.minimum),
             "DBL_MAX" if port.maximum is None else _number(port, port.maximum),

@@ -19,9 +19,9 @@ from typing import Any
 import fmpy
 import pytest
 
-from fmus.packaging.kinds import NATIVE, PYTHON
 from fmus.packaging.loader import compiler
 from fmus.packaging.own import build_own
+from support.kinds import FIXTURES
 from support.raw_fmi import (
     DISCARD,
     ERROR,
@@ -33,9 +33,6 @@ from support.raw_fmi import (
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
 
-#: The fixtures with the FMUs of each kind.
-FOLDERS = {PYTHON: "dist", NATIVE: "native"}
-
 #: A Real input and the String parameter of the controller, and what is no UTF-8.
 NOT_UTF8 = [b"\xff", b"\xc0\xaf", b"\xed\xa0\x80", b"\xf4\x90\x80\x80", b"\xe2\x82", b"\x80"]
 
@@ -45,7 +42,7 @@ def python_folder(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return unpacked(dist, tmp_path_factory)
 
 
-@pytest.fixture(scope="module", params=FOLDERS.values(), ids=FOLDERS.keys())
+@pytest.fixture(scope="module", params=FIXTURES.values(), ids=FIXTURES.keys())
 def fmus(request: pytest.FixtureRequest) -> Path:
     """The FMUs of one of the kinds."""
     folder: Path = request.getfixturevalue(request.param)
@@ -402,6 +399,24 @@ def test_freed_state_and_its_copies_are_dead(fmu: RawFmu, component: int):
     assert fmu.SetFMUstate(component, copy) == ERROR
     assert fmu.FreeFMUstate(component, copy) == ERROR
     assert fmu.GetFMUstate(component, copy) == ERROR
+
+
+def test_handle_is_given_once(fmu: RawFmu, component: int):
+    """Whatever is freed in between, and with more alive than a table begins with."""
+    handles = []
+    for _ in range(100):
+        made = fmu.instantiate()
+        handles.append(made)
+        fmu.FreeInstance(made)
+    states = [c_void_p() for _ in range(3000)]
+    for _ in range(2):
+        for state in states:
+            assert fmu.GetFMUstate(component, state) == OK
+        handles += [state.value for state in states]
+        assert fmu.SetFMUstate(component, states[-1]) == OK
+        for state in states:
+            assert fmu.FreeFMUstate(component, state) == OK
+    assert len({component, *handles}) == 1 + len(handles)
 
 
 def test_states_end_with_their_instance(fmu: RawFmu, component: int):

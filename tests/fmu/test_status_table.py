@@ -9,10 +9,10 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.packaging.kinds import NATIVE, PYTHON
 from orchestrator.experiments import bundle
 from support.calls import CASES
 from support.instances import NAMES
+from support.kinds import FIXTURES
 from support.status_table import (
     CREATION,
     ERROR,
@@ -24,9 +24,6 @@ from support.status_table import (
 )
 from support.trials import SKIPPED, Cell, trials
 from support.worker import Lost, Worker
-
-#: The fixtures with the FMUs of each kind.
-FOLDERS = {PYTHON: "dist", NATIVE: "native"}
 
 #: Longest time for a trial, on a slow machine [s].
 PATIENCE = 60.0
@@ -55,14 +52,14 @@ def unpacked(fmus: Path, folder: Path, *names: str) -> list[Path]:
     return [folder / name for name in names]
 
 
-@pytest.fixture(scope="module", params=product(FOLDERS, NAMES), ids="-".join)
+@pytest.fixture(scope="module", params=product(FIXTURES, NAMES), ids="-".join)
 def worker(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Worker[Cell, str]]:
     """A process that tries cells on one of the FMUs, of one of the kinds."""
     kind, name = request.param
     another = NAMES[NAMES.index(name) - 1]
-    fmus = request.getfixturevalue(FOLDERS[kind])
+    fmus = request.getfixturevalue(FIXTURES[kind])
     folders = unpacked(fmus, tmp_path_factory.mktemp("status"), name, another)
     with Worker(trials, *folders, kind) as process:
         yield process

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fmus.packaging.kinds import NATIVE, PYTHON
 from orchestrator.errors import InputError
 from orchestrator.experiments.scenario import read_scenario
 from orchestrator.experiments.wiring import closed_loop
@@ -16,6 +17,9 @@ from orchestrator.master.observer import Ending
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
 from orchestrator.system.names import port_name
+
+#: The fixtures with the FMUs of each kind.
+FIXTURES = {PYTHON: "dist", NATIVE: "native"}
 
 
 @dataclass(frozen=True)

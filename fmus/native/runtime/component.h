@@ -1,7 +1,7 @@
 /* The component as the functions of an FMI version see it: fmi2.c and fmi3.c are written over this.
  *
- * Such a file includes this one first, and component.c, so that all is one translation unit; it defines
- * what is declared under "The version". A function of FMI is then
+ * Such a file includes this one first, and component.c, so that all is one translation unit; it
+ * defines what is declared under "The version". A function of FMI is then
  *
  *     call this = begin(handle, "fmi2Terminate", NOT_AFTER_ERROR);
  *     if (GOES_ON(this, NULL)) terminate(&this);

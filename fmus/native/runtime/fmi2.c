@@ -70,7 +70,9 @@ EXPORT string FMI2(fmi2GetVersion)(void) { return "2.0"; }
 EXPORT void *FMI2(fmi2Instantiate)(string name, int type, string guid, string location,
                                    const callbacks *functions, int visible, int logging) {
     logger host = {NULL, NULL};
-    if (functions != NULL) host = (logger){(void (*)(void))functions->logger, functions->environment};
+    if (functions != NULL) {
+        host = (logger){(void (*)(void))functions->logger, functions->environment};
+    }
     (void)location;
     (void)visible;
     return instantiate("fmi2Instantiate",

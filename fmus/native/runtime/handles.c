@@ -5,8 +5,8 @@
  * what is alive, without looking where a wrong address points to. (Where a pointer has 32 bits, a
  * number comes again after some thousand.)
  *
- * A call holds the entry of its instance, or state, from its beginning to its end. Entries stay where
- * they are, so that they can be looked up while others come and go.
+ * A call holds the entry of its instance, or state, from its beginning to its end. Entries stay
+ * where they are, so that they can be looked up while others come and go.
  */
 #include <stdlib.h>
 
@@ -113,8 +113,8 @@ static int is_alive(entry *it, void *handle) {
     return it != NULL && get_shared(&it->handle) == handle && handle != NULL;
 }
 
-/* The entry of a handle, which no other thread holds until it is let go; NULL if there is none, or if
- * this thread holds it already, which `inside` tells. */
+/* The entry of a handle, which no other thread holds until it is let go; NULL if there is none, or
+ * if this thread holds it already, which `inside` tells. */
 static entry *hold(void *handle, thing_kind kind, int *inside) {
     size_t place = (uintptr_t)handle & (MOST_ENTRIES - 1);
     entry *chunk = get_shared(&chunks[place >> CHUNK_BITS]);

@@ -1,5 +1,5 @@
-/* What a host hands over, and what it is told: the same for components in C and for the loader of those
- * in Python.
+/* What a host hands over, and what it is told: the same for components in C and for the loader of
+ * those in Python.
  *
  * utf8.c       which bytes are text
  * arguments.c  what can be wrong with arrays

@@ -1,7 +1,7 @@
 /* Python's random numbers: random.Random(seed).gauss(0.0, 1.0), bit for bit.
  *
- * The Mersenne Twister MT19937 of Matsumoto and Nishimura, seeded as Python seeds it with an integer
- * of one word; https://doi.org/10.1145/272991.272995
+ * The Mersenne Twister MT19937 of Matsumoto and Nishimura (https://doi.org/10.1145/272991.272995),
+ * seeded as Python seeds it with an integer of one word.
  */
 #include <math.h>
 

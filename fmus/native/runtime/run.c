@@ -1,7 +1,7 @@
 /* Modes and steps.
  *
- * A step is a transaction: state and outputs change together, after everything was computed and found
- * finite.
+ * A step is a transaction: state and outputs change together, after everything was computed and
+ * found finite.
  */
 #include <math.h>
 
@@ -11,8 +11,8 @@ static const double ROUNDING = 1e-9;
 /* Longest step of a component that has no internal steps [s]. */
 static const double NO_LIMIT = 1e300;
 
-/* Largest norm of a state. No vehicle comes near it, and from a state below it a step with sane inputs
- * is always finite: one wild sample must not be the end of a run. */
+/* Largest norm of a state. No vehicle comes near it, and from a state below it a step with sane
+ * inputs is always finite: one wild sample must not be the end of a run. */
 static const double LARGEST_STATE = 1e100;
 
 /* More internal steps than this in one communication step are taken for a mistake. */
@@ -22,7 +22,9 @@ static const double MOST_INTERNAL_STEPS = 1e6;
 static run new_run(void) {
     run it = {.parameters.h_max = NO_LIMIT};
     for (int i = 0; i < N_PORTS; i++) {
-        if (ports[i].causality == PARAMETER) put_parameter(&it.parameters, &ports[i], ports[i].start);
+        if (ports[i].causality == PARAMETER) {
+            put_parameter(&it.parameters, &ports[i], ports[i].start);
+        }
     }
     return it;
 }
@@ -204,7 +206,8 @@ static int advance(instance *it, double time, double step, message *why) {
     }
     error.raised = 0;
     next->state = now->state;
-    if (!model_credible(parameters, &now->state.groups, inputs, &error)) {
+    int credible = model_credible(parameters, &now->state.groups, inputs, &error);
+    if (!credible && !error.raised) {
         compose(&said, MODEL_RESTARTED, time);
         say(it, &said, FMI_WARNING, "observer restarted");
         model_restart(parameters, &next->state.groups, inputs, &error);

@@ -1,7 +1,7 @@
 /* The state of an FMU: complete, exact, as bytes, and checked before it is taken.
  *
- * It is held in memory as the bytes that it is serialised to. All numbers are little-endian; Reals are
- * IEEE 754 doubles, all others have four bytes:
+ * It is held in memory as the bytes that it is serialised to. All numbers are little-endian; Reals
+ * are IEEE 754 doubles, all others have four bytes:
  *
  *     MAGIC, identity, mode, start time, time,
  *     parameters and inputs in the order of their ports, outputs,
@@ -12,7 +12,6 @@
  *
  * A text is its length and its bytes.
  */
-#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -310,8 +309,8 @@ static int nearly_equal(const double one[], const double other[], size_t n) {
     return 1;
 }
 
-/* Whether a run can have led to a state and outputs, all of them finite; what follows from the state
- * is computed. */
+/* Whether a run can have led to a state and outputs, all of them finite; what follows from the
+ * state is computed. */
 static int can_be_reached(run *it, message *why) {
     const model_parameters *parameters = &it->parameters.model;
     moment *now = &it->moments[it->now];
@@ -322,8 +321,7 @@ static int can_be_reached(run *it, message *why) {
     model_derive(parameters, &now->state.groups, &error);
     model_expected(parameters, &now->state.groups, &now->outputs.groups, &expected.groups, &error);
     if (error.raised) return compose(why, "%s", error.why);
-    if (MODEL_EXPECTS &&
-        !nearly_equal(expected.values, now->outputs.values, MODEL_OUTPUTS)) {
+    if (MODEL_EXPECTS && !nearly_equal(expected.values, now->outputs.values, MODEL_OUTPUTS)) {
         return compose(why, "its outputs are not those of its state");
     }
     return 1;

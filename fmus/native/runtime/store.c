@@ -1,7 +1,8 @@
 /* Values of ports, what may be done with them, and what is refused.
  *
- * A port's value reference is its place in the table. All Real inputs and all Real outputs lie side by
- * side, in their order, so that a host that passes them all in one call costs one comparison.
+ * A port's value reference is its place in the table. All Real inputs and all Real outputs lie
+ * side by side, in their order, so that a host that passes them all in one call costs one
+ * comparison.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -62,13 +63,9 @@ static void refuse(instance *it, string what, message *why) {
 
 /* Ports */
 
-static void no_port(message *why, string kind, uint32_t reference) {
-    compose(why, "no %s has the value reference %u", kind, reference);
-}
-
 static void refuse_reference(instance *it, string kind, uint32_t reference) {
     message why;
-    no_port(&why, kind, reference);
+    compose(&why, "no %s has the value reference %u", kind, reference);
     refuse(it, REFERENCE, &why);
 }
 
@@ -127,17 +124,17 @@ static double parameter(const parameter_values *values, const port *port) {
 
 static void put_parameter(parameter_values *values, const port *port, double number) {
     char *place = (char *)values + port->place;
-    int integer = (int)number;
     if (port->kind == REAL) {
         memcpy(place, &number, sizeof number);
     } else {
+        int integer = (int)number;
         memcpy(place, &integer, sizeof integer);
     }
 }
 
 /* Getting */
 
-/* The value of a port as a number; 0.0, if no port of the type has the reference, which is refused. */
+/* The value of a port as a number; 0.0, and a refusal, if no port of the type has the reference. */
 static double number_of(instance *it, uint32_t reference, kind kind) {
     const port *port = port_of(reference, kind);
     if (port == NULL) {
@@ -150,9 +147,14 @@ static double number_of(instance *it, uint32_t reference, kind kind) {
     return it->run.moments[it->run.now].outputs.values[port->place];
 }
 
+/* Whether references are those of all inputs, or outputs, in their order. */
+static int are_all(const uint32_t references[], const uint32_t all[], size_t n) {
+    return n > 0 && memcmp(references, all, n * sizeof *all) == 0;
+}
+
 static void get_reals(instance *it, const uint32_t references[], size_t n, double values[]) {
     if (it->stale) refresh(it);
-    if (n == MODEL_OUTPUTS && memcmp(references, output_references, n * sizeof *references) == 0) {
+    if (n == MODEL_OUTPUTS && are_all(references, output_references, n)) {
         memcpy(values, it->run.moments[it->run.now].outputs.values, n * sizeof *values);
         return;
     }
@@ -223,8 +225,7 @@ static int all_finite(const double values[], size_t n) {
 static void set_reals(instance *it, const uint32_t references[], size_t n, const double values[]) {
     run *run = &it->run;
     if (n == MODEL_INPUTS && run->mode == STEPPING && run->refused == NULL &&
-        memcmp(references, input_references, n * sizeof *references) == 0 &&
-        all_finite(values, n)) {
+        are_all(references, input_references, n) && all_finite(values, n)) {
         memcpy(run->inputs.values, values, n * sizeof *values);
         return;
     }

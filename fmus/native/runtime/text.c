@@ -69,8 +69,8 @@ static decimal next_above(decimal it) {
 /* The fewest digits that read back as the number. */
 static decimal shortest(double magnitude) {
     int exponent;
-    /* Below a power of two numbers lie closer than above it: the nearest digits may be too far below
-     * it, and those above near enough. */
+    /* Below a power of two numbers lie closer than above it: the nearest digits may be too far
+     * below it, and those above near enough. */
     int power_of_two = frexp(magnitude, &exponent) == 0.5;
     for (int n = 1;; n++) {
         decimal it = rounded(magnitude, n);
@@ -104,7 +104,7 @@ static void append_number(message *it, double number, int exactly) {
     append_text(it, text);
 }
 
-/* A text as Python's repr shows it, but for rare characters that Python knows not to be printable. */
+/* A text as Python's repr shows it, but for rare characters that it takes to be unprintable. */
 static void append_quoted(message *it, string text) {
     char quote = strchr(text, '\'') != NULL && strchr(text, '"') == NULL ? '"' : '\'';
     char ends[] = {quote, '\0'};
@@ -113,12 +113,13 @@ static void append_quoted(message *it, string text) {
         char shown[16];
         uint32_t character;
         int length = character_of(text, &character);
-        int control = character < 0x20 || (character >= 0x7f && character <= 0xa0) || character == 0xad;
+        int unprintable = character < 0x20 || (character >= 0x7f && character <= 0xa0) ||
+                          character == 0xad;
         if (character == '\\' || character == (unsigned char)quote) {
             snprintf(shown, sizeof shown, "\\%c", (char)character);
         } else if (character == '\t' || character == '\n' || character == '\r') {
             snprintf(shown, sizeof shown, "\\%c", "tn\0\0r"[character - '\t']);
-        } else if (control) {
+        } else if (unprintable) {
             snprintf(shown, sizeof shown, "\\x%02x", (unsigned)character);
         } else {
             snprintf(shown, sizeof shown, "%.*s", length, text);

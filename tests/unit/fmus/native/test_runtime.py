@@ -246,3 +246,16 @@ def test_several_components_can_be_linked_into_one_program(tmp_path: Path):
     (tmp_path / "linked.c").write_text(LINKED)
     compile_in(tmp_path, "-o", "linked", "linked.c", *objects, "-lm")
     subprocess.run([tmp_path / "linked"], check=True)
+
+
+def test_memory_that_there_is_not_is_an_error_and_nothing_worse(tmp_path: Path):
+    """Whichever allocation fails first, with all that come after it."""
+    folder = written(tmp_path / "sources", "AuvPlant")
+    source = Path(__file__).with_name("no_memory.c")
+    sanitizers = ("-fsanitize=address,undefined", "-fno-sanitize-recover")
+    compile_in(folder, *sanitizers, "-I.", "-o", "no_memory", source, "-lm")
+    process = subprocess.run(
+        [folder / "no_memory"], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert process.returncode == 0, process.stderr
+    assert int(process.stdout) > 8, "each kind of call that allocates has failed once"
