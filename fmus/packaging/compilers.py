@@ -58,8 +58,10 @@ def compiler_for(platforms: Sequence[Platform]) -> Compiler:
     if find_spec("ziglang") is not None:
         command = [sys.executable, "-m", "ziglang", "cc"]
         return Compiler(f"ziglang {version('ziglang')}", command, targets=True)
-    need = f"for {', '.join(others)}" if own is not None else "on this machine"
-    raise OSError(f"there is no C compiler {need}: pip install 'auv-fmu[native]' brings one")
+    brought = "pip install 'auv-fmu[native]' brings one"
+    if others:
+        raise OSError(f"there is no C compiler for {', '.join(others)}: {brought}")
+    raise OSError(f"there is no C compiler on this machine: install gcc or clang, or {brought}")
 
 
 def _version_of(command: str) -> str:

@@ -1,7 +1,7 @@
 """What no slave can be told: wrong pointers, dead handles, text that is none, FMUs without a slave.
 
-None of it may end the host. Each test is one class of mistakes, on one small FMU: the guard is the
-loader's, and the same for all.
+None of it may end the host. Each test is one class of mistakes, on one small FMU of each kind: the
+guard is the loader's, or that of the FMUs in C, and the same for all.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any
 import fmpy
 import pytest
 
+from fmus.packaging.kinds import NATIVE, PYTHON
 from fmus.packaging.loader import compiler
 from fmus.packaging.own import build_own
 from support.raw_fmi import (
@@ -32,15 +33,39 @@ from support.raw_fmi import (
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
 
+#: The fixtures with the FMUs of each kind.
+FOLDERS = {PYTHON: "dist", NATIVE: "native"}
+
 #: A Real input and the String parameter of the controller, and what is no UTF-8.
 NOT_UTF8 = [b"\xff", b"\xc0\xaf", b"\xed\xa0\x80", b"\xf4\x90\x80\x80", b"\xe2\x82", b"\x80"]
 
 
 @pytest.fixture(scope="module")
-def folder(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def python_folder(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return unpacked(dist, tmp_path_factory)
+
+
+@pytest.fixture(scope="module", params=FOLDERS.values(), ids=FOLDERS.keys())
+def fmus(request: pytest.FixtureRequest) -> Path:
+    """The FMUs of one of the kinds."""
+    folder: Path = request.getfixturevalue(request.param)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def folder(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return unpacked(fmus, tmp_path_factory)
+
+
+def unpacked(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     target = tmp_path_factory.mktemp("guarded")
-    fmpy.extract(dist / "ObserverController.fmu", unzipdir=target)
+    fmpy.extract(fmus / "ObserverController.fmu", unzipdir=target)
     return target
+
+
+@pytest.fixture
+def python_fmu(python_folder: Path) -> RawFmu:
+    return RawFmu(python_folder)
 
 
 @pytest.fixture
@@ -81,19 +106,32 @@ def steps(fmu: RawFmu, component: int) -> int:
         ("is not that of this FMU", {"guid": b"{00000000-0000-0000-0000-000000000000}"}),
         ("co-simulation only", {"kind": MODEL_EXCHANGE}),
         ("co-simulation only", {"kind": 77}),
-        ("no resource location", {"location": None}),
-        ("not UTF-8", {"location": b"file:///tmp/%ff"}),
-        ("zero byte", {"location": b"file:///tmp%00/x"}),
-        ("%%20", {"location": b"file:///tmp/a%2520b"}),
-        ("No such file", {"location": b"file:///nowhere"}),
-        ("slavemodule.txt", {"location": b"file://"}),
-        ("File name too long", {"location": b"file:///" + 100_000 * b"x"}),
     ],
 )
 def test_instance_that_cannot_be_is_null_with_one_message(fmu, what, arguments):
-    before = list(sys.path)
     assert fmu.instantiate(**arguments, logging=0) is None
     [message] = fmu.messages
+    assert message.text.startswith("fmi2Instantiate: ")
+    assert what in message.text
+    assert (message.status, message.category) == (ERROR, "logStatusError")
+
+
+@pytest.mark.parametrize(
+    ("what", "location"),
+    [
+        ("no resource location", None),
+        ("not UTF-8", b"file:///tmp/%ff"),
+        ("zero byte", b"file:///tmp%00/x"),
+        ("%%20", b"file:///tmp/a%2520b"),
+        ("No such file", b"file:///nowhere"),
+        ("slavemodule.txt", b"file://"),
+        ("File name too long", b"file:///" + 100_000 * b"x"),
+    ],
+)
+def test_place_without_a_slave_is_null_with_one_message(python_fmu, what, location):
+    before = list(sys.path)
+    assert python_fmu.instantiate(location=location, logging=0) is None
+    [message] = python_fmu.messages
     assert what in message.text
     assert (message.status, message.category) == (ERROR, "logStatusError")
     assert sys.path == before
@@ -143,9 +181,11 @@ def test_guid_is_that_of_the_description_or_not_stated(fmu: RawFmu, folder: Path
          "exception set"),
     ],
 )  # fmt: skip
-def test_folder_without_a_slave_is_null_with_one_message(fmu, folder, tmp_path, files, what):
+def test_folder_without_a_slave_is_null_with_one_message(
+    python_fmu, python_folder, tmp_path, files, what
+):
     resources = tmp_path / "resources"
-    shutil.copytree(folder / "resources", resources)
+    shutil.copytree(python_folder / "resources", resources)
     script = (resources / "slavemodule.txt").read_text()
     for name, content in files.items():
         path = resources / name.format(script=script)
@@ -153,26 +193,28 @@ def test_folder_without_a_slave_is_null_with_one_message(fmu, folder, tmp_path, 
         if content is not None:
             path.write_bytes(content)
     before = list(sys.path)
-    assert fmu.instantiate(location=resources.as_uri().encode(), logging=0) is None
-    [message] = fmu.messages
+    assert python_fmu.instantiate(location=resources.as_uri().encode(), logging=0) is None
+    [message] = python_fmu.messages
     assert what in message.text
     assert message.status in (ERROR, FATAL)
     assert sys.path == before
-    made = fmu.instantiate()
+    made = python_fmu.instantiate()
     assert made, "the sound one still works"
-    fmu.FreeInstance(made)
+    python_fmu.FreeInstance(made)
 
 
-def test_library_beside_the_loader_is_found_where_the_loader_was(folder, tmp_path, monkeypatch):
+def test_library_beside_the_loader_is_found_where_the_loader_was(
+    python_folder, tmp_path, monkeypatch
+):
     """A host may load by a path from the current folder, and then go elsewhere."""
     libraries = "binaries/linux64"
     for name in ("ours", "theirs"):
-        shutil.copytree(folder / libraries, tmp_path / name / libraries)
+        shutil.copytree(python_folder / libraries, tmp_path / name / libraries)
     (tmp_path / "theirs" / libraries / "ObserverController_pythonfmu.so").write_text("planted")
     monkeypatch.chdir(tmp_path / "ours")
     fmu = RawFmu(Path())
     monkeypatch.chdir(tmp_path / "theirs")
-    made = fmu.instantiate(location=(folder / "resources").as_uri().encode())
+    made = fmu.instantiate(location=(python_folder / "resources").as_uri().encode())
     assert made, fmu.messages
     fmu.FreeInstance(made)
 
@@ -336,8 +378,8 @@ def test_no_function_touches_what_is_not_alive(fmu: RawFmu, capfd):
     assert fmu.messages == []
 
 
-def test_handle_of_another_fmu_is_told_from_ones_own(fmu: RawFmu, dist: Path, tmp_path: Path):
-    fmpy.extract(dist / "MotionPlanner.fmu", unzipdir=tmp_path)
+def test_handle_of_another_fmu_is_told_from_ones_own(fmu: RawFmu, fmus: Path, tmp_path: Path):
+    fmpy.extract(fmus / "MotionPlanner.fmu", unzipdir=tmp_path)
     other = RawFmu(tmp_path)
     theirs, ours = other.initialised(), fmu.initialised()
     assert steps(fmu, theirs) == ERROR
@@ -445,9 +487,11 @@ def test_threads_on_one_instance_take_turns(fmu: RawFmu, component: int):
     assert answers == [OK] * (4 * 200 * 3)
 
 
-def test_threads_that_make_instances_leave_the_process_as_it_was(folder, dist, tmp_path):
-    """Each puts its folder on sys.path while others look for theirs."""
-    fmpy.extract(dist / "MotionPlanner.fmu", unzipdir=tmp_path)
+def test_threads_that_make_instances_leave_the_process_as_it_was(
+    fmus: Path, folder: Path, tmp_path: Path
+):
+    """Each of the Python kind puts its folder on sys.path while others look for theirs."""
+    fmpy.extract(fmus / "MotionPlanner.fmu", unzipdir=tmp_path)
     before, answers = list(sys.path), []
 
     def run(place: Path) -> None:
@@ -456,7 +500,7 @@ def test_threads_that_make_instances_leave_the_process_as_it_was(folder, dist, t
             made = fmu.initialised()
             answers.append(steps(fmu, made))
             fmu.FreeInstance(made)
-            assert fmu.instantiate(location=b"file:///nowhere") is None
+            assert fmu.instantiate(guid=b"{0}", location=b"file:///nowhere") is None
 
     threads = [threading.Thread(target=run, args=(place,)) for place in 3 * (folder, tmp_path)]
     for thread in threads:

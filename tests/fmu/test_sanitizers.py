@@ -14,7 +14,7 @@ from support.sanitizers import GCC, MEMORY, THREADS, sanitize, sanitized_host
 pytestmark = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
 
 #: Calls of a host that makes them at random, and how often it starts anew.
-CALLS, SEEDS = 20_000, range(3)
+CALLS, SEEDS = 5_000, range(2)
 
 
 def sanitized(native: Path, folder: Path, what: str = MEMORY) -> list[str]:

@@ -130,14 +130,9 @@ def compiled_by_zig(target: str, ending: str, unpacked: Path, folder: Path, plat
 
 
 def run_elsewhere(
-    native: Path,
-    folder: Path,
-    scenario: str,
-    command: Sequence[str | Path],
-    library: c_host.Library,
+    system: System, folder: Path, command: Sequence[str | Path], library: c_host.Library
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rows of all Reals on another machine, and here."""
-    system = system_of(native, scenario)
     here = run(system, SHORT.stop_time, SHORT.step)
     names = [name for name in here.header.columns if not name.endswith(".fault")]
     rows, _ = c_host.run(command, folder, c_host.plan(system, SHORT, library), names)

@@ -40,10 +40,14 @@ OUT const char *restarted(void) { return MODEL_RESTARTED; }
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-Wno-unused-function")
 
 
+#: Bytes of what is said of an error, as in arithmetic.h.
+WHY = 512
+
+
 class Error(Structure):
     """The Error of arithmetic.h."""
 
-    _fields_ = (("raised", c_int), ("why", c_char * 256))
+    _fields_ = (("raised", c_int), ("why", c_char * WHY))
 
 
 @cache

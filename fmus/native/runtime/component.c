@@ -7,6 +7,9 @@
 #include "ports.h"
 
 #include "utf8.c"
+#include "arguments.c"
+#include "listener.c"
+
 #include "text.c"
 #include "messages.c"
 #include "handles.c"

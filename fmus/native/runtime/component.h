@@ -1,7 +1,7 @@
 /* The component as the functions of an FMI version see it: fmi2.c and fmi3.c are written over this.
  *
- * Such a file includes this one first, defines what is declared under "The version", and includes
- * component.c, so that all is one translation unit. A function of FMI is then
+ * Such a file includes this one first, and component.c, so that all is one translation unit; it defines
+ * what is declared under "The version". A function of FMI is then
  *
  *     call this = begin(handle, "fmi2Terminate", NOT_AFTER_ERROR);
  *     if (GOES_ON(this, NULL)) terminate(&this);
@@ -15,23 +15,11 @@
 
 #include "platform.h"
 
-#include <stddef.h>
-#include <stdint.h>
-
-typedef const char *string;
-
-/* fmi2Status and fmi3Status. */
-enum { FMI_OK, FMI_WARNING, FMI_DISCARD, FMI_ERROR, FMI_FATAL };
+#include "host.h"
 
 typedef enum { REAL, INTEGER, BOOLEAN, STRING } kind;
 
 typedef struct instance instance;
-
-/* The host's logger, as the version casts it, and what it is called with. */
-typedef struct {
-    void (*function)(void);
-    void *environment;
-} logger;
 
 /* A call between its beginning and its end. */
 typedef struct {
@@ -41,7 +29,7 @@ typedef struct {
     void *entry; /* of the instance in the table of handles */
 } call;
 
-/* The version */
+/* The version: it defines this, and what host.h wants of it. */
 
 /* What it calls things. */
 typedef struct {
@@ -51,10 +39,6 @@ typedef struct {
 } names;
 
 static const names version;
-
-/* Calls the logger, which is not NULL. */
-static void deliver(const logger *host, string instance_name, int status, string category,
-                    string text);
 
 /* Making and freeing */
 
@@ -84,10 +68,6 @@ static int sound(call *this, string wrong);
 
 /* Lets the next call of the instance begin; the status of this one. */
 static int end(call *this);
-
-/* What is wrong with arguments; NULL: nothing. */
-static string wrong_values(size_t n, const uint32_t *references, const void *values);
-static string wrong_strings(size_t n, const uint32_t *references, const string *texts);
 
 /* Messages: errors are told even where logging is off; no categories: all. */
 static void choose_messages(call *this, int logging, size_t n, const string categories[]);

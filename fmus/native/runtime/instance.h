@@ -1,8 +1,7 @@
 /* What the parts of the component know of each other.
  *
- * utf8.c       which bytes are text
  * text.c       texts of messages, with numbers as Python writes them
- * messages.c   what the host is told
+ * messages.c   what an instance says
  * handles.c    tells what is alive from what is not
  * noise.c      Python's random numbers
  * store.c      values of ports, and what may be done with them
@@ -30,14 +29,6 @@ typedef struct {
 
 /* Different messages that an instance logs: a host may step on after a refusal for ever. */
 enum { MOST_MESSAGES = 100 };
-
-typedef struct {
-    logger host;
-    char *name;
-    int logging;
-    size_t n;
-    char **categories;
-} listener;
 
 /* Ports */
 

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-#: The sources; loader.h says what each is for.
+#: The sources; loader.h says what each is for, and fmi2.c includes all others.
 FOLDER = Path(__file__).parent
 
 #: How they are compiled, in their folder, into a library.
@@ -17,7 +17,7 @@ FLAGS = (
     "-std=gnu11", "-shared", "-fPIC", "-fvisibility=hidden", "-pthread",
     # Python holds on to it, so it must stay until the process ends.
     "-Wl,-z,nodelete",
-    *(path.name for path in sorted(FOLDER.glob("*.c"))), "-ldl",
+    "fmi2.c", "-ldl",
 )  # fmt: skip
 
 #: Where PythonFMU's own library goes when the loader takes its name.

@@ -1,41 +1,31 @@
 /* The functions of FMI 2.0: what is sound goes on to PythonFMU. */
+#define _GNU_SOURCE
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "loader.h"
 
-/* More values in one call than any FMU has. PythonFMU takes lists for granted that it cannot get.
- */
-enum { MOST_VALUES = 1 << 20 };
+#include "../../native/runtime/utf8.c"
+#include "../../native/runtime/arguments.c"
+#include "../../native/runtime/listener.c"
+
+#include "messages.c"
+#include "location.c"
+#include "python.c"
+#include "preflight.c"
+#include "handles.c"
+#include "guard.c"
 
 /* More bytes than any state has. */
 static const size_t MOST_BYTES = (size_t)1 << 30;
-
-static string wrong_size(size_t n, const void *array) {
-    if (n > MOST_VALUES) return "more values than there can be";
-    return n > 0 && array == NULL ? "no array" : NULL;
-}
-
-static string wrong_values(size_t n, const void *references, const void *values) {
-    return references == NULL ? wrong_size(n, NULL) : wrong_size(n, values);
-}
-
-static string wrong_strings(size_t n, const string texts[]) {
-    string wrong = wrong_size(n, texts);
-    for (size_t i = 0; i < n && wrong == NULL; i++) {
-        if (texts[i] == NULL) wrong = "a string is NULL";
-        else if (!is_utf8(texts[i])) wrong = "a string is not UTF-8";
-    }
-    return wrong;
-}
 
 /* What PythonFMU answers to a function of its own. */
 #define TO_PYTHONFMU(call, name, parameters, arguments)                                          \
     do {                                                                                         \
         static int(*forward) parameters;                                                         \
         if (forward == NULL) forward = (int(*) parameters)pythonfmu_function(#name);             \
-        (call).status = forward == NULL ? FMI2_FATAL : forward arguments;                        \
+        (call).status = forward == NULL ? FMI_FATAL : forward arguments;                        \
     } while (0)
 
 /* A function that is forwarded as it is if nothing is wrong with its arguments. */
@@ -106,7 +96,7 @@ EXPORT component fmi2Instantiate(string name, int type, string guid, string loca
     }
     free(path);
     if (handle == NULL) {
-        if (!it->host.told) complain(&it->host, FMI2_ERROR, "fmi2Instantiate: %s", why);
+        if (!it->told) complain(it, FMI_ERROR, "fmi2Instantiate: %s", why);
         release_instance(it);
     }
     return handle;
@@ -141,7 +131,7 @@ EXPORT int fmi2Reset(component c) {
     call this = begin(c, "fmi2Reset", ALWAYS);
     if (GOES_ON(this, NULL)) {
         TO_PYTHONFMU(this, fmi2Reset, (component), (this.instance->slave));
-        if (this.status == FMI2_OK) this.instance->condition = SOUND;
+        if (this.status == FMI_OK) this.instance->condition = SOUND;
     }
     return end(&this);
 }
@@ -149,7 +139,7 @@ EXPORT int fmi2Reset(component c) {
 /* Messages are chosen here: PythonFMU would keep errors back, too. */
 EXPORT int fmi2SetDebugLogging(component c, int on, size_t n, const string names[]) {
     call this = begin(c, "fmi2SetDebugLogging", ALWAYS);
-    if (GOES_ON(this, wrong_strings(n, names)) && !choose(&this.instance->host, on, n, names)) {
+    if (GOES_ON(this, wrong_texts(n, names)) && !choose(&this.instance->host, on, n, names)) {
         refuse(&this, "no memory");
     }
     return end(&this);
@@ -183,7 +173,7 @@ GET(fmi2GetString, string)
 SET(fmi2SetReal, const double, wrong_values(n, r, v))
 SET(fmi2SetInteger, const int, wrong_values(n, r, v))
 SET(fmi2SetBoolean, const int, wrong_values(n, r, v))
-SET(fmi2SetString, const string, r == NULL ? wrong_size(n, r) : wrong_strings(n, v))
+SET(fmi2SetString, const string, wrong_strings(n, r, v))
 
 /* States */
 
@@ -199,7 +189,7 @@ static string wrong_place(void **state) {
 /* Hands a state that PythonFMU has made over to the host, in the place of one that it has had. */
 static void hand_over(call *this, component owner, void *made, void **state) {
     void *before = thing_of(*state, STATE);
-    if (this->status != FMI2_OK) return;
+    if (this->status != FMI_OK) return;
     if (before != NULL) {
         replace(*state, made, owner);
         free_state(this->instance, before);
@@ -224,7 +214,7 @@ EXPORT int fmi2SetFMUstate(component c, void *state) {
     if (GOES_ON(this, wrong_state(state))) {
         TO_PYTHONFMU(this, fmi2SetFMUstate, (component, void *),
                      (this.instance->slave, thing_of(state, STATE)));
-        if (this.status == FMI2_OK) this.instance->condition = SOUND;
+        if (this.status == FMI_OK) this.instance->condition = SOUND;
     }
     return end(&this);
 }

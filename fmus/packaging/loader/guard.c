@@ -9,8 +9,6 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include "loader.h"
-
 /* Between two looks whether an instance is still in a call [us]. */
 enum { WAIT = 100 };
 
@@ -22,9 +20,13 @@ static void hear(void *environment, string name, int status, string category, st
 
 instance *new_instance(string name, const callbacks *functions, int logging) {
     instance *it = calloc(1, sizeof *it);
+    logger host = {NULL, NULL};
     if (it == NULL) return NULL;
-    it->heard = (callbacks){.logger = hear, .environment = &it->host};
-    if (!listen(&it->host, name, functions, logging)) {
+    it->heard = (callbacks){.logger = hear, .environment = it};
+    if (functions != NULL) {
+        host = (logger){(void (*)(void))functions->logger, functions->environment};
+    }
+    if (!listen(&it->host, name, host, logging)) {
         free(it);
         return NULL;
     }
@@ -49,7 +51,7 @@ static instance *awaited(component handle) {
 }
 
 call begin(component handle, string function, when when) {
-    call this = {.function = function, .status = FMI2_ERROR};
+    call this = {.function = function, .status = FMI_ERROR};
     instance *it = NULL;
     if (python_runs()) {
         this.lock = py.PyGILState_Ensure();
@@ -66,18 +68,18 @@ call begin(component handle, string function, when when) {
     it->busy = 1;
     it->thread = pthread_self();
     if (it->condition == LOST) {
-        this.status = FMI2_FATAL;
+        this.status = FMI_FATAL;
     } else if (it->condition == SOUND || when == ALWAYS) {
-        this.status = FMI2_OK;
+        this.status = FMI_OK;
     }
     return this;
 }
 
 /* The arguments are wrong: the instance is in FMI's error state from now on. */
 int refuse(call *this, string wrong) {
-    this->status = FMI2_ERROR;
+    this->status = FMI_ERROR;
     this->instance->condition = IN_ERROR;
-    complain(&this->instance->host, FMI2_ERROR, "%s: %s", this->function, wrong);
+    complain(this->instance, FMI_ERROR, "%s: %s", this->function, wrong);
     return 0;
 }
 
@@ -89,10 +91,10 @@ int end(call *this) {
     if (it == NULL) return this->status;
     /* PythonFMU leaves an exception where it does not look for one; a Python host would stumble
      * over it later. */
-    if (exception(why) && this->status < FMI2_ERROR) refuse(this, why);
-    if (this->status == FMI2_FATAL && it->condition != LOST) {
+    if (exception(why) && this->status < FMI_ERROR) refuse(this, why);
+    if (this->status == FMI_FATAL && it->condition != LOST) {
         it->condition = LOST;
-        if (!it->host.told) complain(&it->host, FMI2_FATAL, "%s: failed for good", this->function);
+        if (!it->told) complain(it, FMI_FATAL, "%s: failed for good", this->function);
     }
     it->busy = 0;
     py.PyGILState_Release(this->lock);

@@ -6,8 +6,6 @@
  */
 #include <stdlib.h>
 
-#include "loader.h"
-
 /* The lower bits of a handle are its place in the table, the others the serial number. */
 enum { PLACE_BITS = 24, FIRST_SIZE = 64 };
 

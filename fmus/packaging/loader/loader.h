@@ -1,10 +1,10 @@
-/* What the parts of the loader know of each other.
+/* What the parts of the loader know of each other. fmi2.c is compiled, and includes all others.
  *
  * python.c     finds Python and starts it, once a process
  * preflight.c  has preflight.py find out whether PythonFMU can make an instance
  * handles.c    tells what is alive from what is not
  * messages.c   what the host is told
- * text.c       UTF-8, and the resource location
+ * location.c   the resource location
  * guard.c      the instance that the host holds, and what every call begins and ends with
  * fmi2.c       the functions of FMI 2.0
  *
@@ -14,8 +14,8 @@
 #define LOADER_H
 
 #include <pthread.h>
-#include <stddef.h>
-#include <stdint.h>
+
+#include "../../native/runtime/host.h"
 
 #define EXPORT __attribute__((visibility("default")))
 
@@ -23,11 +23,9 @@ enum { WHY = 1024 };
 
 /* FMI */
 
-enum { FMI2_OK, FMI2_WARNING, FMI2_DISCARD, FMI2_ERROR, FMI2_FATAL };
 enum { CO_SIMULATION = 1 };
 
 typedef void *component;
-typedef const char *string;
 typedef unsigned int reference;
 
 /* fmi2CallbackFunctions, of which only the logger is used. */
@@ -39,9 +37,8 @@ typedef struct {
     void *environment;
 } callbacks;
 
-/* text.c */
+/* location.c */
 
-int is_utf8(string text);
 int plain_path(string uri, char **path, char *why);
 
 /* python.c */
@@ -108,28 +105,11 @@ void replace(void *handle, void *thing, void *owner);
 void drop(void *handle);
 void *state_of(void *owner);
 
-/* messages.c */
-
-typedef struct {
-    callbacks host;
-    char *name;
-    int logging;
-    size_t n;
-    char **categories;
-    int told; /* whether the host has got a message of an error */
-} listener;
-
-int listen(listener *host, string name, const callbacks *functions, int logging);
-int choose(listener *host, int logging, size_t n, const string categories[]);
-void release_listener(listener *host);
-void tell(listener *host, int status, string category, string text);
-void complain(listener *host, int status, string format, ...)
-    __attribute__((format(printf, 3, 4)));
-
 /* guard.c */
 
 typedef struct {
     listener host;
+    int told;        /* whether the host has got a message of an error */
     callbacks heard; /* what PythonFMU gets for callbacks */
     component slave; /* PythonFMU's own instance */
     enum { SOUND, IN_ERROR, LOST } condition;
@@ -149,7 +129,7 @@ typedef struct {
 typedef enum { NOT_AFTER_ERROR, ALWAYS } when;
 
 /* Whether a call may be forwarded: only then it is looked at what is wrong with its arguments. */
-#define GOES_ON(call, wrong) ((call).status == FMI2_OK && sound(&(call), wrong))
+#define GOES_ON(call, wrong) ((call).status == FMI_OK && sound(&(call), wrong))
 
 instance *new_instance(string name, const callbacks *functions, int logging);
 void release_instance(instance *it);
@@ -157,5 +137,11 @@ call begin(component handle, string function, when when);
 int sound(call *this, string wrong);
 int refuse(call *this, string wrong);
 int end(call *this);
+
+/* messages.c */
+
+void tell(instance *it, int status, string category, string text);
+void complain(instance *it, int status, string format, ...)
+    __attribute__((format(printf, 3, 4)));
 
 #endif

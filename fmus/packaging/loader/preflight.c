@@ -1,8 +1,6 @@
 /* Has preflight.py find out whether PythonFMU can make an instance: it would end the process. */
 #include <stdio.h>
 
-#include "loader.h"
-
 enum { FILE_INPUT = 257 };
 
 extern const char source[] __attribute__((visibility("hidden")));

@@ -8,7 +8,6 @@
  * takes no signal from the host. A start that fails ends in a reason, not in the end of the
  * process. It is never ended: another FMU may come.
  */
-#define _GNU_SOURCE
 #include <dlfcn.h>
 #include <limits.h>
 #include <link.h>
@@ -16,8 +15,6 @@
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
-
-#include "loader.h"
 
 enum { NEWEST = 13, OLDEST = 9 };
 

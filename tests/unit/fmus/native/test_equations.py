@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from fmus.packaging.discovery import components
 from fmus.slave.callbacks import explained
-from support.equations import bits, equations, filled, flat, structure
+from support.equations import WHY, bits, equations, filled, flat, structure
 
 PACKAGES = [module.removesuffix(".slave") for module in components().values()]
 
@@ -48,7 +48,7 @@ def raised(call: Any) -> tuple[str, list[str]]:
     try:
         return outcome(call())
     except Exception as error:
-        return explained(error)[:255], []
+        return explained(error)[: WHY - 1], []
 
 
 @every

@@ -1,37 +1,7 @@
-/* UTF-8, and the resource location. */
+/* The resource location. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "loader.h"
-
-/* Bytes of the character that a text begins with; 0 if it is none. */
-static int length_of_character(const unsigned char *text) {
-    static const unsigned int smallest[] = {0, 0, 0x80, 0x800, 0x10000};
-    int length = text[0] < 0x80    ? 1
-                 : text[0] >> 5 == 6  ? 2
-                 : text[0] >> 4 == 14 ? 3
-                 : text[0] >> 3 == 30 ? 4
-                                      : 0;
-    if (length < 2) return length;
-    unsigned int character = text[0] & (0x7f >> length);
-    for (int i = 1; i < length; i++) {
-        if (text[i] >> 6 != 2) return 0;
-        character = character << 6 | (text[i] & 0x3f);
-    }
-    int surrogate = character >= 0xd800 && character <= 0xdfff;
-    return character < smallest[length] || surrogate || character > 0x10ffff ? 0 : length;
-}
-
-int is_utf8(string text) {
-    const unsigned char *rest = (const unsigned char *)text;
-    while (*rest != '\0') {
-        int length = length_of_character(rest);
-        if (length == 0) return 0;
-        rest += length;
-    }
-    return 1;
-}
 
 static int hex(char digit) {
     if (digit >= '0' && digit <= '9') return digit - '0';

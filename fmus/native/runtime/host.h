@@ -1,0 +1,37 @@
+/* What a host hands over, and what it is told: the same for components in C and for the loader of those
+ * in Python.
+ *
+ * utf8.c       which bytes are text
+ * arguments.c  what can be wrong with arrays
+ * listener.c   what the host wants to hear, and how it is told
+ */
+#ifndef HOST_H
+#define HOST_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+typedef const char *string;
+
+/* fmi2Status and fmi3Status. */
+enum { FMI_OK, FMI_WARNING, FMI_DISCARD, FMI_ERROR, FMI_FATAL };
+
+/* The host's logger, as the version of FMI casts it, and what it is called with. */
+typedef struct {
+    void (*function)(void);
+    void *environment;
+} logger;
+
+typedef struct {
+    logger host;
+    char *name;
+    int logging;
+    size_t n;
+    char **categories; /* that are wanted; none: all */
+} listener;
+
+/* Of the version: calls the logger, which is not NULL. */
+static void deliver(const logger *host, string instance_name, int status, string category,
+                    string text);
+
+#endif

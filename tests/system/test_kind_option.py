@@ -1,0 +1,240 @@
+"""`--kind`, `--fmi` and `--platforms`: the FMUs in C wherever a user meets those in Python."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import zipfile
+from importlib.util import find_spec
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+
+from orchestrator import load, simulate
+from orchestrator.commands.main import main
+from orchestrator.experiments import bundle
+from orchestrator.paper.report import write_report
+from orchestrator.paper.runs import Run
+from support.instances import NAMES
+
+SECOND = ["--stop-time", "1"]
+
+OWN = """\
+[components]
+controller = "own.fmu"
+"""
+
+
+def kinds(folder: Path) -> dict[str, str]:
+    """The kind of each component of a run."""
+    record = json.loads((folder / "run.json").read_text())
+    return {name: fmu["kind"] for name, fmu in record["fmus"].items()}
+
+
+def test_build_writes_fmus_ssp_checksums_and_bill(workplace, capsys):
+    assert main(["build", "--kind", "native"]) == 0
+    folder = workplace / "fmus/dist/native"
+    papers = {"auv.ssp", "SHA256SUMS", "bom.cdx.json", "build.json"}
+    assert {path.name for path in folder.iterdir()} == papers | {f"{name}.fmu" for name in NAMES}
+    assert "is built, FMI 2.0 for linux64, by " in capsys.readouterr().out
+    for line in (folder / "SHA256SUMS").read_text().splitlines():
+        digest, name = line.split("  ")
+        assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest
+    bill = json.loads((folder / "bom.cdx.json").read_text())
+    assert {c["type"] for c in bill["components"]} == {"file"}, "no package's code but ours"
+    assert bill["dependencies"][0]["dependsOn"] == []
+    assert main(["build", "--kind", "native"]) == 0
+    assert "is up to date" in capsys.readouterr().out
+
+
+def test_kinds_take_each_others_place_in_a_folder(dist: Path, native: Path, workplace: Path):
+    shutil.copytree(native, workplace / "here")
+    assert main(["build", "--out", "here"]) == 0
+    assert main(["build", "--out", "there", "--kind", "native"]) == 0
+    for name in (*(f"{name}.fmu" for name in NAMES), "auv.ssp", "SHA256SUMS", "bom.cdx.json"):
+        assert (workplace / "here" / name).read_bytes() == (dist / name).read_bytes()
+        assert (workplace / "there" / name).read_bytes() == (native / name).read_bytes()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_fmu_is_valid_and_small_and_says_who_made_it(native: Path, name: str):
+    path = native / f"{name}.fmu"
+    assert validate_fmu(str(path)) == []
+    with zipfile.ZipFile(path) as archive:
+        root = ElementTree.fromstring(archive.read("modelDescription.xml"))
+        [library] = (entry for entry in archive.infolist() if "binaries/" in entry.filename)
+        assert not any(entry.startswith("resources/") for entry in archive.namelist())
+    assert library.compress_size < 60_000
+    assert root.get("generationTool", "").startswith("auv-fmu ")
+    [implementation] = root.iter("CoSimulation")
+    assert implementation.get("needsExecutionTool") == "false"
+    assert [file.get("name") for file in implementation.iter("File")] == ["fmi2.c"]
+
+
+@pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
+def test_run_writes_the_same_table_to_the_bit(workplace: Path, order: str):
+    for kind in bundle.KINDS:
+        options = [*SECOND, "--order", order, "--kind", kind, "--no-figures", "--out", kind]
+        assert main(["run", "fig4", *options]) == 0
+    for name in ("result.csv", "metrics.json", "certificates.csv"):
+        tables = [(workplace / kind / name).read_bytes() for kind in bundle.KINDS]
+        assert tables[0] == tables[1]
+    assert {kind: {*kinds(workplace / kind).values()} for kind in bundle.KINDS} == {
+        "python": {"python"},
+        "native": {"native"},
+    }
+
+
+def test_companion_is_of_the_same_kind(workplace: Path):
+    assert main(["run", "fig5", "--kind", "native", *SECOND, "--no-figures", "--out", "out"]) == 0
+    for folder in (workplace / "out", workplace / "out/fig5-pd"):
+        assert {*kinds(folder).values()} == {"native"}
+
+
+def test_fmus_of_a_file_are_as_they_are(dist: Path, workplace: Path):
+    shutil.copy(dist / "ObserverController.fmu", workplace / "own.fmu")
+    (workplace / "own.toml").write_text(OWN)
+    assert main(["run", "own.toml", "--kind", "native", *SECOND, "--no-figures"]) == 0
+    assert kinds(workplace / "results/own") == {
+        "plant": "native",
+        "controller": "python",
+        "disturbance": "native",
+        "planner": "native",
+    }
+    expected = simulate("fig4", stop_time=1.0)
+    assert np.array_equal(simulate("own.toml", stop_time=1.0, kind="native").rows, expected.rows)
+
+
+def test_systems_of_both_kinds_differ_in_their_files_alone():
+    python, native = load("fig4"), load("fig4", kind="native")
+    assert python.connections == native.connections
+    assert python.parameters == native.parameters
+    assert (python.stop_time, python.step) == (native.stop_time, native.step)
+    for name, component in python.components.items():
+        other = native.components[name]
+        assert component.fmu != other.fmu
+        for ours, theirs in zip(
+            component.description.modelVariables, other.description.modelVariables, strict=True
+        ):
+            for attribute in ("name", "valueReference", "type", "causality", "variability",
+                              "initial", "unit", "start", "min", "max", "description"):  # fmt: skip
+                assert getattr(ours, attribute) == getattr(theirs, attribute)
+        assert all(
+            component.has_feedthrough(v.name) == other.has_feedthrough(v.name)
+            for v in component.having("output")
+        )
+
+
+def test_ssp_of_the_bundle_runs_without_the_cache(native: Path):
+    ssp = simulate(native / "auv.ssp", stop_time=1.0)
+    assert np.array_equal(ssp.rows, simulate("fig4", stop_time=1.0).rows)
+
+
+def test_loaded_system_can_be_run_saved_and_verified(workplace: Path, capsys):
+    system = load("fig4", kind="native")
+    folder = simulate(system, stop_time=1.0).save("saved")
+    assert {*kinds(folder).values()} == {"native"}
+    options = ["--tolerance", "0", "--scenario", "fig4"]
+    assert main(["verify", "saved/result.csv", *options]) == 0
+
+
+def test_cache_has_a_folder_a_kind_and_version(workplace: Path):
+    folders = {
+        (kind, fmi): bundle.current_fmus(kind, fmi)
+        for kind, fmi in (("python", "2"), ("native", "2"), ("native", "3"))
+    }
+    assert len({*folders.values()}) == 3
+    for (kind, fmi), folder in folders.items():
+        settings = bundle.settings_of(folder)
+        assert (settings["kind"], settings.get("fmi", "2")) == (kind, fmi)
+
+
+def test_export_with_fmi_3_is_an_ssp_2(workplace: Path, capsys):
+    changes = ["--set", "plant.noise.std=0", "--set", "controller.saturation=algebraic"]
+    options = ["--kind", "native", "--fmi", "3", *changes, "--out", "out"]
+    assert main(["export", "fig4", *options]) == 0
+    with zipfile.ZipFile(workplace / "out/fig4.ssp") as archive:
+        structure = ElementTree.fromstring(archive.read("SystemStructure.ssd"))
+        values = ElementTree.fromstring(archive.read("parameters/controller.ssv"))
+        archive.extract("resources/AuvPlant.fmu")
+    assert (structure.get("version"), values.get("version")) == ("2.0", "2.0")
+    types = {element.tag.partition("}")[2] for element in structure.iter()}
+    assert {"Float64", "Int32", "Boolean", "String"} < types
+    assert not {"Real", "Integer"} & types
+    assert validate_fmu("resources/AuvPlant.fmu") == []
+    capsys.readouterr()
+    assert main(["run", "out/fig4.ssp"]) == 2
+    assert capsys.readouterr().err == (
+        "auv-fmu: out/fig4.ssp: is an SSP 2.0; this master takes SSP 1.0 with FMI 2.0\n"
+    )
+
+
+@pytest.mark.skipif(find_spec("fmu_manipulation_toolbox") is None, reason="no FMU toolbox")
+def test_container_takes_fmus_of_either_version(workplace: Path):
+    for fmi in bundle.FMI:
+        options = ["--kind", "native", "--fmi", fmi, "--format", "container", "--out", fmi]
+        assert main(["export", "fig4", *options]) == 0
+        with zipfile.ZipFile(workplace / fmi / "fig4.fmu") as archive:
+            root = ElementTree.fromstring(archive.read("modelDescription.xml"))
+        assert root.get("fmiVersion") == f"{fmi}.0"
+
+
+def test_report_is_made_of_runs_of_the_kind(tmp_path: Path):
+    assert Run("fig4", kind="native").label == "fig4 --kind native"
+    write_report(tmp_path, ["fig4"], ["auv-fmu", "report"], stop_time=0.1, kind="native")
+    runs = json.loads((tmp_path / "run.json").read_text())["runs"]
+    assert runs
+    assert all(run.endswith("--kind native") or "--kind native --set" in run for run in runs)
+
+
+@pytest.mark.parametrize(
+    ("command", "complaint"),
+    [
+        ("run auv.ssp --kind native", "auv.ssp: comes with its FMUs; kind and fmi are for the "),
+        ("export fig4 --fmi 3", "--platforms and --fmi 3 need --kind native"),
+        ("export fig4 --kind native --fmi 3 --format osp", "libcosim takes no FMU of FMI 3.0"),
+        ("build --platforms linux64", "--platforms and --fmi 3 need --kind native"),
+        ("build --kind native --loader plain", "--loader is for --kind python"),
+        ("build --kind native --platforms win32", "FMI 2.0 has no platform 'win32'; there are "),
+        ("build --kind native --platforms aarch64-linux", "try --fmi 3"),
+        ("build own.py --kind native", "own.py: only the bundle's components are translated"),
+    ],
+)
+def test_what_does_not_go_together_is_said_in_one_line(
+    workplace, native, capsys, command, complaint
+):
+    shutil.copy(native / "auv.ssp", workplace)
+    assert main(command.split()) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert complaint in said.err
+    assert said.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("run", [lambda: load("fig4", "c"), lambda: simulate("fig4", kind="c")])
+def test_unknown_kind_is_a_value_error(run):
+    with pytest.raises(ValueError, match="kind 'c': use one of python, native"):
+        run()
+
+
+def test_system_keeps_the_fmus_it_was_loaded_with():
+    with pytest.raises(ValueError, match="comes with its FMUs"):
+        simulate(load("fig4"), kind="native")
+
+
+@pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
+def test_one_archive_has_libraries_for_several_machines(native: Path, workplace: Path):
+    options = ["--kind", "native", "--platforms", "linux64,darwin64", "--out", "all"]
+    assert main(["build", *options]) == 0
+    for name in NAMES:
+        path = workplace / "all" / f"{name}.fmu"
+        assert validate_fmu(str(path)) == []
+        with zipfile.ZipFile(path) as archive, zipfile.ZipFile(native / path.name) as own:
+            libraries = {entry for entry in archive.namelist() if "binaries/" in entry}
+            same = set(own.namelist()) - {f"binaries/linux64/{name}.so"}
+            assert {e: archive.read(e) for e in same} == {e: own.read(e) for e in same}
+        assert libraries == {f"binaries/linux64/{name}.so", f"binaries/darwin64/{name}.dylib"}

@@ -1,0 +1,43 @@
+/* What is behind FMI's functions, for tests. */
+#include "platform.h"
+
+#ifdef DECIMAL_COMMA
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+/* snprintf in a locale with a decimal comma. */
+static int with_comma(char *text, size_t size, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    int length = vsnprintf(text, size, format, arguments);
+    va_end(arguments);
+    if (strstr(format, "%.*e") != NULL && strchr(text, '.') != NULL) *strchr(text, '.') = ',';
+    return length;
+}
+#define snprintf with_comma
+#endif
+
+#include "fmi2.c"
+
+EXPORT void show_number(double number, int exactly, char *text) {
+    message it;
+    compose(&it, exactly ? "%r" : "%g", number);
+    strcpy(text, it.text);
+}
+
+EXPORT void show_text(string text, char *quoted) {
+    message it;
+    compose(&it, "%q", text);
+    strcpy(quoted, it.text);
+}
+
+EXPORT int utf8(string text) { return is_utf8(text); }
+
+EXPORT uint32_t checksum(const unsigned char *bytes, size_t n) { return crc32(bytes, n); }
+
+EXPORT void normal_numbers(uint32_t seed, size_t n, double *numbers) {
+    generator it;
+    seed_generator(&it, seed);
+    for (size_t i = 0; i < n; i++) numbers[i] = standard_normal(&it);
+}

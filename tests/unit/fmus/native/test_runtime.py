@@ -1,0 +1,248 @@
+"""What all FMUs in C have in common, held against Python's own, and compiled as hosts may do it."""
+
+from __future__ import annotations
+
+import shutil
+import struct
+import subprocess
+from binascii import crc32
+from ctypes import CDLL, c_char_p, c_double, c_int, c_size_t, c_uint32, create_string_buffer
+from math import inf, ldexp, nan
+from pathlib import Path
+from random import Random
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from fmus.native import VERSIONS, sources
+from fmus.packaging.discovery import components
+
+COMPILERS = [command for command in ("gcc", "clang") if shutil.which(command)]
+
+pytestmark = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
+
+PACKAGES = {name: module.rpartition(".")[0] for name, module in components().items()}
+
+FLAGS = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-ffp-contract=off")
+
+#: Characters of a text in a message, and bytes that they have at most.
+MOST_CHARACTERS = 500
+ROOM = 4 * MOST_CHARACTERS + 1
+
+#: From the smallest to the largest.
+POWERS_OF_TWO = [ldexp(1.0, exponent) for exponent in range(-1074, 1024)]
+
+every_double = st.integers(0, 2**64 - 1).map(
+    lambda bits: struct.unpack("<d", struct.pack("<Q", bits))[0]
+)
+usual_double = st.floats(-1e7, 1e7) | st.floats(-1e-3, 1e-3) | st.integers(-(10**17), 10**17)
+
+
+def written(folder: Path, name: str, version: int = 2) -> Path:
+    """The sources of a component in a folder."""
+    folder.mkdir(exist_ok=True)
+    identity = f'#define MODEL_NAME "{name}"\n#define MODEL_GUID "{{{name}}}"\n'
+    files = {**sources(PACKAGES[name], version), "identity.h": identity}
+    for file, text in files.items():
+        (folder / file).write_text(text, encoding="utf-8")
+    return folder
+
+
+def compile_in(folder: Path, *options: str | Path, compiler: str = "") -> None:
+    command = [compiler or COMPILERS[0], *FLAGS, *options]
+    process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert process.returncode == 0, process.stderr
+
+
+class Runtime:
+    """The functions of probe.c."""
+
+    def __init__(self, library: Path) -> None:
+        self._library = CDLL(str(library))
+
+    def shown(self, number: float, exactly: bool) -> str:
+        text = create_string_buffer(ROOM)
+        self._library.show_number(c_double(number), c_int(exactly), text)
+        return text.value.decode()
+
+    def quoted(self, said: str) -> str:
+        text = create_string_buffer(ROOM)
+        self._library.show_text(c_char_p(said.encode()), text)
+        return text.value.decode()
+
+    def is_utf8(self, content: bytes) -> bool:
+        return bool(self._library.utf8(c_char_p(content)))
+
+    def checksum(self, content: bytes) -> int:
+        self._library.checksum.restype = c_uint32
+        found: int = self._library.checksum(c_char_p(content), c_size_t(len(content)))
+        return found
+
+    def normal_numbers(self, seed: int, n: int) -> list[float]:
+        numbers = (c_double * n)()
+        self._library.normal_numbers(c_uint32(seed), c_size_t(n), numbers)
+        return [*numbers]
+
+
+def probe(folder: Path, *options: str) -> Runtime:
+    source = Path(__file__).with_name("probe.c")
+    written(folder, "DisturbanceGenerator")
+    compile_in(folder, "-O2", "-shared", "-fPIC", *options, "-I.", "-o", "probe.so", source, "-lm")
+    return Runtime(folder / "probe.so")
+
+
+@pytest.fixture(scope="module")
+def runtime(tmp_path_factory: pytest.TempPathFactory) -> Runtime:
+    return probe(tmp_path_factory.mktemp("runtime"))
+
+
+@pytest.fixture(scope="module")
+def comma(tmp_path_factory: pytest.TempPathFactory) -> Runtime:
+    """As in a locale with a decimal comma."""
+    return probe(tmp_path_factory.mktemp("comma"), "-DDECIMAL_COMMA")
+
+
+# Texts
+
+
+@given(number=every_double | usual_double.map(float))
+@example(number=0.0)
+@example(number=-0.0)
+@example(number=nan)
+@example(number=-inf)
+@example(number=9.5e-05)
+@example(number=999999.5)
+@example(number=1e16)
+@example(number=9007199254740993.0)
+@example(number=2.2250738585072014e-308)
+@example(number=1.7976931348623157e308)
+def test_numbers_are_written_as_python_writes_them(runtime: Runtime, number: float):
+    assert runtime.shown(number, exactly=True) == repr(number)
+    assert runtime.shown(number, exactly=False) == f"{number:g}"
+
+
+def test_powers_of_two_are_written_as_python_writes_them(runtime: Runtime):
+    """Below one numbers lie closer than above it, and other digits may be the fewest."""
+    for number in POWERS_OF_TWO:
+        assert runtime.shown(number, exactly=True) == repr(number)
+
+
+def test_decimal_comma_of_the_host_is_not_seen(comma: Runtime):
+    for number in (0.1, -1234.5678, 5e-324, 1.7976931348623157e308, 1e23, 12.5):
+        assert comma.shown(number, exactly=True) == repr(number)
+        assert comma.shown(number, exactly=False) == f"{number:g}"
+
+
+#: What Python can show as it is, without a look into Unicode's tables.
+PLAIN = st.text(
+    st.characters(max_codepoint=0xFF, exclude_characters="\0") | st.sampled_from("€ß∂𝜃")
+)
+
+
+@given(text=PLAIN)
+@example(text="it's")
+@example(text='"it\'s"')
+@example(text="back\\slash \t\n\r\x1b\x7f\xad")
+def test_texts_are_quoted_as_python_quotes_them(runtime: Runtime, text: str):
+    assert runtime.quoted(text) == repr(text)[:MOST_CHARACTERS]
+
+
+def test_long_text_is_cut_between_characters(runtime: Runtime):
+    assert runtime.quoted("𝜃" * 100_000) == "'" + "𝜃" * (MOST_CHARACTERS - 1)
+
+
+def can_be_decoded(content: bytes) -> bool:
+    try:
+        content.decode()
+    except UnicodeDecodeError:
+        return False
+    return True
+
+
+#: Bytes that stand at borders of what UTF-8 allows.
+ODD_BYTES = st.lists(st.sampled_from(b"a\x80\x8f\x90\x9f\xa0\xbf\xc0\xc2\xe0\xed\xf0\xf4\xf5")).map(
+    bytes
+)
+
+
+@given(content=st.binary() | st.text().map(str.encode) | ODD_BYTES)
+def test_utf8_is_what_python_takes_for_it(runtime: Runtime, content: bytes):
+    assert runtime.is_utf8(content) == can_be_decoded(content.split(b"\0")[0])
+
+
+# Checksum and noise
+
+
+@given(content=st.binary(max_size=5000))
+def test_checksum_is_that_of_zip(runtime: Runtime, content: bytes):
+    assert runtime.checksum(content) == crc32(content)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@example(seed=0)
+@example(seed=1)
+@example(seed=2**31)
+@example(seed=2**32 - 1)
+def test_noise_is_that_of_python(runtime: Runtime, seed: int):
+    """To the bit, over more numbers than the generator makes at once."""
+    random = Random(seed)
+    expected = [random.gauss(0.0, 1.0) for _ in range(1001)]
+    assert bits(runtime.normal_numbers(seed, 1001)) == bits(expected)
+
+
+def bits(numbers: list[float]) -> bytes:
+    return struct.pack(f"{len(numbers)}d", *numbers)
+
+
+# Compiling
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("name", PACKAGES)
+def test_sources_are_c99_without_a_warning(tmp_path: Path, name: str, version: int, compiler: str):
+    folder = written(tmp_path, name, version)
+    compile_in(folder, "-fsyntax-only", VERSIONS[version], compiler=compiler)
+
+
+LINKED = """
+#include <stdio.h>
+
+#define DECLARE(prefix)                                                                \\
+    void *prefix##fmi2Instantiate(const char *, int, const char *, const char *,       \\
+                                  const void *, int, int);                             \\
+    int prefix##fmi2EnterInitializationMode(void *);                                   \\
+    int prefix##fmi2ExitInitializationMode(void *);                                    \\
+    int prefix##fmi2DoStep(void *, double, double, int);                               \\
+    void prefix##fmi2FreeInstance(void *);
+
+#define RUN(prefix)                                                                    \\
+    do {                                                                               \\
+        void *c = prefix##fmi2Instantiate("linked", 1, NULL, NULL, NULL, 0, 1);        \\
+        if (prefix##fmi2EnterInitializationMode(c)) return 1;                          \\
+        if (prefix##fmi2ExitInitializationMode(c)) return 2;                           \\
+        if (prefix##fmi2DoStep(c, 0.0, 0.02, 1)) return 3;                             \\
+        prefix##fmi2FreeInstance(c);                                                   \\
+    } while (0)
+
+DECLARE(AuvPlant_)
+DECLARE(MotionPlanner_)
+
+int main(void) {
+    RUN(AuvPlant_);
+    RUN(MotionPlanner_);
+    return 0;
+}
+"""
+
+
+def test_several_components_can_be_linked_into_one_program(tmp_path: Path):
+    objects = []
+    for name in ("AuvPlant", "MotionPlanner"):
+        folder = written(tmp_path / name, name)
+        objects.append(folder / "fmi2.o")
+        compile_in(folder, f"-DFMI2_FUNCTION_PREFIX={name}_", "-c", "fmi2.c")
+    (tmp_path / "linked.c").write_text(LINKED)
+    compile_in(tmp_path, "-o", "linked", "linked.c", *objects, "-lm")
+    subprocess.run([tmp_path / "linked"], check=True)

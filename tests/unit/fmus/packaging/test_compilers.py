@@ -1,0 +1,104 @@
+"""Which compiler makes the libraries, and what it says if it cannot."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+import pytest
+
+from fmus.packaging import compilers
+from fmus.packaging.compilers import compiler_for, library
+from fmus.packaging.platforms import platforms
+
+OWN = "/usr/bin/own-cc"
+
+needs_compiler = pytest.mark.skipif(compilers.compiler() is None, reason="there is no C compiler")
+needs_zig = pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
+
+SOURCES = {
+    "main.c": b'#include "other.h"\nOTHER int answer(void) { return ANSWER; }\n',
+    "other.h": b'#define ANSWER 42\n#define OTHER __attribute__((visibility("default")))\n',
+}
+
+
+@pytest.fixture
+def machine(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+    """An x86-64 Linux with a compiler of its own and without ziglang."""
+    monkeypatch.setattr(compilers, "this_machine", lambda: "x86_64-linux")
+    monkeypatch.setattr(compilers, "compiler", lambda: OWN)
+    monkeypatch.setattr(compilers, "_version_of", lambda command: command)
+    monkeypatch.setattr(compilers, "find_spec", lambda name: None)
+    return monkeypatch
+
+
+def with_zig(machine: pytest.MonkeyPatch) -> None:
+    machine.setattr(compilers, "find_spec", lambda name: object())
+    machine.setattr(compilers, "version", lambda name: "0.99")
+
+
+@pytest.mark.parametrize("zig", [False, True])
+def test_this_machine_has_its_own_compiler(machine: pytest.MonkeyPatch, zig: bool):
+    if zig:
+        with_zig(machine)
+    assert compiler_for(platforms("2", "linux64")).command[0] == OWN
+
+
+@pytest.mark.parametrize("names", ["win64", "linux64,win64", "darwin64", "all"])
+def test_other_machines_have_zig_for_all(machine: pytest.MonkeyPatch, names: str):
+    with pytest.raises(OSError, match=r"no C compiler for .*pip install 'auv-fmu\[native\]'"):
+        compiler_for(platforms("2", names))
+    with_zig(machine)
+    assert compiler_for(platforms("2", names)).name == "ziglang 0.99"
+
+
+def test_only_what_cannot_be_made_is_named(machine: pytest.MonkeyPatch):
+    with pytest.raises(OSError, match="no C compiler for win64: "):
+        compiler_for(platforms("2", "linux64,win64"))
+
+
+def test_machine_without_a_compiler(machine: pytest.MonkeyPatch):
+    machine.setattr(compilers, "compiler", lambda: None)
+    with pytest.raises(
+        OSError, match="no C compiler on this machine: install gcc or clang, or pip "
+    ):
+        compiler_for(platforms("2", "linux64"))
+    with_zig(machine)
+    assert compiler_for(platforms("2", "linux64")).name == "ziglang 0.99"
+
+
+def test_operations_are_never_contracted_nor_reordered():
+    assert "-ffp-contract=off" in compilers.FLAGS
+    assert not any("fast" in flag for flag in compilers.FLAGS)
+
+
+@needs_compiler
+def test_complaint_of_a_compiler_is_told_in_one_line():
+    [own] = platforms("2" if compilers.this_machine() == "x86_64-linux" else "3")
+    sources = {**SOURCES, "other.h": b"#error on purpose\n"}
+    with pytest.raises(OSError, match=r"makes no Answer for .*other.h.*on purpose") as error:
+        library(compiler_for([own]), own, "Answer", sources, "main.c")
+    assert "\n" not in str(error.value)
+
+
+#: How a library begins, and the number of its processor: at its place, in that many bytes.
+HEADS = {
+    "x86_64-linux": (b"\x7fELF\x02\x01", 18, (0x3E).to_bytes(2, "little")),
+    "aarch64-linux": (b"\x7fELF\x02\x01", 18, (0xB7).to_bytes(2, "little")),
+    "x86_64-darwin": (b"\xcf\xfa\xed\xfe", 4, (0x01000007).to_bytes(4, "little")),
+    "aarch64-darwin": (b"\xcf\xfa\xed\xfe", 4, (0x0100000C).to_bytes(4, "little")),
+}
+
+
+@needs_zig
+@pytest.mark.parametrize("name", HEADS)
+def test_zig_makes_libraries_for_other_machines(name: str, tmp_path, monkeypatch):
+    found = platforms("3", name)
+    zig = compiler_for([*found, *platforms("3", "x86_64-windows")])
+    monkeypatch.chdir(tmp_path)
+    made = library(zig, found[0], "Answer", SOURCES, "main.c")
+    magic, place, processor = HEADS[name]
+    assert made.startswith(magic)
+    assert made[place : place + len(processor)] == processor
+    assert b"answer" in made
+    assert str(tmp_path).encode() not in made
+    assert list(tmp_path.iterdir()) == []
