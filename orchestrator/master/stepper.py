@@ -13,7 +13,7 @@ from orchestrator.master.observer import Blocks
 from orchestrator.master.schedule import CALLS, Stage
 
 #: Longest time until Python looks whether somebody wants the run to stop [s].
-_GLANCE = 0.1
+_GLANCE = 0.02
 
 
 def stepped(

@@ -52,7 +52,10 @@ def faults(said: Any, description: Description, samples: Sequence[dict[str, Any]
     # After an initialisation that was refused, values are others than those the state came from.
     if found or kept_true is None or said["state"] is None or "initialisation" in said["refused"]:
         return found
-    return [*kept_true(said)]
+    try:
+        return [*kept_true(said)]
+    except (ArithmeticError, ValueError) as error:
+        return [f"nothing follows from it: {error}"]
 
 
 def _faults(

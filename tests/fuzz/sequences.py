@@ -311,16 +311,16 @@ def main() -> int:
     failed = False
     with ExitStack() as stack:
         folders, twin = (
-            stack.enter_context(unpacked(sorted(found.glob("*.fmu")) if found else []))
-            for found in (options.fmus, options.twin)
+            stack.enter_context(unpacked(sorted(folder.glob("*.fmu")) if folder else []))
+            for folder in (options.fmus, options.twin)
         )
         if not folders or (options.twin and folders.keys() != twin.keys()):
             parser.error("no FMUs, or not the same ones of each kind: auv-fmu build makes them")
         if options.sanitize:
             for folder in (twin or folders).values():
                 sanitize(folder)
-            reports = stack.enter_context(sanitizers())
-            stack.callback(lambda: print(reports))
+            found = stack.enter_context(sanitizers())
+            stack.callback(lambda: print(found))
 
         def one(name: str) -> list[list[str]]:
             with Fuzzer(folders, name, twin) as fuzzer:

@@ -19,6 +19,7 @@ from fuzz.sequences import Finding, Fuzzer, unpacked
 from support import states
 from support.calls import CASES, Call, Draw, Item
 from support.instances import NAMES
+from support.native_states import Unwritable
 from support.raw import Description, Library, Variable, instance
 from support.sanitizers import GCC, sanitize, sanitizers
 from support.worker import Lost, Worker
@@ -153,8 +154,12 @@ def test_state_that_was_taken_once_does_no_harm(kinds, kind, name, what):
     said = next(state for state in map(states.read, contents) if state["mode"] == "stepping")
     _, change = TAKEN_ONCE[what]
     change(said)
+    try:
+        mutant = states.Mutant(states.sealed(said), what)
+    except Unwritable:
+        pytest.skip("a state of this kind has no place for that")
     with instance(library) as host:
-        Trials(host, contents, []).hold(states.Mutant(states.sealed(said), what))
+        Trials(host, contents, []).hold(mutant)
 
 
 # Whether it would notice
@@ -214,7 +219,9 @@ def test_states_that_were_reached_are_told_from_others(
     random = Random(1)
     changed = [states.mutant(random.choice(contents), random, samples) for _ in range(300)]
     found = [without_checksum(mutant.content) for mutant in changed]
-    assert sum(not faults(state, library.description, samples) for state in found) < 100
+    # Numbers alone, as FMUs in C write them, can often be those of another run.
+    most = {"python": 100, "native": 225}[kind]
+    assert sum(not faults(state, library.description, samples) for state in found) < most
 
 
 def test_model_follows_a_run():

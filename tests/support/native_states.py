@@ -30,6 +30,10 @@ _SHAPES = {
 _NOISY, _WORDS, _VERSION = "AuvPlant", 625, 3
 
 
+#: What Python raises where a value is not what it should be.
+_OF_ANOTHER_SHAPE = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+
+
 class NativeState(dict[str, Any]):
     """What a state of an FMU in C says."""
 
@@ -143,7 +147,14 @@ def written(said: NativeState) -> bytes:
     """
     try:
         return _written(said)
-    except (struct.error, ValueError, LookupError, TypeError, AttributeError) as error:
+    except (
+        struct.error,
+        ArithmeticError,
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+    ) as error:
         raise Unwritable(str(error)) from error
 
 

@@ -120,10 +120,10 @@ def test_a_warning_is_no_failure(folder, loop):
 
 @pytest.mark.parametrize("loop", LOOPS)
 def test_an_interrupt_ends_a_run_of_slow_steps_soon(folder, loop):
-    """It comes in the seventh step; more than three of 40 ms do not follow within 0.1 s."""
+    """It comes in the seventh step; each takes longer than a look may be away."""
     system = pair(folder, "INTERRUPT", milliseconds=40)
     table = run(system, Experiment(100.0, H), loop)
-    assert 8 <= len(table) <= 11
+    assert 8 <= len(table) <= 9
     assert table.failure == f"interrupted at t = {table.time[-1]:g} s"
     assert np.array_equal(table.time, np.arange(len(table)) * H)
     assert len(table.ending.signals) == 1

@@ -33,11 +33,15 @@ def test_wheel_builds_the_bundle_and_runs_fig4_in_an_empty_folder(tmp_path: Path
     )  # fmt: skip
     assert where.stdout.startswith(str(packages))
     command = [sys.executable, "-P", "-m", "orchestrator.commands.main", "run", "fig4"]
-    subprocess.run(
-        [*command, "--stop-time", "1"],
-        env=environment, cwd=empty, check=True, capture_output=True,
-    )  # fmt: skip
+    # The second has all that a translation to C needs.
+    for options in ([], ["--kind", "native", "--no-figures", "--out", "results/native"]):
+        subprocess.run(
+            [*command, "--stop-time", "1", *options],
+            env=environment, cwd=empty, check=True, capture_output=True,
+        )  # fmt: skip
     assert (empty / "results/fig4/fig4.png").is_file()
+    tables = {(empty / "results" / name / "result.csv").read_bytes() for name in ("fig4", "native")}
+    assert len(tables) == 1
     assert [path.name for path in empty.iterdir()] == ["results"]
 
 

@@ -110,9 +110,13 @@ def test_runs_are_kept_for_the_next_report(folder):
 
 def test_files_on_the_command_line_come_after_the_scenarios(tmp_path, monkeypatch, capsys):
     asked = []
-    monkeypatch.setattr(
-        paper, "write_report", lambda *arguments: asked.append(arguments) or (Path("a"), Path("b"))
-    )
+
+    def write_report(*arguments: object, kind: str) -> tuple[Path, Path]:
+        assert kind == "python"
+        asked.append(arguments)
+        return Path("a"), Path("b")
+
+    monkeypatch.setattr(paper, "write_report", write_report)
     assert main(["report", "mine.toml", "--out", str(tmp_path)]) == 0
     [(folder, scenarios, command)] = asked
     assert (folder, scenarios[-2:]) == (tmp_path, ["fig7c", "mine.toml"])
