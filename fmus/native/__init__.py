@@ -5,7 +5,9 @@ module               what it states
 ==================== ===============================================================
 :mod:`.language`     the subset of Python that equations keep to
 :mod:`.translator`   the equations of a component in C
+:mod:`.program`      what a set of functions needs
 :mod:`.functions`    the functions of the equations, one by one
+:mod:`.expressions`  their expressions
 :mod:`.shapes`       the types of the equations in C
 :mod:`.layout`       lines of C
 :mod:`.tables`       the ports of a component in C

@@ -1,17 +1,14 @@
-"""The equations of a component in C, from the text that its Python kind runs.
-
-`python -m fmus.native.translator fmus.auv_plant` prints them.
-"""
+"""The equations of a component in C, from the text that its Python kind runs."""
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
 from types import FunctionType, ModuleType
 from typing import get_type_hints
 
-from fmus.native.functions import Function, Program
+from fmus.native.functions import function_in_c
 from fmus.native.layout import laid_out
+from fmus.native.program import Function, Program
 from fmus.native.shapes import Structure, numbers
 from fmus.ports.groups import Nothing
 
@@ -54,7 +51,7 @@ def translated(package: str) -> str:
 
     """
     behaviour = import_module(f"{package}.behaviour")
-    program = Program()
+    program = Program(function_in_c)
     glue = _Glue(program, behaviour).text()
     title = import_module(f"{package}.ports").DESCRIPTION
     sections = [
@@ -191,7 +188,3 @@ def _defined(returns: str, name: str, arguments: str, body: list[str]) -> str:
 def _uses(text: str, name: str) -> bool:
     separated = "".join(c if c.isalnum() or c == "_" else " " for c in text)
     return name in separated.split()
-
-
-if __name__ == "__main__":
-    print(translated(sys.argv[1]), end="")

@@ -23,7 +23,7 @@ every = pytest.mark.parametrize("package", PACKAGES)
 @every
 def test_every_process_writes_the_same(package):
     process = subprocess.run(
-        [sys.executable, "-m", "fmus.native.translator", package],
+        [sys.executable, "-m", "fmus.native", package],
         capture_output=True,
         text=True,
         check=True,
