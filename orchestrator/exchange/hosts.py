@@ -16,7 +16,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import fmpy
 import numpy as np
@@ -39,13 +39,28 @@ from orchestrator.system.structure import System
 _TIMEOUT = 300
 
 
+class Ran(NamedTuple):
+    """A run in a host.
+
+    Attributes:
+        rows: of all Real outputs, one a step.
+        seconds: that the steps have taken.
+        reading: what it took to read the rows, where the tool does not record them itself.
+
+    """
+
+    rows: np.ndarray
+    seconds: float
+    reading: float = 0.0
+
+
 @dataclass(frozen=True)
 class Host:
     """A tool that can run the bundle.
 
     Attributes:
         package: that it comes from.
-        run: (system, folder of the export, steps, step) -> (rows of all Real outputs, seconds).
+        run: (system, folder of the export, steps, step) -> what came of it.
         bound: largest deviation from our Jacobi master that is expected.
         compared: how the names of the ports begin that are compared.
         why: what makes it deviate, if more than rounding does.
@@ -53,7 +68,7 @@ class Host:
     """
 
     package: str
-    run: Callable[[System, Path, int, float], tuple[np.ndarray, float]]
+    run: Callable[[System, Path, int, float], Ran]
     bound: float = 1e-9
     compared: tuple[str, ...] = ("",)
     why: str = ""
@@ -61,13 +76,25 @@ class Host:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What came of a host: `failure` is None if it ran."""
+    """What came of a host.
+
+    Attributes:
+        host: key of :data:`HOSTS`.
+        package: that it comes from, with its version.
+        deviation, port: the largest, and where it was.
+        steps_per_second: of the tool.
+        rows_per_second: with every output read, as this program reads it.
+        failure: why it did not run; None: it did.
+        agrees: whether the deviation is within the host's bound.
+
+    """
 
     host: str
     package: str
     deviation: float = float("nan")
     port: str = ""
     steps_per_second: float = float("nan")
+    rows_per_second: float = float("nan")
     failure: str | None = None
     agrees: bool = False
 
@@ -82,7 +109,20 @@ def real_outputs(system: System) -> list[tuple[str, str, int]]:
     ]
 
 
-def _libcosim(system: System, path: Path, steps: int, execution: Any) -> tuple[np.ndarray, float]:
+def _stepped(step: Callable[[], object], read: Callable[[], list[float]], steps: int) -> Ran:
+    """Step a tool that is read after each step."""
+    rows, seconds, reading = [], 0.0, 0.0
+    for _ in range(steps):
+        start = perf_counter()
+        step()
+        stepped = perf_counter()
+        rows.append(read())
+        seconds += stepped - start
+        reading += perf_counter() - stepped
+    return Ran(np.array(rows), seconds, reading)
+
+
+def _libcosim(system: System, path: Path, steps: int, execution: Any) -> Ran:
     from libcosimpy.CosimObserver import CosimObserver  # noqa: PLC0415
 
     observer = CosimObserver.create_last_value()
@@ -91,19 +131,19 @@ def _libcosim(system: System, path: Path, steps: int, execution: Any) -> tuple[n
     for component, _, reference in real_outputs(system):
         references.setdefault(component, []).append(reference)
     index = {name: execution.slave_index_from_instance_name(name) for name in references}
-    rows = []
-    start = perf_counter()
-    for _ in range(steps):
+
+    def one() -> None:
         if not execution.step():
             raise InputError("libcosim ended the run")
-        rows.append(
-            [
-                value
-                for name, wanted in references.items()
-                for value in observer.last_real_values(index[name], wanted)
-            ]
-        )
-    return np.array(rows), perf_counter() - start
+
+    def read() -> list[float]:
+        return [
+            value
+            for name, wanted in references.items()
+            for value in observer.last_real_values(index[name], wanted)
+        ]
+
+    return _stepped(one, read, steps)
 
 
 def _quiet_libcosim() -> Any:
@@ -114,23 +154,19 @@ def _quiet_libcosim() -> Any:
     return CosimExecution
 
 
-def _libcosim_ssp(
-    system: System, folder: Path, steps: int, step: float
-) -> tuple[np.ndarray, float]:
+def _libcosim_ssp(system: System, folder: Path, steps: int, step: float) -> Ran:
     [path] = write_ssp(system, folder)
     return _libcosim(system, folder, steps, _quiet_libcosim().from_ssp_file(ssp_path=str(path)))
 
 
-def _libcosim_osp(
-    system: System, folder: Path, steps: int, step: float
-) -> tuple[np.ndarray, float]:
+def _libcosim_osp(system: System, folder: Path, steps: int, step: float) -> Ran:
     write_osp(system, folder)
     return _libcosim(
         system, folder, steps, _quiet_libcosim().from_osp_config_file(osp_path=str(folder))
     )
 
 
-def _ecos(system: System, folder: Path, steps: int, step: float) -> tuple[np.ndarray, float]:
+def _ecos(system: System, folder: Path, steps: int, step: float) -> Ran:
     # ecospy needs libtbb, which the wheel tbb puts where the loader does not look.
     for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
         ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
@@ -142,15 +178,10 @@ def _ecos(system: System, folder: Path, steps: int, step: float) -> tuple[np.nda
             simulation.init(parameter_set="scenario")
         else:
             simulation.init()
-        rows = []
-        start = perf_counter()
-        for _ in range(steps):
-            simulation.step()
-            rows.append([simulation.get_real(name) for name in names])
-        return np.array(rows), perf_counter() - start
+        return _stepped(simulation.step, lambda: [*map(simulation.get_real, names)], steps)
 
 
-def _fmpy_ssp(system: System, folder: Path, steps: int, step: float) -> tuple[np.ndarray, float]:
+def _fmpy_ssp(system: System, folder: Path, steps: int, step: float) -> Ran:
     # fmpy.ssp ignores parameter bindings and Boolean connectors without a start value.
     [path] = write_ssp(replace(system, parameters={}), folder)
     start = perf_counter()
@@ -158,10 +189,10 @@ def _fmpy_ssp(system: System, folder: Path, steps: int, step: float) -> tuple[np
     table = simulate_ssp(str(path), stop_time=(steps + 0.5) * step, step_size=step)
     seconds = perf_counter() - start
     names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
-    return np.column_stack([table[name] for name in names])[1 : steps + 1], seconds
+    return Ran(np.column_stack([table[name] for name in names])[1 : steps + 1], seconds)
 
 
-def _container(system: System, folder: Path, steps: int, step: float) -> tuple[np.ndarray, float]:
+def _container(system: System, folder: Path, steps: int, step: float) -> Ran:
     [path] = write_container(system, folder)
     start = perf_counter()
     table = fmpy.simulate_fmu(
@@ -169,14 +200,14 @@ def _container(system: System, folder: Path, steps: int, step: float) -> tuple[n
     )
     seconds = perf_counter() - start
     names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
-    return np.column_stack([table[name] for name in names])[1:], seconds
+    return Ran(np.column_stack([table[name] for name in names])[1:], seconds)
 
 
-def _c_program(system: System, folder: Path, steps: int, step: float) -> tuple[np.ndarray, float]:
+def _c_program(system: System, folder: Path, steps: int, step: float) -> Ran:
     what = c_host.plan(system, Experiment(steps * step, step, "jacobi"))
     names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
     rows, seconds = c_host.run([c_host.compiled(folder)], folder, what, names)
-    return rows[1:], seconds
+    return Ran(rows[1:], seconds)
 
 
 HOSTS: dict[str, Host] = {
@@ -231,10 +262,10 @@ def _verdict(
             reason = last_line(process.stderr, f"exit status {process.returncode}")
             return Verdict(host, labelled, failure=reason)
         with np.load(Path(folder, "rows.npz")) as content:
-            rows, seconds = content["rows"], float(content["seconds"])
-    if rows.shape != table.shape:
-        return Verdict(host, labelled, failure=f"{len(rows)} rows instead of {len(table)}")
-    deviation = np.abs(rows - table).max(axis=0)
+            ran = Ran(content["rows"], float(content["seconds"]), float(content["reading"]))
+    if ran.rows.shape != table.shape:
+        return Verdict(host, labelled, failure=f"{len(ran.rows)} rows instead of {len(table)}")
+    deviation = np.abs(ran.rows - table).max(axis=0)
     compared = [i for i, name in enumerate(names) if name.startswith(HOSTS[host].compared)]
     worst_port = max(compared, key=lambda i: float(deviation[i]))
     worst = float(deviation[worst_port])
@@ -243,7 +274,8 @@ def _verdict(
         labelled,
         worst,
         names[worst_port],
-        steps / seconds,
+        steps / ran.seconds,
+        steps / (ran.seconds + ran.reading),
         agrees=worst <= HOSTS[host].bound,
     )
 
@@ -252,8 +284,8 @@ def _child(host: str, folder: Path, steps: int, step: float) -> None:
     system = read_ssp(folder / "given.ssp")
     export = folder / "export"
     export.mkdir()
-    rows, seconds = HOSTS[host].run(replace(system, name="auv"), export, steps, step)
-    np.savez(folder / "rows.npz", rows=rows, seconds=seconds)
+    ran = HOSTS[host].run(replace(system, name="auv"), export, steps, step)
+    np.savez(folder / "rows.npz", **ran._asdict())
 
 
 if __name__ == "__main__":
