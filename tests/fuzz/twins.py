@@ -19,7 +19,8 @@ from support.trials import CREATIONS
 STEPS, H = 3, 0.02
 
 #: What is wrong with bytes depends on their format; one function PythonFMU spells in its own way.
-_OWN_WORDS = re.compile(r"(?<=state refused: ).*?(?=; |$)|fmi2?GetRealOutputDerivatives")
+_REFUSED_STATE = "state refused: "
+_OWN_WORDS = re.compile(rf"(?<={_REFUSED_STATE}).*?(?=; |$)|fmi2?GetRealOutputDerivatives")
 
 #: Nothing that is said is longer [characters].
 _LONGEST = 500
@@ -83,7 +84,12 @@ def _outcome(answer: Callable[[Side], Any], side: Side) -> Any:
 
 
 def _messages(host: Host) -> list[tuple[Status, str]]:
-    return [(message.status, _shared(message.text)) for message in host.messages]
+    """Those that are told once by either kind: the same words are not told again."""
+    return [
+        (message.status, _shared(message.text))
+        for message in host.messages
+        if _REFUSED_STATE not in message.text
+    ]
 
 
 def _shared(text: str) -> str:
