@@ -84,7 +84,7 @@ def _outcome(answer: Callable[[Side], Any], side: Side) -> Any:
 
 
 def _messages(host: Host) -> list[tuple[Status, str]]:
-    """Those that are told once by either kind: the same words are not told again."""
+    """All but those of refused states: the same words are not told twice, and these differ."""
     return [
         (message.status, _shared(message.text))
         for message in host.messages
