@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
@@ -21,7 +22,7 @@ from support.calls import CASES, Call, Draw, Item
 from support.instances import NAMES
 from support.native_states import Unwritable
 from support.raw import Description, Library, Variable, instance
-from support.sanitizers import GCC, sanitize, sanitizers
+from support.sanitizers import GCC, compiled, sanitize, sanitizers
 from support.worker import Lost, Worker
 
 #: Seeds of CI: those of the night come after them.
@@ -178,6 +179,23 @@ def test_answer_that_is_not_the_tables_is_noticed_and_shrunk(planner: Fuzzer):
 
 def planner_port(planner: Fuzzer) -> Variable:
     return planner.description().find("tau_d.u")
+
+
+@pytest.mark.skipif(GCC is None, reason="gcc is not installed")
+def test_constant_of_one_kind_alone_is_noticed(kinds: dict[str, Folders], tmp_path: Path):
+    changed = tmp_path / "DisturbanceGenerator"
+    shutil.copytree(kinds["native"]["DisturbanceGenerator"], changed)
+    equations = changed / "sources" / "equations.c"
+    text = equations.read_text()
+    assert text.count("A_f * disturbance_sign(u)") == 1
+    equations.write_text(text.replace("A_f * disturbance_sign(u)", "2.0 * A_f"))
+    compiled(changed)
+    ours = {"DisturbanceGenerator": kinds["python"]["DisturbanceGenerator"]}
+    with Fuzzer(ours, "DisturbanceGenerator", {"DisturbanceGenerator": changed}) as fuzzer:
+        findings = [f for _, found in fuzzer.attack("twins", range(25)) for f in found]
+        [seen] = {f.what.rpartition(": ")[2] for f in findings}
+        assert seen == "values differ"
+        assert "tau_w.u" in explained(fuzzer, "twins", findings)
 
 
 def test_seed_gives_the_same_sequence_again(planner: Fuzzer):

@@ -36,31 +36,31 @@ class Twins(Players):
     def make(self, case: str) -> None:
         # Only one of the kinds has resources, and who refuses says so in its own words.
         if creations(PYTHON)[case] == creations(NATIVE)[case]:
-            what = f"an instance with {case}"
+            what = f"instances with {case}"
             self._expect_equal(what, lambda s: s.host.instantiate(**CREATIONS[case]))
             self._expect_equal("messages", lambda s: [m.status for m in s.host.messages])
             self._forget_messages()
 
     def play_on(self, call: Call, on: str) -> None:
-        self._expect_equal("the status", lambda side: side.on(call, on).name)
+        self._expect_equal("statuses", lambda side: side.on(call, on).name)
 
     def play(self, call: Call) -> None:
-        self._expect_equal("the status", lambda side: make(side.host, call, side.saved).name)
+        self._expect_equal("statuses", lambda side: make(side.host, call, side.saved).name)
         self._count += 1
         self._compare()
         if self._count % STATES_EVERY == 0:
-            self._expect_equal("the state", _state)
+            self._expect_equal("states", _state)
 
     def compare_all(self) -> None:
         self._compare()
-        self._expect_equal("the state", _state)
-        self._expect_equal("what comes of the state", _ways_on)
+        self._expect_equal("states", _state)
+        self._expect_equal("ways on from the state", _ways_on)
         self._compare()
 
     def _compare(self) -> None:
-        self._expect_equal("the values", lambda side: side.host.values())
-        self._expect_equal("the progress", lambda side: _progress(side.host))
-        self._expect_equal("the messages", lambda side: _messages(side.host))
+        self._expect_equal("values", lambda side: side.host.values())
+        self._expect_equal("times of the last step", lambda side: _progress(side.host))
+        self._expect_equal("messages", lambda side: _messages(side.host))
         self._forget_messages()
 
     def _forget_messages(self) -> None:
@@ -73,7 +73,7 @@ class Twins(Players):
         if repr(ours) != repr(theirs):
             parts = (_part(ours, theirs), _part(theirs, ours))
             said = (f"{kind} {part}" for kind, part in zip(KINDS, parts, strict=True))
-            raise Difference(f"{what}, {'; '.join(said)}: {what} differs")
+            raise Difference(f"{what}, {'; '.join(said)}: {what} differ")
 
 
 def _outcome(answer: Callable[[Side], Any], side: Side) -> Any:

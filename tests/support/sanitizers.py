@@ -18,23 +18,31 @@ MEMORY, THREADS = "address,undefined", "thread"
 _HOSTS = Path(__file__).parents[1] / "fmu"
 
 
-def _compile(folder: Path, target: Path, what: str, *options: str | Path) -> None:
-    flags = ["-g", "-O1", "-fno-omit-frame-pointer", f"-fsanitize={what}", "-fno-sanitize-recover"]
-    command = [str(GCC), *flags, "-o", target, *options, "-pthread", "-ldl", "-lm"]
+def _watched(what: str) -> list[str]:
+    return ["-O1", "-fno-omit-frame-pointer", f"-fsanitize={what}", "-fno-sanitize-recover"]
+
+
+def _compile(folder: Path, target: Path, *options: str | Path) -> None:
+    command = [str(GCC), "-g", "-o", target, *options, "-pthread", "-ldl", "-lm"]
     subprocess.run(command, cwd=folder, check=True)
 
 
-def sanitize(folder: Path, what: str = MEMORY) -> Path:
+def compiled(folder: Path, *options: str) -> Path:
     """Compile the sources of an unpacked FMU into the place of its library."""
     [library] = folder.glob("binaries/linux64/*.so")
     kind = ("-std=c99", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
-    _compile(folder / "sources", library, what, *kind, "fmi2.c")
+    _compile(folder / "sources", library, *kind, *options, "fmi2.c")
     return library
+
+
+def sanitize(folder: Path, what: str = MEMORY) -> Path:
+    """The same, with sanitizers."""
+    return compiled(folder, *_watched(what))
 
 
 def sanitized_host(name: str, folder: Path, what: str = MEMORY) -> Path:
     """One of the tests' hosts."""
-    _compile(folder, folder / name, what, _HOSTS / f"{name}.c")
+    _compile(folder, folder / name, *_watched(what), _HOSTS / f"{name}.c")
     return folder / name
 
 
