@@ -25,8 +25,7 @@ from orchestrator.experiments.scenario import read_scenario
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import Experiment
 from orchestrator.system.structure import System
-from support.cells import Company, check
-from support.fmi3 import Fmi3Library, Logger
+from support.fmi3 import Fmi3Library, Logger, trials
 from support.instances import NAMES
 from support.kinds import outcome
 from support.raw import Host, Status, instance
@@ -208,25 +207,6 @@ def test_functions_have_a_prefix_where_it_is_asked_for(unpacked: Path, tmp_path:
 
 
 # docs/status.md
-
-
-def trials(folder: Path, other: Path) -> Any:
-    """Prepare a process for cells of the tables that both versions share."""
-    library = Fmi3Library(folder)
-    with instance(Fmi3Library(other)) as foreign:
-        content = foreign.content()
-    beside = Host(library)
-    assert beside.instantiate()
-    assert beside.setup() == beside.enter() == beside.exit() == Status.OK
-    company = Company(beside, content)
-
-    def trial(cell: tuple[tuple[str, str], str]) -> str:
-        try:
-            return "" if check(library, *cell, company) else SKIPPED
-        except AssertionError as error:
-            return str(error) or "an assertion fails"
-
-    return trial
 
 
 SHARED = {

@@ -15,9 +15,11 @@ from xml.etree import ElementTree
 
 import fmpy
 
-from support.raw import Description, Library, Variable
+from support.cells import Company, check
+from support.raw import Description, Host, Library, Status, Variable, instance
 from support.raw_fmi import MODEL_EXCHANGE
 from support.status_table import names_in_fmi3
+from support.trials import SKIPPED
 
 Logger = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
 
@@ -151,3 +153,22 @@ class _Functions:
                 component, references, n, values, n
             )
         return function  # type: ignore[no-any-return]
+
+
+def trials(folder: Path, other: Path) -> Any:
+    """Prepare a process for cells of the tables that both versions share."""
+    library = Fmi3Library(folder)
+    with instance(Fmi3Library(other)) as foreign:
+        content = foreign.content()
+    beside = Host(library)
+    assert beside.instantiate()
+    assert beside.setup() == beside.enter() == beside.exit() == Status.OK
+    company = Company(beside, content)
+
+    def trial(cell: tuple[tuple[str, str], str]) -> str:
+        try:
+            return "" if check(library, *cell, company) else SKIPPED
+        except AssertionError as error:
+            return str(error) or "an assertion fails"
+
+    return trial
