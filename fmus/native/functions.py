@@ -141,6 +141,9 @@ class _Translation:
             code = self._in_c.code(value, self._in_c.local.get(target.id))
             yield self._stored([(target.id, code)])
         elif isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+            # Python computes all values first, C stores one after the other.
+            for name in sorted(_names(target) & _names(value)):
+                raise self._in_c.fail(target, f"{name} is given and used in one assignment")
             pairs = list(zip(target.elts, value.elts))
             if all(isinstance(one, ast.Name) for one, _ in pairs):
                 codes = [(ast.unparse(one), self._in_c.code(other)) for one, other in pairs]
@@ -179,15 +182,15 @@ class _Translation:
 
     def _stored(self, values: list[tuple[str, Code]]) -> str:
         """The assignment of values of one type, to names that are new or not."""
-        texts = ", ".join(f"{name} = {code.text}" for name, code in values)
+        stores = [f"{name} = {code.text}" for name, code in values]
         if any(name in scope for name, _ in values for scope in self._scopes):
-            return texts.replace(", ", "; ") + ";" if len(values) > 1 else f"{texts};"
+            return "; ".join(stores) + ";"
         shape = values[0][1].shape
         for name, code in values:
             self._scopes[-1].add(name)
             self._in_c.local[name] = self._program.defined(code.shape)
         changes = any(self._assigned[name] > 1 for name, _ in values)
-        return f"{'' if changes else 'const '}{_declared(shape)}{texts};"
+        return f"{'' if changes else 'const '}{_declared(shape)}{', '.join(stores)};"
 
     def _raised(self, node: ast.Raise) -> str:
         assert isinstance(node.exc, ast.Call)
@@ -209,6 +212,10 @@ class _Translation:
 
 def _zero(shape: Shape) -> str:
     return f"({shape.name}){{0}}" if isinstance(shape, Structure) else "0"
+
+
+def _names(node: ast.expr) -> set[str]:
+    return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
 
 
 def _declared(shape: Shape) -> str:

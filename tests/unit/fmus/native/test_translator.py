@@ -83,6 +83,7 @@ def test_each_function_has_its_docstring_above_it(package):
         ("def begin(parameters: A) -> A:\n    return A(1.0, 2.0)\n", "10: 2 values for 1 fields"),
         ("def begin(state: A) -> A:\n    x, y = state\n    return A(x)\n", "2 names for 1 values"),
         ("def begin(parameters: A) -> A:\n    return A(max(1.0, 2.0))\n", "10: the name max"),
+        ("def begin(t: int, h: int) -> A:\n    t, h = h, t\n    return A(1.0)\n", "10: h is given"),
         ("def begin(parameters: list[float]) -> A:\n    return A(1.0)\n", "is no type"),
     ],
 )  # fmt: skip
@@ -103,3 +104,24 @@ def test_what_cannot_be_translated_is_named(tmp_path: Path, text, why):
         check=False,
     )
     assert why in process.stderr.splitlines()[-1]
+
+
+def test_names_are_given_other_values_one_by_one(tmp_path: Path):
+    """Each by a call with several arguments, whose commas stay what they are."""
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own/__init__.py").touch()
+    (tmp_path / "own/behaviour.py").write_text(
+        "from __future__ import annotations\n\nfrom math import atan2\n\n\n"
+        "def turned(x: float, y: float, z: float) -> float:\n"
+        "    x, y = atan2(z, 1.0), atan2(z, 2.0)\n    return x + y\n"
+    )
+    code = (
+        "from fmus.native.functions import function_in_c\n"
+        "from fmus.native.program import Program\n"
+        "from own.behaviour import turned\n"
+        "print(Program(function_in_c).function(turned).text)\n"
+    )
+    process = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert "    x = atan2(z, 1.0); y = atan2(z, 2.0);\n" in process.stdout
