@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from itertools import count
@@ -12,6 +11,7 @@ import numpy as np
 
 from orchestrator.errors import InputError, last_line
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.library import COMPILERS, machines_compiler
 from orchestrator.master.schedule import stages
 from orchestrator.system.component import Component
 from orchestrator.system.graph import has_feedthrough
@@ -25,16 +25,8 @@ SOURCE = Path(__file__).with_name("host.c")
 #: What the host reads and writes.
 PLAN, TABLE = "plan.txt", "table.csv"
 
-#: C compilers, the first of which is taken that there is.
-_COMPILERS = ("cc", "gcc", "clang")
-
 #: Where the library of an unpacked FMU is.
 Library = Callable[[Component], Path]
-
-
-def compiler() -> str | None:
-    """The C compiler of this machine, if it has one."""
-    return next(filter(None, map(shutil.which, _COMPILERS)), None)
 
 
 def compiled(folder: Path, command: Sequence[str] = (), name: str = "host") -> Path:
@@ -49,9 +41,9 @@ def compiled(folder: Path, command: Sequence[str] = (), name: str = "host") -> P
         InputError: there is no compiler, or it fails.
 
     """
-    found = command or (compiler(),)
+    found = command or (machines_compiler(),)
     if found[0] is None:
-        raise InputError(f"there is no C compiler: neither {' nor '.join(_COMPILERS)}")
+        raise InputError(f"there is no C compiler: neither {' nor '.join(COMPILERS)}")
     program = folder / name
     options = ["-std=c99", "-O2", "-o", str(program), str(SOURCE)]
     if program.suffix != ".exe":

@@ -27,6 +27,9 @@ _SOURCE = Path(__file__).with_name("stepper.c")
 #: Products are not contracted with sums: t + h must not depend on the processor.
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC")
 
+#: C compilers, the first of which is taken that there is.
+COMPILERS = ("cc", "gcc", "clang")
+
 #: How the name of a folder of the cache begins in which it is compiled.
 _PARTIAL = ".partial-"
 
@@ -49,7 +52,7 @@ def made(in_no_time: bool = False) -> CDLL:
         InputError: it cannot be; the text says what to do.
 
     """
-    compiler = _machines_compiler() or (None if in_no_time else _zig())
+    compiler = _of_the_machine() or (None if in_no_time else _zig())
     if compiler is None:
         raise InputError(
             "the compiled loop needs a C compiler: install gcc or clang, or `pip install ziglang`"
@@ -64,15 +67,20 @@ def made(in_no_time: bool = False) -> CDLL:
 _Compiler = Callable[..., CompletedProcess[str]]
 
 
-def _machines_compiler() -> _Compiler | None:
-    for name in ("cc", "gcc", "clang"):
-        if command := shutil.which(name):
-            return lambda *arguments: subprocess.run(
-                # Ctrl-C is for this process alone.
-                [command, *arguments], capture_output=True, text=True, check=False,
-                start_new_session=True,
-            )  # fmt: skip
-    return None
+def machines_compiler() -> str | None:
+    """The C compiler of this machine, if it has one."""
+    return next(filter(None, map(shutil.which, COMPILERS)), None)
+
+
+def _of_the_machine() -> _Compiler | None:
+    command = machines_compiler()
+    if command is None:
+        return None
+    return lambda *arguments: subprocess.run(
+        # Ctrl-C is for this process alone.
+        [command, *arguments], capture_output=True, text=True, check=False,
+        start_new_session=True,
+    )  # fmt: skip
 
 
 def _zig() -> _Compiler | None:

@@ -23,6 +23,7 @@ from orchestrator.experiments import bundle
 from orchestrator.experiments.scenario import read_scenario
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.library import machines_compiler
 from orchestrator.system.component import Component
 from orchestrator.system.structure import System
 from support.instances import NAMES
@@ -38,7 +39,7 @@ _OF_THE_RUNTIME = {"__gmon_start__", "_ITM_registerTMCloneTable", "_ITM_deregist
 NM, CMAKE, QEMU, WINE = map(shutil.which, ("nm", "cmake", "qemu-aarch64", "wine"))
 ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")
 
-needs_compiler = pytest.mark.skipif(c_host.compiler() is None, reason="there is no C compiler")
+needs_compiler = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 needs_zig = pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
 each_scenario = pytest.mark.parametrize("scenario", SCENARIOS)
 

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.exchange import c_host
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.exchange.verify import verify
 from orchestrator.experiments.scenario import read_scenario
 from orchestrator.experiments.wiring import closed_loop
+from orchestrator.master.library import machines_compiler
 
 LIBDIR = sysconfig.get_config_var("LIBDIR")
 
@@ -26,7 +26,7 @@ def test_host_gives_the_numbers_of_our_jacobi_master(dist: Path, host: str, scen
     """Every Real output over 500 steps, to 1e-9; fmpy.ssp ignores parameters, so fig4 only."""
     if find_spec(HOSTS[host].package) is None:
         pytest.skip(f"{HOSTS[host].package} is not installed")
-    if host == "c-program" and c_host.compiler() is None:
+    if host == "c-program" and machines_compiler() is None:
         pytest.skip("there is no C compiler")
     if host == "fmpy-ssp" and scenario != "fig4":
         pytest.skip("fmpy.ssp ignores parameter sets")
