@@ -10,16 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
-typedef void *Component;
-typedef enum { OK, Warning, Discard, Error, Fatal } Status;
-typedef void (*Logger)(void *, const char *, Status, const char *, const char *, ...);
-typedef struct {
-    Logger logger;
-    void *(*allocate)(size_t, size_t);
-    void (*release)(void *);
-    void *step_finished;
-    void *environment;
-} Callbacks;
+#include "slave.h"
 
 /* Inputs come first, outputs behind them, and parameters last. */
 enum { PORTS = 64, OUTPUTS = 24, AT = 60, ACT, CALL, MILLISECONDS };
@@ -82,8 +73,6 @@ static void respond(Instance *it)
     }
 }
 
-const char *fmi2GetTypesPlatform(void) { return "default"; }
-const char *fmi2GetVersion(void) { return "2.0"; }
 Status fmi2SetDebugLogging(Component c, int on, size_t n, const char *const *categories)
 {
     return OK;
@@ -150,24 +139,3 @@ Status fmi2DoStep(Component c, double t, double h, int no_rollback)
     respond(it);
     return status;
 }
-
-/* What a host may look for, and nobody here calls. */
-#define ABSENT(name) \
-    Status name(void) { return Error; }
-ABSENT(fmi2GetString)
-ABSENT(fmi2SetString)
-ABSENT(fmi2GetFMUstate)
-ABSENT(fmi2SetFMUstate)
-ABSENT(fmi2FreeFMUstate)
-ABSENT(fmi2SerializedFMUstateSize)
-ABSENT(fmi2SerializeFMUstate)
-ABSENT(fmi2DeSerializeFMUstate)
-ABSENT(fmi2GetDirectionalDerivative)
-ABSENT(fmi2SetRealInputDerivatives)
-ABSENT(fmi2GetRealOutputDerivatives)
-ABSENT(fmi2CancelStep)
-ABSENT(fmi2GetStatus)
-ABSENT(fmi2GetRealStatus)
-ABSENT(fmi2GetIntegerStatus)
-ABSENT(fmi2GetBooleanStatus)
-ABSENT(fmi2GetStringStatus)

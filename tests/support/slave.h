@@ -1,0 +1,39 @@
+/* What slaves of FMI 2.0 have in common that are written for tests: FMI's types, and the functions
+   that none of them does anything in. */
+
+#include <stddef.h>
+
+typedef void *Component;
+typedef enum { OK, Warning, Discard, Error, Fatal } Status;
+typedef void (*Logger)(void *, const char *, Status, const char *, const char *, ...);
+typedef struct {
+    Logger logger;
+    void *(*allocate)(size_t, size_t);
+    void (*release)(void *);
+    void *step_finished;
+    void *environment;
+} Callbacks;
+
+const char *fmi2GetTypesPlatform(void) { return "default"; }
+const char *fmi2GetVersion(void) { return "2.0"; }
+
+/* What a host may look for, and nobody here calls. */
+#define ABSENT(name) \
+    Status name(void) { return Error; }
+ABSENT(fmi2GetString)
+ABSENT(fmi2SetString)
+ABSENT(fmi2GetFMUstate)
+ABSENT(fmi2SetFMUstate)
+ABSENT(fmi2FreeFMUstate)
+ABSENT(fmi2SerializedFMUstateSize)
+ABSENT(fmi2SerializeFMUstate)
+ABSENT(fmi2DeSerializeFMUstate)
+ABSENT(fmi2GetDirectionalDerivative)
+ABSENT(fmi2SetRealInputDerivatives)
+ABSENT(fmi2GetRealOutputDerivatives)
+ABSENT(fmi2CancelStep)
+ABSENT(fmi2GetStatus)
+ABSENT(fmi2GetRealStatus)
+ABSENT(fmi2GetIntegerStatus)
+ABSENT(fmi2GetBooleanStatus)
+ABSENT(fmi2GetStringStatus)
