@@ -14,6 +14,7 @@ room                        what it is for
 :mod:`.analysis`            the loop's signals by the paper's names; indices, figures
 :mod:`.experiments`         scenarios, wiring, bundle, one run and its files
 :mod:`.exchange`            other tools: hosts, reference results, verification
+:mod:`.studies`             many runs: what varies, engines, Dask
 :mod:`.paper`               the paper's numbers and claims beside ours
 :mod:`.commands`            the command line
 ==========================  ==========================================================

@@ -19,8 +19,8 @@ ROOT = Path(__file__).parents[2]
 #: Rooms, each of which may import those before it.
 FLOORS = {
     "orchestrator": (
-        "errors", "reading", "system", "master", "analysis", "experiments", "exchange", "paper",
-        "commands",
+        "errors", "reading", "system", "master", "analysis", "experiments", "exchange",
+        "studies", "paper", "commands",
     ),
     "fmus": ("ports", "slave", "native", "components", "packaging"),
 }  # fmt: skip
@@ -30,8 +30,8 @@ ALLOWED = {
     "auv_fmu": set(),
     "fmus": {"auv_fmu", "markdown_it", "pythonfmu"},
     "orchestrator": {
-        "auv_fmu", "fmpy", "libcosimpy", "markdown_it", "matplotlib", "numpy", "pandas", "PIL",
-        "platformdirs", "tqdm",
+        "auv_fmu", "dask", "distributed", "fmpy", "libcosimpy", "markdown_it", "matplotlib", "numba",
+        "numpy", "pandas", "PIL", "platformdirs", "pyarrow", "scipy", "tqdm",
     },
 }  # fmt: skip
 

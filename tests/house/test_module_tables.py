@@ -22,6 +22,7 @@ PACKAGES = (
     "orchestrator.analysis",
     "orchestrator.experiments",
     "orchestrator.exchange",
+    "orchestrator.studies",
     "orchestrator.paper",
     "orchestrator.commands",
 )

@@ -1,0 +1,10 @@
+"""Studies: many runs of which each differs from the others in what the study varies.
+
+==================  ==================================================================
+module              what it holds
+==================  ==================================================================
+:mod:`.engine`      a run of a study, what comes out of it, and what makes it
+==================  ==================================================================
+
+A study needs the packages of the extra `studies`.
+"""
