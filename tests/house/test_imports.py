@@ -30,8 +30,8 @@ ALLOWED = {
     "auv_fmu": set(),
     "fmus": {"auv_fmu", "markdown_it", "pythonfmu"},
     "orchestrator": {
-        "auv_fmu", "dask", "distributed", "fmpy", "libcosimpy", "markdown_it", "matplotlib", "numba",
-        "numpy", "pandas", "PIL", "platformdirs", "pyarrow", "scipy", "tqdm",
+        "auv_fmu", "dask", "distributed", "fmpy", "libcosimpy", "markdown_it", "matplotlib",
+        "numba", "numpy", "pandas", "PIL", "platformdirs", "pyarrow", "scipy", "tqdm",
     },
 }  # fmt: skip
 
