@@ -4,6 +4,7 @@
 module              what it holds
 ==================  ==================================================================
 :mod:`.engine`      a run of a study, what comes out of it, and what makes it
+:mod:`.cluster`     who makes which runs, and where: Dask
 ==================  ==================================================================
 
 A study needs the packages of the extra `studies`.
