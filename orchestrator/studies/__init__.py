@@ -9,8 +9,9 @@ module              what it holds
 :mod:`.fmu_engine`  runs of FMUs
 :mod:`.indices`     what comes out of a run, from its rows
 :mod:`.store`       what has come out of a study, as it comes and at the end
+:mod:`.cluster`     who makes which runs, and where: Dask
 :mod:`.sweep`       a study as a whole
 ==================  ==================================================================
 
-A study needs the packages of the extra `studies`.
+A study needs the packages of the extra `studies`, which are imported when they are needed.
 """

@@ -191,18 +191,14 @@ def drawn(sample: Sample) -> np.ndarray:
     """Shares of the ranges, (samples, values); a sample is what seed and method make it.
 
     Raises:
-        InputError: scipy is not installed, or cannot draw that many.
+        InputError: the method cannot draw that many.
 
     """
     n, width = sample.n, len(sample.ranges)
     if sample.method == "random":
         return np.random.default_rng(sample.seed).random((n, width))
-    try:
-        from scipy.stats import qmc  # noqa: PLC0415
-    except ImportError as error:
-        raise InputError(
-            f"method {sample.method!r} needs scipy: pip install 'auv-fmu[studies]'"
-        ) from error
+    from scipy.stats import qmc  # noqa: PLC0415
+
     generator = np.random.default_rng(sample.seed)
     try:
         if sample.method == METHODS[0]:

@@ -104,8 +104,6 @@ def store(folder: Path, record: Mapping[str, Any]) -> Iterator[Store | None]:
         InputError: the folder holds another study, cannot be written, or is being written into.
 
     """
-    if find_spec("pyarrow") is None:
-        raise InputError("studies need pyarrow: pip install 'auv-fmu[studies]'")
     with ExitStack() as stack:
         with _written(folder):
             folder.mkdir(parents=True, exist_ok=True)
@@ -173,8 +171,8 @@ def _check_same(folder: Path, record: Mapping[str, Any]) -> None:
     different = [key for key in {**now, **before} if now.get(key) != before.get(key)]
     if different:
         raise InputError(
-            f"{folder} holds another study: {', '.join(different)} differ; choose another folder "
-            "(--out DIR), or remove that one"
+            f"{folder} holds another study, which differs in {', '.join(different)}; choose "
+            "another folder (--out DIR), or remove that one"
         )
 
 

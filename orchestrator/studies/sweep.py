@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import platform
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import version
-from itertools import islice
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.preparation import loaded
 from orchestrator.master.loop import LOOPS
-from orchestrator.studies.engine import Engine, Outcome, Run
+from orchestrator.studies.engine import Engine, Outcome
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import FAILURE, Runs, Store, read_record, store, write_record
@@ -26,6 +26,9 @@ from orchestrator.studies.study import BATCH, ENGINES, FMU, Study, read_study, s
 
 #: Packages whose versions the runs depend on.
 PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy", "pyarrow", "scipy")
+
+#: What a study needs besides.
+_NEEDED = ("distributed", "numba", "pyarrow", "scipy")
 
 #: Seconds before a bar appears.
 _PATIENCE = 2.0
@@ -89,6 +92,7 @@ def swept(
     progress: bool,
 ) -> Runs:
     """The same, for a study that has been read; the command is for the record."""
+    _check_installed()
     chosen = engine or study.engine
     systems = {name: loaded(name, kind) for name in study.scenario}
     space = Space(study, systems)
@@ -117,13 +121,24 @@ def swept(
     }
     with store(folder, record) as unfinished:
         if unfinished is not None:
+            # A second that a study which is done needs not wait for.
+            from orchestrator.studies.cluster import making  # noqa: PLC0415
+
             runs = (space[number] for number in unfinished.missing(len(space)))
-            _keep(unfinished, _made(maker, runs), len(space), study.name if progress else None)
+            name = study.name if progress else None
+            with making(maker, runs, scheduler=scheduler, workers=workers) as blocks:
+                _keep(unfinished, blocks, len(space), name)
             unfinished.publish(space)
         done = Runs(folder)
         failed = sum(failure is not None for failure in done[FAILURE])
         write_record(folder, {**read_record(folder), "failed": failed})
     return done
+
+
+def _check_installed() -> None:
+    missing = [package for package in _NEEDED if find_spec(package) is None]
+    if missing:
+        raise InputError(f"studies need {' and '.join(missing)}: pip install 'auv-fmu[studies]'")
 
 
 def _keep(unfinished: Store, blocks: Iterable[Sequence[Outcome]], n: int, name: str | None) -> None:
@@ -147,9 +162,3 @@ def _engine(name: str, systems: Mapping[str, Any], kind: str, loop: str) -> Engi
     if name == BATCH:
         raise InputError("engine batch: not there yet")
     raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
-
-
-def _made(engine: Engine, runs: Iterator[Run]) -> Iterator[Sequence[Outcome]]:
-    """Blocks of outcomes, made in this process."""
-    while block := list(islice(runs, 1)):
-        yield list(engine.outcomes(block))
