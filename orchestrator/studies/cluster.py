@@ -43,9 +43,8 @@ _MOST_RUNS = 10_000
 #: Blocks under way for each thread of the workers: the one it makes, and the one that is next.
 _AHEAD = 2
 
-#: How often workers are counted [s], how long there may be none [s], and how long it may take to
-#: find the scheduler [s].
-_GLANCE, _PATIENCE, _CONNECT = 2.0, 120.0, 15.0
+#: How often workers are counted [s], and how long there may be none [s].
+_GLANCE, _PATIENCE = 2.0, 120.0
 
 #: How long a process of this machine has to leave when the study is broken off [s].
 _FAREWELL = 0.5
@@ -103,7 +102,7 @@ def _remote(address: str, workers: int | None) -> Iterator[Client]:
             "--workers is for processes of this machine: those of a scheduler are started with it"
         )
     try:
-        client = Client(address, timeout=_CONNECT, set_as_default=False)
+        client = Client(address, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(f"no scheduler answers at {address}: {reason(error)}") from error
     with client:
@@ -128,7 +127,10 @@ def _local(workers: int | None) -> Iterator[Client]:
             )
             client = Client(cluster, set_as_default=False)
     except (OSError, RuntimeError) as error:
-        raise InputError(f"no process can be started: {reason(error)}") from error
+        raise InputError(
+            f"no process can be started: {reason(error)} (a script needs `if __name__ == "
+            "'__main__':` around what it does)"
+        ) from error
     with cluster, client:
         try:
             yield client
