@@ -12,7 +12,7 @@ from orchestrator.analysis.figures.style import COLOURS, STYLES
 from orchestrator.studies.figures.bins import Bins, bins_of, grouped, is_logarithmic
 from orchestrator.studies.figures.entries import Plan
 from orchestrator.studies.figures.panels import legend, paneled, spread
-from orchestrator.studies.figures.runs import VERDICTS, Runs
+from orchestrator.studies.figures.values import VERDICTS, Values
 
 #: Parts of an axis along which runs are counted together.
 _BINS = 30
@@ -26,7 +26,7 @@ _ABREAST = 2
 _HEIGHT = 2.3
 
 
-def bands(plan: Plan, title: str, runs: Runs) -> Figure:
+def bands(plan: Plan, title: str, runs: Values) -> Figure:
     """A row of panels for each value that is shown, a column for each x; runs apart by colours."""
     columns = len(plan.x) if len(plan.x) > 1 else min(_ABREAST, len(plan.show))
     shown = list(product(plan.show, plan.x))

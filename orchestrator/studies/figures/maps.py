@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from orchestrator.studies.figures.bins import bins_of, grouped, is_logarithmic
 from orchestrator.studies.figures.entries import Plan
 from orchestrator.studies.figures.panels import paneled, spread
-from orchestrator.studies.figures.runs import VERDICTS, Runs
+from orchestrator.studies.figures.values import VERDICTS, Values
 
 #: Cells along each axis of runs that are no grid.
 _CELLS = 24
@@ -26,7 +26,7 @@ _COLOURS, _EMPTY = "cividis", "lightgrey"
 _HEIGHT = 2.4
 
 
-def maps(plan: Plan, title: str, runs: Runs) -> Figure:
+def maps(plan: Plan, title: str, runs: Values) -> Figure:
     """Panels for each value that is shown, with one scale of colours, beside and below each other.
 
     The last column that tells runs apart has its values side by side, the others below each other.

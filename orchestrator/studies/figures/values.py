@@ -66,7 +66,7 @@ VERDICTS: Mapping[str, tuple[str, Callable[[Columns], np.ndarray]]] = {
 }
 
 
-class Runs:
+class Values:
     """The values of some runs.
 
     A value is a column, or one of :data:`VERDICTS`, or is made of columns:
@@ -128,7 +128,7 @@ class Runs:
         """What a value is called, without its unit."""
         return _UNIT.sub("", self.label(value))
 
-    def parts(self, by: Sequence[str]) -> Iterator[tuple[str, Runs]]:
+    def parts(self, by: Sequence[str]) -> Iterator[tuple[str, Values]]:
         """The runs that agree in some columns, and what tells them from the others.
 
         Args:
@@ -140,7 +140,7 @@ class Runs:
         for key in dict.fromkeys(keys):
             rows = np.array([other == key for other in keys])
             columns = {name: values[rows] for name, values in self._columns.items()}
-            yield self._name(by, key), Runs(columns, self._labels)
+            yield self._name(by, key), Values(columns, self._labels)
         if not by:
             yield "", self
 
