@@ -95,14 +95,14 @@ ENTRIES: Mapping[str, Entry] = {
 
 
 def read_figures(
-    where: str, figures: Mapping[str, Any], varied: Sequence[str], is_compared: bool
+    where: str, figures: Mapping[str, Any], varied: Mapping[str, type], is_compared: bool
 ) -> tuple[Plan, ...]:
     """The figures of a study.
 
     Args:
         where: they stand, for messages.
         figures: what the study file says of them; without a figure the usual one is drawn.
-        varied: the names of what varies.
+        varied: the types of what varies, by name.
         is_compared: whether there are several scenarios.
 
     Raises:
@@ -111,9 +111,9 @@ def read_figures(
     """
     tables = dict(figures)
     labels = dict(flattened(tables.pop(_LABELS, {})))
-    usual = {"kind": INFLUENCE, "x": list(varied), "show": list(_USUAL)}
-    if not tables and varied:
-        tables["influence"] = usual
+    numbers = [name for name, kind in varied.items() if kind is not str]
+    if not tables and numbers:
+        tables["influence"] = {"kind": INFLUENCE, "x": numbers, "show": list(_USUAL)}
     by = (SCENARIO,) if is_compared else ()
     columns = (*varied, *INDICES, *by)
     plans = []
