@@ -51,13 +51,8 @@ def advance(
     """State after n steps of h seconds, and outputs at the beginning of the first."""
     gains = output_feedback.sampled(parameters, h)
     signals = output_feedback.evaluate(gains, state, inputs)
-    outputs = _seen(state, signals)
-    state = output_feedback.step(state, signals, h)
-    while n > 1:
-        signals = output_feedback.evaluate(gains, state, inputs)
-        state = output_feedback.step(state, signals, h)
-        n -= 1
-    return state, outputs
+    after = output_feedback.steps(gains, state, signals, inputs, h, n)
+    return after, _seen(state, signals)
 
 
 def _seen(state: ControllerState, signals: Signals) -> Outputs:
