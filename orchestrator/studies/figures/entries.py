@@ -65,7 +65,7 @@ KINDS: Mapping[str, _Kind] = {
 
 
 def _are_names(value: Any) -> bool:
-    return is_text(value) or (are_names(value) and bool(value))
+    return is_text(value) or are_names(value)
 
 
 def _are_numbers(value: Any) -> bool:
@@ -87,7 +87,7 @@ ENTRIES: Mapping[str, Entry] = {
     "by": Entry(
         "name, or list of names",
         _are_names,
-        "Columns that tell runs apart, by colours or in panels of their own.",
+        "Columns that tell runs apart, by colours or in panels of their own; `[]` for none.",
         "the scenario, if there are several",
     ),
     "limits": Entry("table of numbers", _are_numbers, "Lines at values of what is shown.", "none"),
@@ -143,7 +143,7 @@ def _check(where: str, table: Any, columns: Sequence[str]) -> None:
     if kind is None:
         raise InputError(f"{where}: lacks kind; there are {', '.join(KINDS)}")
     needs, may = KINDS[kind]
-    if missing := [key for key in needs if key not in table]:
+    if missing := [key for key in needs if not table.get(key)]:
         raise InputError(f"{where}: lacks {' and '.join(missing)}")
     if more := [key for key in table if key not in ("kind", *needs, *may)]:
         raise InputError(f"{where}: {kind} have no {more[0]}")

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from orchestrator.analysis.figures.style import heading
 from orchestrator.errors import InputError
 from orchestrator.experiments.scenario import read_scenario
 from orchestrator.studies.engine import INDICES, REACHED
@@ -105,7 +106,7 @@ class Values:
     def label(self, value: str) -> str:
         """What a value is called, with its unit in brackets."""
         if value in self._labels:
-            return self._labels[value]
+            return heading(self._labels[value])
         if value in VERDICTS:
             return VERDICTS[value][0]
         if len(factors := _factors(value)) > 1:
