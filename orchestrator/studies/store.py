@@ -140,28 +140,25 @@ def write_record(folder: Path, record: Mapping[str, Any]) -> None:
 
 
 def read_record(folder: Path) -> dict[str, Any]:
-    """The record of a study; empty if there is none.
+    """The record of a study.
 
     Raises:
-        InputError: there is something else in its place.
+        InputError: there is none.
 
     """
     path = folder / RECORD
     try:
         return dict(json.loads(path.read_text(encoding="utf-8")))
-    except FileNotFoundError:
-        return {}
     except (OSError, ValueError, TypeError) as error:
         raise InputError(f"{path}: not the record of a study: {reason(error)}") from error
 
 
 def _check_same(folder: Path, record: Mapping[str, Any]) -> None:
-    there = read_record(folder)
-    if not there:
+    if not (folder / RECORD).exists():
         if (folder / TABLE).exists() or (folder / _DATABASE).exists():
             raise InputError(f"{folder}: has runs, but no {RECORD}; choose another folder")
         return
-    before, now = there.get("made_of"), record["made_of"]
+    before, now = read_record(folder).get("made_of"), record["made_of"]
     if not isinstance(before, dict):
         raise InputError(f"{folder / RECORD}: not the record of a study")
     # As it is read again: JSON knows no tuples.
