@@ -42,7 +42,7 @@ def draw_figures(
 
     """
     for plan in plans:
-        runs = Values(columns, plan.labels)
+        runs = Values(columns, plan.labels).where(plan.where)
         values = (*plan.x, *([plan.y] if plan.y else ()), *plan.show)
         lacking = [value for value in values if not np.isfinite(runs[value]).any()]
         if lacking:

@@ -129,6 +129,15 @@ class Values:
         """What a value is called, without its unit."""
         return _UNIT.sub("", self.label(value))
 
+    def where(self, values: Mapping[str, Any]) -> Values:
+        """The runs of which some columns have some values."""
+        fitting = [self._columns[name] == value for name, value in values.items()]
+        return self._rows(np.all(fitting, axis=0)) if fitting else self
+
+    def _rows(self, rows: np.ndarray) -> Values:
+        columns = {name: values[rows] for name, values in self._columns.items()}
+        return Values(columns, self._labels)
+
     def parts(self, by: Sequence[str]) -> Iterator[tuple[str, Values]]:
         """The runs that agree in some columns, and what tells them from the others.
 
@@ -139,9 +148,7 @@ class Values:
         keys = list(zip(*(self._columns[name].tolist() for name in by), strict=True))
         keys = [tuple(None if _is_nan(part) else part for part in key) for key in keys]
         for key in dict.fromkeys(keys):
-            rows = np.array([other == key for other in keys])
-            columns = {name: values[rows] for name, values in self._columns.items()}
-            yield self._name(by, key), Values(columns, self._labels)
+            yield self._name(by, key), self._rows(np.array([other == key for other in keys]))
         if not by:
             yield "", self
 
