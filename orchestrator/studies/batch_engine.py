@@ -27,7 +27,7 @@ from orchestrator.studies.batch.library import compiled, digest
 from orchestrator.studies.batch.parameters import setting_of
 from orchestrator.studies.batch.standard import difference
 from orchestrator.studies.batch.verdict import (
-    has_limits,
+    misfit,
     refused,
     refused_at_once,
     refused_at_start,
@@ -146,7 +146,7 @@ def _job(system: System, run: Run) -> _Job:
     experiment = Experiment(run.stop_time, run.step, run.order)
     fmus = {name: part.description.modelName for name, part in system.components.items()}
     setting = setting_of(fmus, system.parameters, experiment.step)
-    if not has_limits(setting):
+    if misfit(setting):
         raise InputError(refused_at_start(setting))
     full, stop = experiment.full_steps, experiment.stop_time
     parts = splits(setting, experiment.step)

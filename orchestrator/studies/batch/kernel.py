@@ -54,7 +54,7 @@ class Done(NamedTuple):
     theta_hat: Any  #: and parameters
     commanded: Vector3  #: by the controller (tau_u, tau_q, tau_r) [N, N.m]
     told: Vector3  #: to the actuators
-    tau: Vector3  #: applied
+    tau: Vector3  #: that acts
     tau_w: Vector6  #: disturbance (u, v, w, p, q, r) [N, N.m]
 
 
@@ -96,13 +96,16 @@ def run(
         take_row(tallies[j], row, ends[j])
     if len(rows):
         fill(rows[0], 0.0, moment, done)
+    gains = law.sampled(setting.controller, plan.h / plan.parts.controller)
     for k in range(plan.steps):
         whole = k < plan.full
         t, end = k * plan.h, (k + 1) * plan.h if whole else plan.stop
         h, parts = (plan.h, plan.parts) if whole else (end - t, plan.last_parts)
+        if not whole:
+            gains = law.sampled(setting.controller, h / parts.controller)
         n, spare = normals(generator, noisy, spare)
         tau_before, dy = done.tau, moment.scene.plant.dy
-        after, done = step(setting, moment, plan.delayed, end, h, parts, n)
+        after, done = step(setting, gains, moment, plan.delayed, end, h, parts, n)
         if not is_sound(after):
             return k, moment
         progress[0] = k + 1
@@ -126,15 +129,16 @@ def begin(setting: Setting, n: Vector3) -> tuple[Moment, Done]:
     control = law.start(gains, scene)
     state, signals = law.command(gains, control, scene)
     velocity, theta_hat = law.estimates(state, signals, scene)
-    tau = plant.applied(setting.plant, signals.tau)
+    driven, _ = plant.begin(setting.plant, plant.applied(setting.plant, signals.tau))
     return (
         Moment(vehicles, scene, control, (signals.tau, scene.tau_w)),
-        Done(velocity, theta_hat, signals.tau, signals.tau, tau, scene.tau_w),
+        Done(velocity, theta_hat, signals.tau, signals.tau, driven.tau, scene.tau_w),
     )
 
 
 def step(
     setting: Setting,
+    gains: Any,
     moment: Moment,
     delayed: bool,
     end: float,
@@ -146,6 +150,7 @@ def step(
 
     Args:
         setting: of the loop.
+        gains: of the controller, for steps of this length.
         moment: that it begins with.
         delayed: whether what acts is that of the step before.
         end: when it ends [s].
@@ -154,7 +159,7 @@ def step(
         n: three independent standard normal numbers.
 
     """
-    gains, scene = setting.controller, moment.scene
+    scene = moment.scene
     control, signals = law.command(gains, moment.control, scene)
     velocity, theta_hat = law.estimates(control, signals, scene)
     now = signals.tau, scene.tau_w
@@ -164,7 +169,7 @@ def step(
     vehicles = closed_loop.move(setting, moment.vehicles, tau, tau_w, h, parts)
     return (
         Moment(vehicles, closed_loop.scene(setting, vehicles, end, n), control, now),
-        Done(velocity, theta_hat, signals.tau, told, tau, tau_w),
+        Done(velocity, theta_hat, signals.tau, told, vehicles.plant.tau, tau_w),
     )
 
 
@@ -231,7 +236,7 @@ def row_of(setting: Setting, t: float, moment: Moment, done: Done) -> Row:
     phi, theta, psi = seen.euler
     rotation = rotation_from_euler(phi, theta, psi)
     y = control_point(moment.vehicles.plant.position, rotation, setting.plant.ell)
-    _, v, w, _, _, _ = moment.vehicles.plant.nu
+    _, v, w, _, _, _ = seen.nu
     return Row(
         t,
         difference(y, moment.scene.reference.y_d),
@@ -243,8 +248,8 @@ def row_of(setting: Setting, t: float, moment: Moment, done: Done) -> Row:
 
 def fill(row: np.ndarray, t: float, moment: Moment, done: Done) -> None:
     """Fill a row with the time and the values of :data:`.columns.COLUMNS`."""
-    state, scene = moment.vehicles.plant, moment.scene
-    seen = state.position, scene.plant.euler, state.nu, scene.y, scene.plant.dy
-    values = flat((t, seen, scene.reference, done))
+    scene, seen = moment.scene, moment.scene.plant
+    shown = moment.vehicles.plant.position, seen.euler, seen.nu, scene.y, seen.dy
+    values = flat((t, shown, scene.reference, done))
     for i in range(len(values)):
         row[i] = values[i]

@@ -8,6 +8,7 @@ from typing import Any
 from auv_fmu import motion_planner, plant
 from auv_fmu.closed_loop import LongestSteps, Setting
 from auv_fmu.disturbance import Disturbance
+from auv_fmu.observer import FORMS
 from auv_fmu.output_feedback import Gains
 from auv_fmu.pd import PdGains
 from auv_fmu.saturation import SATURATIONS
@@ -51,6 +52,7 @@ PATHS: Mapping[str, Mapping[str, Path]] = {
         "m44": ("roll", "m44"),
         "d44": ("roll", "d44"),
         "righting.roll": ("roll", "righting_roll"),
+        "roll": ("roll", "rolls"),
         "ell": ("ell",),
         **_members("tau_max", ACTUATORS, "limits", "tau_max"),
         **_members("tau_min", ACTUATORS, "limits", "tau_min"),
@@ -58,12 +60,15 @@ PATHS: Mapping[str, Mapping[str, Path]] = {
         **_members("nu0", DIRECTIONS),
         "noise.std": ("noise", "std"),
         "noise.seed": ("noise", "seed"),
+        **_members("current", AXES),
+        **_members("actuator.T", ACTUATORS, "T"),
     },
     "ObserverController": {
         **_BOTH_CONTROLLERS,
         **_numbered("K2", 3),
         **_plain(("k_d", "innovation_gate")),
         "saturation": ("s",),
+        "observer": ("form",),
     },
     "PdController": _BOTH_CONTROLLERS,
     "DisturbanceGenerator": _plain(Disturbance._fields),
@@ -71,9 +76,13 @@ PATHS: Mapping[str, Mapping[str, Path]] = {
         **_VEHICLE,
         **_members("tau_d", ACTUATORS),
         **_members("eta0", (*AXES, *EULER[1:])),
+        **_members("nu0", (direction for direction in DIRECTIONS if direction != "p")),
         "ell": ("ell",),
     },
 }
+
+#: Those that are texts, and what each text stands for.
+CHOICES: Mapping[str, Mapping[str, int]] = {"saturation": SATURATIONS, "observer": FORMS}
 
 #: The sets by the names of the FMUs, with the FMUs' own values.
 DEFAULTS: Mapping[str, Any] = {
@@ -115,11 +124,12 @@ def _meant(name: PortName, value: Value) -> Value:
     """What the equations take for a value."""
     if not isinstance(value, str):
         return value
-    if value not in SATURATIONS:
+    choices = CHOICES[name.port]
+    if value not in choices:
         raise InputError(
-            f"{name.component}: {name.port} = {value!r}: use one of {', '.join(SATURATIONS)}"
+            f"{name.component}: {name.port} = {value!r}: use one of {', '.join(choices)}"
         )
-    return SATURATIONS[value]
+    return choices[value]
 
 
 def _replaced(whole: Any, path: Path, value: Value) -> Any:

@@ -11,7 +11,7 @@ from math import isfinite
 from typing import Any
 
 from auv_fmu import motion_planner, plant
-from auv_fmu.closed_loop import LAWS, Setting, Splits, Vehicles, scene
+from auv_fmu.closed_loop import LAWS, Setting, Splits, begin, scene
 from auv_fmu.disturbance import disturbance
 from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS
 from orchestrator.analysis.signals import ACTUATORS, AXES, DIRECTIONS
@@ -21,11 +21,15 @@ from orchestrator.studies.batch.kernel import Moment, Plan, is_bounded
 _Result = tuple[Any, dict[str, float]]
 
 
+#: No force is too large to begin with.
+_NO_FORCE = (0.0, 0.0, 0.0)
+
+
 def refused_at_start(setting: Setting) -> str:
     """Why a run has no start; empty: it has one."""
     refusals = {
-        "plant": _without_limits(setting)
-        or _why(lambda: _plant(setting, *plant.begin(setting.plant))),
+        "plant": misfit(setting)
+        or _why(lambda: _plant(setting, *plant.begin(setting.plant, _NO_FORCE))),
         "planner": _why(lambda: _planner(setting, *motion_planner.begin(setting.planner))),
     }
     # Who is refused shows zeros, which are no reason to refuse anything.
@@ -36,21 +40,22 @@ def refused_at_start(setting: Setting) -> str:
     )
 
 
-def has_limits(setting: Setting) -> bool:
-    """Whether the limits of (3) leave every actuator something."""
-    return not _without_limits(setting)
-
-
-def _without_limits(setting: Setting) -> str:
-    for k, lower, upper in zip(ACTUATORS, *setting.plant.limits, strict=True):
+def misfit(setting: Setting) -> str:
+    """Which parameters of the plant do not fit together; empty: all do."""
+    parameters = setting.plant
+    for k, lower, upper in zip(ACTUATORS, *parameters.limits, strict=True):
         if not lower < upper:
             return f"tau_min.{k} = {lower:g} must be below tau_max.{k} = {upper:g}"
+    if not parameters.roll.rolls:
+        for name, value in (("eta0.phi", parameters.eta0[3]), ("nu0.p", parameters.nu0[3])):
+            if value:
+                return f"{name} = {value:g} must be 0 where roll is false"
     return ""
 
 
 def _controller_at_start(setting: Setting) -> _Result:
     law, gains = LAWS[type(setting.controller)], setting.controller
-    vehicles = Vehicles(*plant.begin(setting.plant), *motion_planner.begin(setting.planner))
+    vehicles = begin(setting)
     # Noise is too small to make a difference.
     seen = scene(setting, vehicles, 0.0, (0.0, 0.0, 0.0))
     state, signals = law.command(gains, law.start(gains, seen), seen)
@@ -102,20 +107,19 @@ class _Step:
         self._parts = plan.parts if k < plan.full else plan.last_parts
         self._setting, self._moment, self._delayed = setting, moment, plan.delayed
         self._law = LAWS[type(setting.controller)]
+        self._gains = self._law.sampled(setting.controller, self._h / self._parts.controller)
 
     def _signals(self) -> tuple[Any, Any]:
-        return self._law.command(self._setting.controller, self._moment.control, self._moment.scene)
+        return self._law.command(self._gains, self._moment.control, self._moment.scene)
 
     def controller(self) -> _Result:
         state, signals = self._signals()
         n = self._parts.controller
-        after = self._law.steps(
-            self._setting.controller, state, signals, self._moment.scene, self._h / n, n
-        )
+        after = self._law.steps(self._gains, state, signals, self._moment.scene, self._h / n, n)
         return after, _named("tau", ACTUATORS, signals.tau)
 
     def disturbance(self) -> _Result:
-        nu = self._moment.vehicles.plant.nu
+        nu = self._moment.scene.plant.nu
         tau_w = disturbance(self._setting.disturbance, nu, self.t)
         return (), _named("tau_w", DIRECTIONS, tau_w)
 
@@ -139,8 +143,8 @@ class _Step:
 
 
 def _plant(setting: Setting, state: Any, rotation: Any) -> _Result:
-    _, y, dy = plant.outputs(state, rotation, setting.plant.ell)
-    return state, {**_named("y", AXES, y), **_named("dy", AXES, dy)}
+    seen = plant.outputs(setting.plant, state, rotation)
+    return state, {**_named("y", AXES, seen.y), **_named("dy", AXES, seen.dy)}
 
 
 def _planner(setting: Setting, state: Any, moving: Any) -> _Result:
