@@ -8,6 +8,8 @@ module              what it holds
 :mod:`.study_page`  the page on studies
 :mod:`.space`       the runs of a study: which values each of them has
 :mod:`.fmu_engine`  runs of FMUs
+:mod:`.batch_engine`runs of the closed loop by its equations, compiled
+:mod:`.batch`       what it is made of
 :mod:`.indices`     what comes out of a run, from its rows
 :mod:`.store`       what has come out of a study, as it comes and at the end
 :mod:`.cluster`     who makes which runs, and where: Dask
