@@ -169,7 +169,9 @@ def main() -> None:
         total = options.runs * one / 3600
         print(f"{name:15}{total:12,.0f} core hours,{total / cores:9.2f} h by all cores")
     keep = options.runs * run / 3600
-    print(f"who sends and keeps them: {keep:.1f} h, {options.runs * (database + table) / 1e9:.0f} GB")
+    print(
+        f"who sends and keeps them: {keep:.1f} h, {options.runs * (database + table) / 1e9:.0f} GB"
+    )
 
 
 if __name__ == "__main__":
