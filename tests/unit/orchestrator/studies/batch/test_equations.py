@@ -62,4 +62,9 @@ def test_flat_is_the_same_in_both():
 
     value = (1.0, (2.0, (3.0, 4.0)), ((5.0,), 6.0))
     assert flat(value) == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
-    assert numba.njit(flat)(value) == flat(value)
+
+    @numba.njit
+    def compiled(x):
+        return flat(x)
+
+    assert compiled(value) == flat(value)
