@@ -91,6 +91,9 @@ Until all runs are done, they are kept in `unfinished.sqlite` beside `study.json
 
 $ready
 
+Each holds the proposed controller against PD, at more than 10,000 points:
+[what they show](ready-studies.md).
+
 ## A study file
 
 ```toml
