@@ -13,6 +13,7 @@ module                  what it holds
 :mod:`.claims`          each claim of the paper, judged by the runs named beside it
 :mod:`.effects`         what runs show when they are compared
 :mod:`.sections`        a section for each scenario
+:mod:`.studies`         the ready studies, their figures and what these show
 :mod:`.page`            Markdown as one HTML page
 :mod:`.report`          all of it put together
 ======================  ==============================================================

@@ -175,7 +175,7 @@ def _draw(plans: Sequence[Plan], title: str, result: StudyResult) -> list[str]:
 def _check_installed() -> None:
     missing = [package for package in _NEEDED if find_spec(package) is None]
     if missing:
-        raise InputError(f"studies need {' and '.join(missing)}: pip install 'auv-fmu[studies]'")
+        raise InputError(f"studies need {', '.join(missing)}: pip install 'auv-fmu[studies]'")
 
 
 def _engine(name: str, systems: Mapping[str, tuple[Scenario, System]], means: Means) -> Engine:

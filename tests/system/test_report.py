@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,8 @@ from orchestrator.commands.main import main
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
 from orchestrator.paper.report import write_report
+from orchestrator.paper.studies import make_studies, sections
+from orchestrator.studies.study import ready_studies
 
 STRANGER = """\
 title = "Mine | <b>own</b>"
@@ -31,6 +34,26 @@ controller.k_d = "all of it"
 """
 
 SCENARIOS = ("fig3a", "fig4")
+
+STUDY = """\
+title = "Many | of mine"
+scenario = "fig4"
+stop_time = 0.1
+remark = "What they **show**."
+
+[vary]
+controller.k_d = [10.0, 20.0]
+
+[figures.gain]
+kind = "bands"
+x = "controller.k_d"
+show = "peak_command.u"
+
+[figures.nothing]
+kind = "bands"
+x = "controller.k_d"
+show = "time_to_reach"
+"""
 
 
 @pytest.fixture(scope="module")
@@ -108,11 +131,30 @@ def test_runs_are_kept_for_the_next_report(folder):
     assert not list(folder.glob(".unfinished*"))
 
 
+def test_studies_are_in_the_report_and_kept_for_the_next(folder, tmp_path):
+    pytest.importorskip("distributed", reason="needs the extra studies")
+    (tmp_path / "many.toml").write_text(STUDY)
+    [study] = make_studies([str(tmp_path / "many.toml")], tmp_path / "kept", "python", ["me"])
+    text = "\n\n".join(sections([study], tmp_path / "kept", tmp_path))
+    assert "### Many \\| of mine\n" in text
+    assert "What they **show**." in text
+    [picture] = re.findall(r"\]\((figures/[^)]+)\)\]", text)
+    assert (tmp_path / picture).is_file()
+    before = (tmp_path / "kept/many/runs.parquet").stat().st_mtime_ns
+    make_studies([str(tmp_path / "many.toml")], tmp_path / "kept", "python", ["me"])
+    assert (tmp_path / "kept/many/runs.parquet").stat().st_mtime_ns == before
+
+
+def test_a_report_without_studies_says_how_they_are_made(text):
+    [line] = [line for line in text.splitlines() if "report --studies" in line]
+    assert all(name in line for name in ready_studies())
+
+
 def test_files_on_the_command_line_come_after_the_scenarios(tmp_path, monkeypatch, capsys):
     asked = []
 
-    def write_report(*arguments: object, kind: str) -> tuple[Path, Path]:
-        assert kind == "python"
+    def write_report(*arguments: object, kind: str, ready: Sequence[str]) -> tuple[Path, Path]:
+        assert (kind, ready) == ("python", ())
         asked.append(arguments)
         return Path("a"), Path("b")
 
