@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple, TypedDict
 
 from auv_fmu import plant
-from auv_fmu.actuators import limit, limit_all
+from auv_fmu.actuators import limit
 from auv_fmu.attitude import rotation_from_quaternion
-from auv_fmu.plant import PlantState
+from auv_fmu.plant import Parameters, PlantState
 from auv_fmu.types import Rotation, Vector3, Vector6
-from fmus.auv_plant.ports import Parameters
 from fmus.ports.port import Refusal
 
 #: By how much the square of the length of a normalised quaternion is off.
@@ -51,10 +50,9 @@ def _check_limits(k: str, tau_min: float, tau_max: float) -> None:
 
 def begin(parameters: Parameters, inputs: Inputs) -> tuple[PlantState, Rotation, Outputs]:
     """State, its attitude and outputs at the start."""
-    x, y, z, phi, theta, psi = parameters.eta0
-    state = plant.initial_state((x, y, z), (phi, theta, psi), parameters.nu0)
-    rotation = rotation_from_quaternion(state.quaternion)
-    return state, rotation, _seen(parameters, state, rotation, _limited(parameters, inputs.tau))
+    state, rotation = plant.begin(parameters)
+    tau = plant.applied(parameters, inputs.tau)
+    return state, rotation, _seen(parameters, state, rotation, tau)
 
 
 def derive(state: PlantState) -> Rotation:
@@ -66,13 +64,8 @@ def advance(
     parameters: Parameters, state: PlantState, derived: Rotation, inputs: Inputs, h: float, n: int
 ) -> tuple[PlantState, Rotation, Outputs]:
     """State, its attitude and outputs after n steps of h seconds."""
-    tau = _limited(parameters, inputs.tau)
-    while n > 0:
-        state = plant.step(
-            parameters.vehicle, parameters.roll, state, derived, tau, inputs.tau_w, h
-        )
-        derived = rotation_from_quaternion(state.quaternion)
-        n -= 1
+    tau = plant.applied(parameters, inputs.tau)
+    state, derived = plant.steps(parameters, state, derived, tau, inputs.tau_w, h, n)
     return state, derived, _seen(parameters, state, derived, tau)
 
 
@@ -92,7 +85,7 @@ def expected(parameters: Parameters, state: PlantState, outputs: Outputs) -> Out
     if not abs(a * a + b * b + c * c + d * d - 1.0) <= _ROUNDING:
         raise Refusal("its quaternion is not of length one")
     rotation = rotation_from_quaternion(state.quaternion)
-    tau = _limited(parameters, outputs["tau_applied"])
+    tau = plant.applied(parameters, outputs["tau_applied"])
     seen = _seen(parameters, state, rotation, tau)
     most = _MOST_DEVIATIONS * parameters.noise.std
     y, noisy = seen["y"], outputs["y"]
@@ -107,10 +100,6 @@ def expected(parameters: Parameters, state: PlantState, outputs: Outputs) -> Out
         "dy": seen["dy"],
         "tau_applied": tau,
     }
-
-
-def _limited(parameters: Parameters, tau: Vector3) -> Vector3:
-    return limit_all(tau, parameters.limits.tau_min, parameters.limits.tau_max)
 
 
 def _seen(parameters: Parameters, state: PlantState, rotation: Rotation, tau: Vector3) -> Outputs:

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from auv_fmu.actuators import Limits
-from auv_fmu.plant import ETA_0, NU_0, Localisation, RollAxis
-from auv_fmu.types import Vector6
-from auv_fmu.vehicle import Vehicle
+from auv_fmu.plant import ETA_0, NU_0, Localisation, Parameters, RollAxis
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters
 from fmus.ports.quantities import ETA, NU, POSITION, TAU, TAU_W, VELOCITY
@@ -21,18 +17,6 @@ _ROLL, _LIMITS, _LOCALISATION = RollAxis(), Limits(), Localisation()
 _FARTHEST = 1e6
 
 _COMMAND = inputs("tau", TAU, "Commanded force and moments")
-
-
-class Parameters(NamedTuple):
-    """What the parameters of AuvPlant mean."""
-
-    vehicle: Vehicle
-    roll: RollAxis
-    ell: float
-    limits: Limits
-    eta0: Vector6
-    nu0: Vector6
-    noise: Localisation
 
 
 PARAMETERS = ParameterSet(

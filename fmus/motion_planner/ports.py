@@ -2,26 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-from auv_fmu.motion_planner import ETA_D0, TAU_D
-from auv_fmu.types import Vector3, Vector5
-from auv_fmu.vehicle import Vehicle
+from auv_fmu.motion_planner import ETA_D0, TAU_D, Parameters
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, Port, outputs, parameters
 from fmus.ports.quantities import ACCELERATION, ETA_WITHOUT_ROLL, POSITION, TAU, VELOCITY
 from fmus.ports.vehicle import CONTROL_POINT, VEHICLE
 
 DESCRIPTION = "Motion planner: helical reference with velocity and acceleration"
-
-
-class Parameters(NamedTuple):
-    """What the parameters of MotionPlanner mean."""
-
-    tau_d: Vector3
-    eta0: Vector5
-    vehicle: Vehicle
-    ell: float
 
 
 PARAMETERS = ParameterSet(

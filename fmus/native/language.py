@@ -21,6 +21,7 @@ BUILT_IN = frozenset(("abs",))
 #: Functions that stand among the equations and are none, with the reason.
 OUTSIDE = {
     "plant.white_noise": "makes the generator of the standard library that has the state",
+    "euler.internal_steps": "makes an integer; the runtime in C has a twin, which looks first",
     "closed_loop.closed_loop": "is the generator of instants that all else is held against",
 }
 

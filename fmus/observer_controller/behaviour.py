@@ -50,13 +50,8 @@ def advance(
 ) -> tuple[ControllerState, Outputs]:
     """State after n steps of h seconds, and outputs at the beginning of the first."""
     signals = output_feedback.evaluate(parameters, state, inputs)
-    outputs = _seen(state, signals)
-    state = output_feedback.step(state, signals, h)
-    while n > 1:
-        signals = output_feedback.evaluate(parameters, state, inputs)
-        state = output_feedback.step(state, signals, h)
-        n -= 1
-    return state, outputs
+    after = output_feedback.steps(parameters, state, signals, inputs, h, n)
+    return after, _seen(state, signals)
 
 
 def _seen(state: ControllerState, signals: Signals) -> Outputs:

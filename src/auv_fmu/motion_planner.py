@@ -11,7 +11,7 @@ from math import degrees, radians
 from typing import NamedTuple
 
 from auv_fmu.attitude import rotate, rotation_from_euler
-from auv_fmu.control_point import control_point, control_point_velocity
+from auv_fmu.control_point import ELL, control_point, control_point_velocity
 from auv_fmu.types import Rotation, Vector3, Vector5
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 
@@ -30,6 +30,15 @@ _UNDISTURBED = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 class SteepReference(ArithmeticError):
     """The reference vehicle stands on its nose or on its tail."""
+
+
+class Parameters(NamedTuple):
+    """All parameters of the planner."""
+
+    tau_d: Vector3 = TAU_D  #: driving force and moments (u, q, r) [N, N.m]
+    eta0: Vector5 = ETA_D0  #: initial posture (x, y, z, theta, psi) [m, rad]
+    vehicle: Vehicle = Vehicle()  #: the reference vehicle
+    ell: float = ELL  #: distance of its control point [m]
 
 
 class PlannerState(NamedTuple):
@@ -103,6 +112,31 @@ def step(state: PlannerState, moving: Motion, h: float) -> PlannerState:
         psi + h * dpsi,
         (u + h * du, v + h * dv, w + h * dw, q + h * dq, r + h * dr),
     )
+
+
+def begin(parameters: Parameters) -> tuple[PlannerState, Motion]:
+    """State at the start, and its motion."""
+    state = initial_state(parameters.eta0)
+    return state, motion(parameters.vehicle, state, parameters.tau_d)
+
+
+def steps(
+    parameters: Parameters, state: PlannerState, moving: Motion, h: float, n: int
+) -> tuple[PlannerState, Motion]:
+    """State after n steps of h seconds, and its motion.
+
+    Args:
+        parameters: of the planner.
+        state, moving: at the beginning.
+        h: step [s].
+        n: how many.
+
+    """
+    while n > 0:
+        state = step(state, moving, h)
+        moving = motion(parameters.vehicle, state, parameters.tau_d)
+        n -= 1
+    return state, moving
 
 
 def reference(state: PlannerState, moving: Motion, ell: float) -> Reference:

@@ -231,3 +231,28 @@ def step(state: ControllerState, signals: Signals, h: float) -> ControllerState:
         advance(dy_hat_o, signals.ddy_hat_o, h),
         advance_4(theta_hat, signals.dtheta_hat, h),
     )
+
+
+def steps(
+    gains: Gains,
+    state: ControllerState,
+    signals: Signals,
+    measurement: Measurement,
+    h: float,
+    n: int,
+) -> ControllerState:
+    """State after n steps of h seconds under a held measurement.
+
+    Args:
+        gains: of the controller.
+        state, signals: at the beginning.
+        measurement: held.
+        h: step [s].
+        n: how many, one at least.
+
+    """
+    state = step(state, signals, h)
+    while n > 1:
+        state = step(state, evaluate(gains, state, measurement), h)
+        n -= 1
+    return state

@@ -11,14 +11,16 @@ from __future__ import annotations
 from random import Random
 from typing import NamedTuple
 
+from auv_fmu.actuators import Limits, limit_all
 from auv_fmu.attitude import (
     euler_from_rotation,
     normalised,
     quaternion_from_euler,
     quaternion_rates,
     rotate,
+    rotation_from_quaternion,
 )
-from auv_fmu.control_point import control_point, control_point_velocity
+from auv_fmu.control_point import ELL, control_point, control_point_velocity
 from auv_fmu.types import Rotation, Vector3, Vector4, Vector6
 from auv_fmu.vehicle import Vehicle, accelerations
 
@@ -42,6 +44,18 @@ class Localisation(NamedTuple):
 
     std: float = 0.001  #: standard deviation of each measured coordinate [m]
     seed: int = 1  #: of the white noise
+
+
+class Parameters(NamedTuple):
+    """All parameters of the plant."""
+
+    vehicle: Vehicle = Vehicle()
+    roll: RollAxis = RollAxis()
+    ell: float = ELL  #: distance of the control point [m]
+    limits: Limits = Limits()
+    eta0: Vector6 = ETA_0  #: initial posture (x, y, z, phi, theta, psi) [m, rad]
+    nu0: Vector6 = NU_0  #: initial velocity (u, v, w, p, q, r) [m/s, rad/s]
+    noise: Localisation = Localisation()
 
 
 class PlantState(NamedTuple):
@@ -140,6 +154,45 @@ def step(
         normalised((a + h * da, b + h * db, c + h * dc, d + h * dd)),
         (u + h * du, v + h * dv, w + h * dw, p + h * dp, q + h * dq, r + h * dr),
     )
+
+
+def begin(parameters: Parameters) -> tuple[PlantState, Rotation]:
+    """State at the start, and its attitude."""
+    x, y, z, phi, theta, psi = parameters.eta0
+    state = initial_state((x, y, z), (phi, theta, psi), parameters.nu0)
+    return state, rotation_from_quaternion(state.quaternion)
+
+
+def applied(parameters: Parameters, tau: Vector3) -> Vector3:
+    """What the actuators make of a command (tau_u, tau_q, tau_r) [N, N.m]: equation (3)."""
+    return limit_all(tau, parameters.limits.tau_min, parameters.limits.tau_max)
+
+
+def steps(
+    parameters: Parameters,
+    state: PlantState,
+    rotation: Rotation,
+    tau: Vector3,
+    tau_w: Vector6,
+    h: float,
+    n: int,
+) -> tuple[PlantState, Rotation]:
+    """State after n steps of h seconds under held inputs, and its attitude.
+
+    Args:
+        parameters: of the plant.
+        state, rotation: at the beginning.
+        tau: applied (tau_u, tau_q, tau_r), after the limits of (3) [N, N.m].
+        tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
+        h: step [s].
+        n: how many.
+
+    """
+    while n > 0:
+        state = step(parameters.vehicle, parameters.roll, state, rotation, tau, tau_w, h)
+        rotation = rotation_from_quaternion(state.quaternion)
+        n -= 1
+    return state, rotation
 
 
 def outputs(state: PlantState, rotation: Rotation, ell: float) -> PlantOutputs:
