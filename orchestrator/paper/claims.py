@@ -23,7 +23,7 @@ from orchestrator.paper.measures import (
     largest_estimate,
     total_variation_until,
     turning_radius,
-    way,
+    way_of,
 )
 from orchestrator.paper.outcomes import Outcome
 from orchestrator.paper.published import (
@@ -201,7 +201,7 @@ def effort_as_printed(five: Outcome, pd: Outcome) -> Finding:
 )
 def effort_of_the_way(five: Outcome, pd: Outcome) -> Finding:
     """No course of the force gives that impulse in that time with the printed effort."""
-    ways = [found for run in (five, pd) if (found := way(run.table))]
+    ways = [found for run in (five, pd) if (found := way_of(run.table))]
     published = EFFORT_PROPOSED[0], EFFORT_PD[0]
     if len(ways) < len(published):
         return Finding(f"|e| does not come to {REACHED:g} m", "none")

@@ -37,15 +37,26 @@ class Way(NamedTuple):
         return (self.impulse / effort) ** 2
 
 
-def way(table: Table) -> Way | None:
-    """The way of a run to its reference; None if it does not come there."""
-    # The first of them; row 0 if there is none, or no way to go.
-    reached = int((np.linalg.norm(tracking_error(table), axis=1) <= REACHED).argmax())
+def way(time: np.ndarray, error: np.ndarray, force: np.ndarray) -> Way | None:
+    """The way of a run to its reference; None if it does not come there, or is there already.
+
+    Args:
+        time: of each row [s].
+        error: e = y - y_d, a row each [m].
+        force: surge force that was applied in the step that ends with a row [N].
+
+    """
+    # The first of them; row 0 if there is none.
+    reached = int((np.linalg.norm(error, axis=1) <= REACHED).argmax())
     if not reached:
         return None
-    # A row holds what was applied in the step that ends there.
-    force = table[APPLIED[0]][1 : reached + 1]
-    return Way(float(table.time[reached]), float(force @ np.diff(table.time[: reached + 1])))
+    impulse = force[1 : reached + 1] @ np.diff(time[: reached + 1])
+    return Way(float(time[reached]), float(impulse))
+
+
+def way_of(table: Table) -> Way | None:
+    """The same of a table."""
+    return way(table.time, tracking_error(table), table[APPLIED[0]])
 
 
 def turning_radius(table: Table) -> float:
