@@ -36,11 +36,14 @@ class Outputs(TypedDict):
 
 
 def check(parameters: Parameters) -> None:
-    """Refuse limits that leave an actuator nothing."""
+    """Refuse limits that leave an actuator nothing, and a start with a roll that is held."""
     lower, upper = parameters.limits
     _check_limits("u", lower[0], upper[0])
     _check_limits("q", lower[1], upper[1])
     _check_limits("r", lower[2], upper[2])
+    if not parameters.roll.rolls:
+        _check_roll("eta0.phi", parameters.eta0[3])
+        _check_roll("nu0.p", parameters.nu0[3])
 
 
 def _check_limits(k: str, tau_min: float, tau_max: float) -> None:
@@ -48,11 +51,15 @@ def _check_limits(k: str, tau_min: float, tau_max: float) -> None:
         raise Refusal(f"tau_min.{k} = {tau_min:g} must be below tau_max.{k} = {tau_max:g}")
 
 
+def _check_roll(name: str, value: float) -> None:
+    if value:
+        raise Refusal(f"{name} = {value:g} must be 0 where roll is false")
+
+
 def begin(parameters: Parameters, inputs: Inputs) -> tuple[PlantState, Rotation, Outputs]:
     """State, its attitude and outputs at the start."""
-    state, rotation = plant.begin(parameters)
-    tau = plant.applied(parameters, inputs.tau)
-    return state, rotation, _seen(parameters, state, rotation, tau)
+    state, rotation = plant.begin(parameters, plant.applied(parameters, inputs.tau))
+    return state, rotation, _seen(parameters, state, rotation)
 
 
 def derive(state: PlantState) -> Rotation:
@@ -66,7 +73,7 @@ def advance(
     """State, its attitude and outputs after n steps of h seconds."""
     tau = plant.applied(parameters, inputs.tau)
     state, derived = plant.steps(parameters, state, derived, tau, inputs.tau_w, h, n)
-    return state, derived, _seen(parameters, state, derived, tau)
+    return state, derived, _seen(parameters, state, derived)
 
 
 def seed(parameters: Parameters) -> int:
@@ -85,8 +92,9 @@ def expected(parameters: Parameters, state: PlantState, outputs: Outputs) -> Out
     if not abs(a * a + b * b + c * c + d * d - 1.0) <= _ROUNDING:
         raise Refusal("its quaternion is not of length one")
     rotation = rotation_from_quaternion(state.quaternion)
-    tau = plant.applied(parameters, outputs["tau_applied"])
-    seen = _seen(parameters, state, rotation, tau)
+    if not parameters.roll.rolls:
+        _check_level(state, rotation)
+    seen = _seen(parameters, state, rotation)
     most = _MOST_DEVIATIONS * parameters.noise.std
     y, noisy = seen["y"], outputs["y"]
     return {
@@ -98,16 +106,22 @@ def expected(parameters: Parameters, state: PlantState, outputs: Outputs) -> Out
             y[2] + limit(noisy[2] - y[2], -most, most),
         ),
         "dy": seen["dy"],
-        "tau_applied": tau,
+        "tau_applied": plant.applied(parameters, seen["tau_applied"]),
     }
 
 
-def _seen(parameters: Parameters, state: PlantState, rotation: Rotation, tau: Vector3) -> Outputs:
-    euler, y, dy = plant.outputs(state, rotation, parameters.ell)
+def _check_level(state: PlantState, rotation: Rotation) -> None:
+    """Refuse a state that rolls: the starboard axis is no longer level."""
+    if state.nu[3] or not abs(rotation[1][2]) <= _ROUNDING:
+        raise Refusal("its roll, which is held at zero, is not zero")
+
+
+def _seen(parameters: Parameters, state: PlantState, rotation: Rotation) -> Outputs:
+    euler, y, dy, nu = plant.outputs(parameters, state, rotation)
     return {
         "eta": (*state.position, *euler),
-        "nu": state.nu,
+        "nu": nu,
         "y": y,
         "dy": dy,
-        "tau_applied": tau,
+        "tau_applied": state.tau,
     }

@@ -12,8 +12,11 @@ from typing import Any, NamedTuple
 
 #: Functions of `math` that equations may use.
 MATHEMATICS = frozenset(
-    ("asin", "atan2", "copysign", "cos", "degrees", "exp", "log", "log1p", "sin", "sqrt", "tanh")
-)
+    (
+        "asin", "atan", "atan2", "copysign", "cos", "degrees", "exp", "expm1", "log", "log1p",
+        "sin", "sqrt", "tanh",
+    )
+)  # fmt: skip
 
 #: What else may be called without being imported.
 BUILT_IN = frozenset(("abs",))

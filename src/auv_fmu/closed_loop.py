@@ -19,6 +19,9 @@ from auv_fmu.pd import PdGains, PdMeasurement, PdSignals
 from auv_fmu.plant import PlantOutputs, PlantState
 from auv_fmu.types import Rotation, Vector3, Vector4, Vector6
 
+#: Before the first instant.
+_NO_COMMAND: Vector3 = (0.0, 0.0, 0.0)
+
 
 class LongestSteps(NamedTuple):
     """Largest internal step of each component [s]; a longer step is split evenly."""
@@ -84,7 +87,7 @@ class Scene(NamedTuple):
 
 def begin(setting: Setting) -> Vehicles:
     """Both vehicles at the start."""
-    state, rotation = plant.begin(setting.plant)
+    state, rotation = plant.begin(setting.plant, _NO_COMMAND)
     planned, moving = motion_planner.begin(setting.planner)
     return Vehicles(state, rotation, planned, moving)
 
@@ -99,12 +102,12 @@ def scene(setting: Setting, vehicles: Vehicles, t: float, n: Vector3) -> Scene:
         n: three independent standard normal numbers, of the localisation system.
 
     """
-    seen = plant.outputs(vehicles.plant, vehicles.rotation, setting.plant.ell)
+    seen = plant.outputs(setting.plant, vehicles.plant, vehicles.rotation)
     return Scene(
         seen,
         plant.measure(seen.y, n, setting.plant.noise.std),
         motion_planner.reference(vehicles.planner, vehicles.moving, setting.planner.ell),
-        disturbance(setting.disturbance, vehicles.plant.nu, t),
+        disturbance(setting.disturbance, seen.nu, t),
     )
 
 
@@ -116,7 +119,7 @@ def move(
     Args:
         setting: of the loop.
         vehicles: at the beginning of the step.
-        tau: applied (tau_u, tau_q, tau_r) [N, N.m].
+        tau: (tau_u, tau_q, tau_r) after the limits of (3) [N, N.m].
         tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
         h: step [s].
         parts: that the step is split into.
@@ -135,6 +138,11 @@ def move(
         setting.planner, vehicles.planner, vehicles.moving, h / parts.planner, parts.planner
     )
     return Vehicles(state, rotation, planned, moving)
+
+
+def sampled(gains: Gains, h: float) -> Gains:
+    """Gains of the proposed controller for steps of h seconds."""
+    return output_feedback.sampled(gains, h)
 
 
 def start(gains: Gains, seen: Scene) -> ControllerState:
@@ -161,6 +169,11 @@ def measurement(seen: Scene) -> Measurement:
     return Measurement(seen.y, seen.plant.euler, y_d, dy_d, ddy_d)
 
 
+def pd_sampled(gains: PdGains, h: float) -> PdGains:
+    """Gains of the PD controller for steps of h seconds."""
+    return gains
+
+
 def pd_start(gains: PdGains, seen: Scene) -> Vector4:
     """State of the PD controller at the start."""
     return gains.theta_0
@@ -185,8 +198,12 @@ def pd_measurement(seen: Scene) -> PdMeasurement:
 
 
 class Law(NamedTuple):
-    """A controller in the loop: how it starts, what it commands, how its state goes on."""
+    """A controller in the loop: how it starts, what it commands, how its state goes on.
 
+    All are given the gains of a step, which the first makes of those that are set.
+    """
+
+    sampled: Callable[[Any, float], Any]
     start: Callable[[Any, Scene], Any]
     command: Callable[[Any, Any, Scene], tuple[Any, Any]]
     steps: Callable[[Any, Any, Any, Scene, float, int], Any]
@@ -194,8 +211,8 @@ class Law(NamedTuple):
 
 #: The controller that goes with a set of gains.
 LAWS: dict[type, Law] = {
-    Gains: Law(start, command, steps),
-    PdGains: Law(pd_start, pd_command, pd_steps),
+    Gains: Law(sampled, start, command, steps),
+    PdGains: Law(pd_sampled, pd_start, pd_command, pd_steps),
 }
 
 
@@ -208,7 +225,7 @@ class Instant(NamedTuple):
     controller_state: ControllerState | Vector4  #: of the PD controller theta_hat
     signals: Signals | PdSignals
     command: Vector3  #: (tau_u, tau_q, tau_r) as it reaches the actuators [N, N.m]
-    tau: Vector3  #: applied, after the limits of (3) [N, N.m]
+    tau: Vector3  #: what the limits of (3) leave of it [N, N.m]
     tau_w: Vector6  #: disturbance that acts (u, v, w, p, q, r) [N, N.m]
 
 
@@ -224,9 +241,10 @@ def closed_loop(count: int, setting: Setting = PAPER, delayed: bool = False) -> 
         The instants t_0 = 0 to t_count, one more than steps.
 
     """
-    law, gains, h = LAWS[type(setting.controller)], setting.controller, setting.h
+    law, h = LAWS[type(setting.controller)], setting.h
     gauss = plant.white_noise(setting.plant.noise.seed).gauss
     parts = splits(setting, h)
+    gains = law.sampled(setting.controller, h / parts.controller)
     vehicles = begin(setting)
     before = None
     for k in range(count + 1):

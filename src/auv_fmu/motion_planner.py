@@ -21,6 +21,9 @@ TAU_D: Vector3 = (5.0, 1.0, 2.0)
 #: Initial posture of section 4.1: x, y, z [m], theta, psi [rad].
 ETA_D0: Vector5 = (0.0, 0.0, -2.0, 0.0, 0.0)
 
+#: Initial velocity (u, v, w, q, r) [m/s, rad/s]: at rest, which section 4.1 does not say.
+NU_D0: Vector5 = (0.0, 0.0, 0.0, 0.0, 0.0)
+
 #: Steepest pitch of the reference [rad]. At 90 degrees (1) has a pole: near it the yaw turns as
 #: fast as one likes, and a step leaps over it.
 STEEPEST = radians(85.0)
@@ -39,6 +42,7 @@ class Parameters(NamedTuple):
     eta0: Vector5 = ETA_D0  #: initial posture (x, y, z, theta, psi) [m, rad]
     vehicle: Vehicle = Vehicle()  #: the reference vehicle
     ell: float = ELL  #: distance of its control point [m]
+    nu0: Vector5 = NU_D0  #: initial velocity (u, v, w, q, r) [m/s, rad/s]
 
 
 class PlannerState(NamedTuple):
@@ -65,10 +69,10 @@ class Reference(NamedTuple):
     ddy_d: Vector3  #: [m/s2]
 
 
-def initial_state(eta_d: Vector5) -> PlannerState:
-    """State at rest in the posture eta_d = (x, y, z, theta, psi) [m, rad]."""
+def initial_state(eta_d: Vector5, nu_d: Vector5) -> PlannerState:
+    """State in the posture eta_d = (x, y, z, theta, psi) [m, rad] with the velocity nu_d."""
     x, y, z, theta, psi = eta_d
-    return PlannerState((x, y, z), theta, psi, (0.0, 0.0, 0.0, 0.0, 0.0))
+    return PlannerState((x, y, z), theta, psi, nu_d)
 
 
 def motion(vehicle: Vehicle, state: PlannerState, tau_d: Vector3) -> Motion:
@@ -116,7 +120,7 @@ def step(state: PlannerState, moving: Motion, h: float) -> PlannerState:
 
 def begin(parameters: Parameters) -> tuple[PlannerState, Motion]:
     """State at the start, and its motion."""
-    state = initial_state(parameters.eta0)
+    state = initial_state(parameters.eta0, parameters.nu0)
     return state, motion(parameters.vehicle, state, parameters.tau_d)
 
 

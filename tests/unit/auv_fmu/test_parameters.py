@@ -7,9 +7,10 @@ import pytest
 
 import auv_fmu
 from auv_fmu import control_point, euler
+from auv_fmu.observer import EULER
 from auv_fmu.saturation import TANH
 
-TEN, ZERO_3, ZERO_4, ZERO_6 = (10.0,) * 3, (0.0,) * 3, (0.0,) * 4, (0.0,) * 6
+TEN, ZERO_3, ZERO_4, ZERO_5, ZERO_6 = (10.0,) * 3, *((0.0,) * n for n in (3, 4, 5, 6))
 CONTROLLER = {
     "K1": TEN,
     "lambda_": 1.0,
@@ -48,11 +49,12 @@ SECTION_4_1 = {
     "Setting": {"h": 0.02},
 }
 OURS = {
-    "RollAxis": {"righting_roll": 5.0},
+    "RollAxis": {"righting_roll": 5.0, "rolls": True},
     "Localisation": {"std": 0.001, "seed": 1},
-    "Gains": {"printed_jacobian": False, "innovation_gate": 1.0},
+    "Gains": {"printed_jacobian": False, "innovation_gate": 1.0, "form": EULER},
     "PdGains": {"printed_jacobian": False},
-    "plant.Parameters": {"nu0": ZERO_6},
+    "plant.Parameters": {"nu0": ZERO_6, "current": ZERO_3, "T": ZERO_3},
+    "motion_planner.Parameters": {"nu0": ZERO_5},
 }
 
 
