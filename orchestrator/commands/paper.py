@@ -26,7 +26,8 @@ def add_to(commands: Any) -> None:
     report.add_argument(
         "--studies",
         action="store_true",
-        help="make the ready studies as well, or what is missing of them",
+        help="hold the printed table against every reading as well, and make the ready studies, "
+        "or what is missing of them",
     )
     add_kind(report)
     add_out(report, Path("results", "report"))
@@ -43,7 +44,12 @@ def _report(options: argparse.Namespace) -> int:
     scenarios = [*names(), *options.scenarios]
     ready = ready_studies() if options.studies else ()
     for path in write_report(
-        options.out, scenarios, options.command, kind=options.kind, ready=ready
+        options.out,
+        scenarios,
+        options.command,
+        kind=options.kind,
+        ready=ready,
+        variants=options.studies,
     ):
         show(path)
     return OK

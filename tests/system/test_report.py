@@ -14,6 +14,7 @@ from orchestrator.commands.main import main
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
 from orchestrator.paper.report import write_report
+from support.variants import planted
 
 STRANGER = """\
 title = "Mine | <b>own</b>"
@@ -42,7 +43,11 @@ def folder(tmp_path_factory, dist: Path) -> Path:
     (theirs / "lost.toml").write_text(STRANGER.replace("mine.fmu", "lost.fmu"))
     report = tmp_path_factory.mktemp("report")
     files = [str(theirs / f"{name}.toml") for name in ("stranger", "lost")]
-    write_report(report, [*SCENARIOS, *files], ["auv-fmu", "report"], stop_time=1.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("orchestrator.paper.report.all_variants", lambda crew: planted())
+        write_report(
+            report, [*SCENARIOS, *files], ["auv-fmu", "report"], stop_time=1.0, variants=True
+        )
     return report
 
 
@@ -62,6 +67,12 @@ def test_every_claim_has_a_row_and_every_effect_a_section(text):
     for effect in EFFECTS:
         assert f"\n### {effect.title}\n" in text
         assert f"](figures/{effect.name}.png)" in text
+
+
+def test_the_printed_table_stands_beside_every_reading(text):
+    """Ours is twice what is printed."""
+    assert "\n## The printed table against every reading\n" in text
+    assert "\n| proposed L2 effort u [N·√s] | 130 | 260 |" in text
 
 
 def test_the_stranger_is_in_the_report(folder, text, page):
@@ -111,8 +122,8 @@ def test_runs_are_kept_for_the_next_report(folder):
 def test_files_on_the_command_line_come_after_the_scenarios(tmp_path, monkeypatch, capsys):
     asked = []
 
-    def write_report(*arguments: object, kind: str) -> tuple[Path, Path]:
-        assert kind == "python"
+    def write_report(*arguments: object, **options: object) -> tuple[Path, Path]:
+        assert options == {"kind": "python", "ready": (), "variants": False}
         asked.append(arguments)
         return Path("a"), Path("b")
 

@@ -9,39 +9,13 @@ import pytest
 
 from orchestrator.experiments.preparation import Request, loaded, prepare
 from orchestrator.paper import choices
-from orchestrator.paper.choices import END_TIMES, OF_RUNS, PD, PROPOSED, Choice, Option, runs
+from orchestrator.paper.choices import OF_RUNS, PD, PROPOSED, SIGNALS, runs
 from orchestrator.paper.courses import Course
 from orchestrator.paper.measures import Way
 from orchestrator.paper.printed_table import section, write_variants
-from orchestrator.paper.sensitivity import PUBLISHED, Sensitivity
+from orchestrator.paper.sensitivity import PUBLISHED
 from orchestrator.system.names import port_name
-
-#: A choice of both controllers, and one of the proposed alone.
-SEA = Choice("sea", (Option("calm"), Option("rough", against="4.1: calm")))
-OBSERVER = Choice("observer", (Option("slow"), Option("fast")), of_proposed=True)
-
-APPLIED, COMMANDED, EXCHANGED = range(len(choices.SIGNALS))
-T_F = {time: i for i, time in enumerate(END_TIMES)}
-
-
-def planted(**cells):
-    """Ours is twice what is printed everywhere, but where something else is planted."""
-    numbers = {
-        PROPOSED: np.full((2, 2, len(choices.SIGNALS), len(END_TIMES), 6), 2.0),
-        PD: np.full((2, 1, len(choices.SIGNALS), len(END_TIMES), 6), 2.0),
-    }
-    for scenario, values in {"proposed": PROPOSED, "pd": PD}.items():
-        for where, value in cells.get(scenario, {}).items():
-            numbers[values][where] = value
-    ways = {PROPOSED: np.full((2, 2, 2), np.nan), PD: np.full((2, 1, 2), np.nan)}
-    ways[PROPOSED][0] = 40.0, 1000.0
-    ways[PROPOSED][1] = 20.0, 2000.0
-    ways[PD][0] = 16.0, 1200.0
-    return Sensitivity(
-        {scenario: values * PUBLISHED[scenario] for scenario, values in numbers.items()},
-        ways,
-        (SEA, OBSERVER),
-    )
+from support.variants import APPLIED, COMMANDED, EXCHANGED, T_F, planted
 
 
 def test_numbers_of_forces_and_errors_known_by_hand():
@@ -64,7 +38,7 @@ def test_the_score_is_a_sum_of_logarithms():
     assert found.ours.score == pytest.approx(12 * np.log(2.0))
     assert found.ours.factor == pytest.approx(2.0)
     assert found.ours.options == (0, 0, APPLIED, T_F[100.0])
-    assert found.scores.shape == (2, 2, len(choices.SIGNALS), len(END_TIMES))
+    assert found.scores.shape == (2, 2, len(SIGNALS), len(T_F))
 
 
 def test_the_nearest_variant_is_found():
@@ -136,7 +110,7 @@ def test_every_combination_has_a_row_at_its_best_end_time(tmp_path):
     write_variants(tmp_path / "variants.csv", found)
     with (tmp_path / "variants.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 2 * 2 * len(choices.SIGNALS)
+    assert len(rows) == 2 * 2 * len(SIGNALS)
     best = min(rows, key=lambda row: float(row["score"]))
     assert (best["sea"], best["observer"], best["T_f"]) == ("rough", "fast", "60 s")
     assert float(best["proposed L2 effort q [N·m·√s]"]) == pytest.approx(40.0)
