@@ -13,6 +13,7 @@ from orchestrator.experiments.bundle import current_fmus, run_fmus
 from orchestrator.experiments.folder import replaced, whole
 from orchestrator.experiments.scenario_page import scenario_page
 from orchestrator.studies.ready_page import ready_page
+from orchestrator.studies.study_page import study_page
 
 
 def add_to(commands: Any) -> None:
@@ -38,7 +39,11 @@ def _reference(options: argparse.Namespace) -> int:
 
 def _docs(options: argparse.Namespace) -> int:
     written = run_fmus("packaging.documentation", options.out / "components")
-    pages = {"scenarios.md": scenario_page(), "ready-studies.md": ready_page()}
+    pages = {
+        "scenarios.md": scenario_page(),
+        "studies.md": study_page(),
+        "ready-studies.md": ready_page(),
+    }
     for name, text in pages.items():
         with whole(options.out / name) as partial:
             partial.write_text(text, encoding="utf-8")

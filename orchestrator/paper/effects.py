@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
+from auv_fmu.euler import STEP
 from orchestrator.analysis.certificates import COLUMNS, certificates
 from orchestrator.analysis.figures import (
     COLOURS,
@@ -34,12 +35,14 @@ from orchestrator.paper.runs import Run
 NOISE_LEVELS = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
 
 #: Steps to show the effect of [s]; section 4.1 has the first.
-STEPS = (0.02, 0.01, 0.005, 0.002)
+STEPS = (STEP, 0.01, 0.005, 0.002)
 
 _PRINTED = replace(FIVE, parameters={"controller.printed_jacobian": True})
 _JACOBI, _JACOBI_PD = (replace(run, order="jacobi") for run in (FIVE, FIVE_PD))
 _NOISY = tuple(Run("fig4", {"plant.noise.std": level}) for level in NOISE_LEVELS)
-_STEPPED = tuple(replace(run, step=step) for run in (FIVE, FIVE_PD) for step in STEPS)
+_STEPPED = tuple(
+    run if step == STEP else replace(run, step=step) for run in (FIVE, FIVE_PD) for step in STEPS
+)
 _ALGEBRAIC = replace(QUIET, parameters={**QUIET.parameters, "controller.saturation": "algebraic"})
 
 

@@ -5,6 +5,7 @@ module              what it holds
 ==================  ==================================================================
 :mod:`.engine`      a run of a study, what comes out of it, and what makes it
 :mod:`.study`       a study file, read and checked
+:mod:`.study_page`  the page on studies
 :mod:`.space`       the runs of a study: which values each of them has
 :mod:`.fmu_engine`  runs of FMUs
 :mod:`.indices`     what comes out of a run, from its rows

@@ -14,6 +14,8 @@ from orchestrator.commands.main import main
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
 from orchestrator.paper.report import write_report
+from orchestrator.paper.studies import make_studies, sections
+from orchestrator.studies.study import ready_studies
 from support.variants import planted
 
 STRANGER = """\
@@ -32,6 +34,26 @@ controller.k_d = "all of it"
 """
 
 SCENARIOS = ("fig3a", "fig4")
+
+STUDY = """\
+title = "Many | of mine"
+scenario = "fig4"
+stop_time = 0.1
+remark = "What they **show**."
+
+[vary]
+controller.k_d = [10.0, 20.0]
+
+[figures.gain]
+kind = "bands"
+x = "controller.k_d"
+show = "peak_command.u"
+
+[figures.nothing]
+kind = "bands"
+x = "controller.k_d"
+show = "time_to_reach"
+"""
 
 
 @pytest.fixture(scope="module")
@@ -117,6 +139,25 @@ def test_runs_are_kept_for_the_next_report(folder):
     # Fig. 4 with 1 mm of noise is Fig. 4 itself; Fig. 3(a) and the stranger are further runs.
     assert len(list((folder / "runs").glob("*.npz"))) == len(runs) + 2
     assert not list(folder.glob(".unfinished*"))
+
+
+def test_studies_are_in_the_report_and_kept_for_the_next(folder, tmp_path):
+    pytest.importorskip("distributed", reason="needs the extra studies")
+    (tmp_path / "many.toml").write_text(STUDY)
+    [study] = make_studies([str(tmp_path / "many.toml")], tmp_path / "kept", "python", ["me"])
+    text = "\n\n".join(sections([study], tmp_path / "kept", tmp_path))
+    assert "### Many \\| of mine\n" in text
+    assert "What they **show**." in text
+    [picture] = re.findall(r"\]\((figures/[^)]+)\)\]", text)
+    assert (tmp_path / picture).is_file()
+    before = (tmp_path / "kept/many/runs.parquet").stat().st_mtime_ns
+    make_studies([str(tmp_path / "many.toml")], tmp_path / "kept", "python", ["me"])
+    assert (tmp_path / "kept/many/runs.parquet").stat().st_mtime_ns == before
+
+
+def test_a_report_without_studies_says_how_they_are_made(text):
+    [line] = [line for line in text.splitlines() if "report --studies" in line]
+    assert all(name in line for name in ready_studies())
 
 
 def test_files_on_the_command_line_come_after_the_scenarios(tmp_path, monkeypatch, capsys):

@@ -56,8 +56,9 @@ def bins_of(values: np.ndarray, most: int) -> Bins:
         centres = 0.5 * (edges[1:] + edges[:-1])
     else:
         between = 0.5 * (places[1:] + places[:-1])
-        low, high = (between[0], between[-1]) if between.size else (places[0] - 1, places[0] + 1)
-        edges = np.array([2 * places[0] - low, *between, 2 * places[-1] - high])
+        # The outer bins are as wide as they would be with one more neighbour.
+        first, last = (between[0], between[-1]) if between.size else (places + 0.5, places - 0.5)
+        edges = np.hstack((2.0 * places[0] - first, between, 2.0 * places[-1] - last))
         centres = places
     if wide:
         edges, centres = np.exp(edges), np.exp(centres)
