@@ -151,7 +151,7 @@ def _job(system: System, run: Run) -> _Job:
     full, stop = experiment.full_steps, experiment.stop_time
     parts = splits(setting, experiment.step)
     if failure := refused_at_once(setting, parts, _order(system, experiment)):
-        raise InputError(failure)
+        raise InputError(refused_at_start(setting) or failure)
     # Where there is none it has no length, and is no step.
     last_parts = (
         splits(setting, stop - full * experiment.step) if experiment.has_short_step else parts

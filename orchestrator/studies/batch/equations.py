@@ -23,8 +23,9 @@ from orchestrator.studies.batch.flat import overload_flat
 #: Where a number is not finite, Python raises in some places; here it is found afterwards.
 OPTIONS: Any = {"nogil": True, "error_model": "numpy"}
 
-#: A call costs as much as what most equations compute.
-_WITHIN: Any = {"forceinline": True}
+#: A call costs as much as what most of them compute. Compiled ones alone call them: what Python
+#: and C would call them by takes half of the time to compile.
+_WITHIN: Any = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 #: What is compiled besides the package of the equations.
 _PACKAGE, _MODULES = "auv_fmu", (kernel.__name__, tally.__name__)
@@ -42,17 +43,20 @@ class Equations:
         """Begin with none."""
         self._made: dict[str, ModuleType] = {}
 
-    def module(self, module: ModuleType, path: Path | None = None) -> ModuleType:
-        """A module of which everything is compiled, with what it takes from others.
+    def module(self, module: ModuleType) -> ModuleType:
+        """A module of which everything is compiled, with what it takes from others."""
+        if module.__name__ not in self._made:
+            self._made[module.__name__] = ModuleType(module.__name__)
+            self._fill(self._made[module.__name__], module, str(inspect.getsourcefile(module)))
+        return self._made[module.__name__]
 
-        Args:
-            module: whose text it is.
-            path: of the file that the functions say they are from; None: its own.
+    def anew(self, module: ModuleType, path: Path) -> ModuleType:
+        """The same, made anew, with functions that say they are from another file."""
+        made = ModuleType(module.__name__)
+        self._fill(made, module, str(path))
+        return made
 
-        """
-        if module.__name__ in self._made:
-            return self._made[module.__name__]
-        made = self._made[module.__name__] = ModuleType(module.__name__)
+    def _fill(self, made: ModuleType, module: ModuleType, path: str) -> None:
         tree = ast.parse(inspect.getsource(module))
         functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
         names = {function.name for function in functions}
@@ -60,10 +64,9 @@ class Equations:
         for name, value in vars(module).items():
             if name not in names:
                 scope[name] = self._counterpart(value)
-        exec(_code(functions, str(path or inspect.getsourcefile(module))), scope)
+        exec(_code(functions, path), scope)
         for name in names:
             scope[name] = numba.njit(scope[name], **OPTIONS, **_WITHIN)
-        return made
 
     def function(self, function: Callable[..., Any]) -> Any:
         """A function, compiled."""
@@ -75,6 +78,10 @@ class Equations:
         if isinstance(value, FunctionType) and _is_compiled(value.__module__):
             return self.function(value)
         return value
+
+
+#: Those of this process.
+EQUATIONS = Equations()
 
 
 def _is_compiled(module: str) -> bool:

@@ -29,12 +29,11 @@ def compiled(gains: type[Any]) -> Callable[..., tuple[int, Moment]]:
     # Not installed for those who make no studies.
     import numba  # noqa: PLC0415
 
-    from orchestrator.studies.batch.equations import OPTIONS, Equations  # noqa: PLC0415
+    from orchestrator.studies.batch.equations import EQUATIONS, OPTIONS  # noqa: PLC0415
 
-    equations = Equations()
     path = _place()
-    made = equations.module(kernel, path)
-    vars(made)["law"] = Law(*(equations.function(function) for function in LAWS[gains]))
+    made = EQUATIONS.anew(kernel, path or Path(kernel.__file__))
+    vars(made)["law"] = Law(*(EQUATIONS.function(function) for function in LAWS[gains]))
     run: Callable[..., tuple[int, Moment]] = numba.njit(
         made.run.py_func, cache=path is not None, **OPTIONS
     )
