@@ -14,7 +14,7 @@ module                  what it holds
 :mod:`.effects`         what runs show when they are compared
 :mod:`.choices`         what the paper leaves open of the runs behind its table
 :mod:`.sensitivity`     how the printed numbers move with it
-:mod:`.courses`         the runs of all combinations, and what is read off them
+:mod:`.variants`        the runs of all combinations, and what is read off them
 :mod:`.printed_table`   the printed table beside them
 :mod:`.sections`        a section for each scenario
 :mod:`.studies`         the ready studies, their figures and what these show

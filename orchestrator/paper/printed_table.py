@@ -14,9 +14,9 @@ from orchestrator.analysis.signals import ACTUATORS, AXES
 from orchestrator.experiments.folder import replaced
 from orchestrator.experiments.record import PACKAGES, Clock, write_files
 from orchestrator.paper.choices import END_TIMES, PD, PROPOSED
-from orchestrator.paper.courses import all_variants
 from orchestrator.paper.formatting import numbers, plain, table
 from orchestrator.paper.sensitivity import PUBLISHED, Range, Sensitivity, Variant
+from orchestrator.paper.variants import all_variants
 from orchestrator.paper.workers import workers
 from orchestrator.studies.engine import REACHED
 

@@ -17,12 +17,12 @@ from orchestrator.experiments.record import PACKAGES, Clock, write_files
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.paper import printed_table, readings, studies
 from orchestrator.paper.claims import CLAIMS
-from orchestrator.paper.courses import all_variants
 from orchestrator.paper.effects import EFFECTS, show_effect
 from orchestrator.paper.formatting import table
 from orchestrator.paper.outcomes import Outcomes
 from orchestrator.paper.page import contents, html
 from orchestrator.paper.sections import Section, draw_section, sections, written
+from orchestrator.paper.variants import all_variants
 from orchestrator.paper.workers import Workers, workers
 
 #: Folders within the report's: figures, and outcomes that the next report can use again.

@@ -11,8 +11,8 @@ from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.paper import printed_table
 from orchestrator.paper.choices import OF_RUNS, PD, PROPOSED, SIGNALS, Choice
-from orchestrator.paper.courses import all_variants
 from orchestrator.paper.measures import way_of
+from orchestrator.paper.variants import all_variants
 
 pytest.importorskip("numba", reason="needs the extra `studies`")
 

@@ -7,30 +7,43 @@ import csv
 import numpy as np
 import pytest
 
+from orchestrator.analysis.signals import COMMANDED as COMMANDED_PORTS
 from orchestrator.experiments.preparation import Request, loaded, prepare
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.observer import Header
+from orchestrator.master.table import Table
 from orchestrator.paper import choices
-from orchestrator.paper.choices import OF_RUNS, PD, PROPOSED, SIGNALS, runs
-from orchestrator.paper.courses import Course
+from orchestrator.paper.choices import END_TIMES, OF_RUNS, PD, PROPOSED, SIGNALS, runs
 from orchestrator.paper.measures import Way
 from orchestrator.paper.printed_table import section, write_variants
 from orchestrator.paper.sensitivity import PUBLISHED
+from orchestrator.paper.variants import numbers_of
+from orchestrator.studies.engine import Outcome
 from orchestrator.system.names import port_name
 from support.variants import APPLIED, COMMANDED, EXCHANGED, T_F, planted
 
 
-def test_numbers_of_forces_and_errors_known_by_hand():
-    """Constant forces have the effort F sqrt(T); of an error that falls, e_f is that of T - 5 s."""
-    time = np.linspace(0.0, 200.0, 10_001)
-    force = np.array([3.0, -4.0, 5.0])
-    applied = np.broadcast_to(force, (len(time), 3)).copy()
-    applied[0] = 1e6  # ends no step
-    error = np.exp(-0.1 * time)[:, np.newaxis] * (1.0, -2.0, 3.0)
-    numbers = Course(time, 2.0 * applied, applied, error).numbers()
-    for end in (20.0, 57.0, 200.0):
-        effort, e_f = np.abs(force) * np.sqrt(end), np.exp(-0.1 * (end - 5.0)) * np.arange(1, 4)
-        for signal, times in ((APPLIED, 1.0), (COMMANDED, 2.0)):
-            np.testing.assert_allclose(numbers[signal, T_F[end]], [*(times * effort), *e_f])
-        np.testing.assert_allclose(numbers[EXCHANGED, T_F[end]], [*effort[[0, 2, 1]], *e_f])
+def test_numbers_are_those_of_the_indices_and_of_the_commands():
+    """A constant command has the effort |F| sqrt(T); the first row ends no step."""
+    indices = {
+        time: {f"l2_effort.{k}": i * time for i, k in enumerate("uqr", 1)}
+        | {f"final_error.{k}": i / time for i, k in enumerate("xyz", 1)}
+        for time in END_TIMES
+    }
+    outcomes = [Outcome(0, indices[time]) for time in END_TIMES]
+    rows = np.tile([0.0, 3.0, -4.0, 5.0], (10_001, 1))
+    rows[:, 0] = 0.02 * np.arange(len(rows))
+    rows[0, 1:] = 1e6
+    table = Table.of(Header(COMMANDED_PORTS, Experiment(200.0, 0.02), {}), rows)
+    numbers = numbers_of(outcomes, table)
+    for time in (20.0, 57.0, 200.0):
+        e_f = np.arange(1, 4) / time
+        for signal, effort in (
+            (APPLIED, np.multiply(time, (1, 2, 3))),
+            (EXCHANGED, np.multiply(time, (1, 3, 2))),
+            (COMMANDED, np.multiply(np.sqrt(time), (3.0, 4.0, 5.0))),
+        ):
+            np.testing.assert_allclose(numbers[signal, T_F[time]], [*effort, *e_f])
 
 
 def test_the_score_is_a_sum_of_logarithms():

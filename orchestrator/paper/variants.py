@@ -1,16 +1,13 @@
-"""Courses of runs, and the numbers of the printed table read off them."""
+"""The runs of all variants, and the numbers of the printed table read off them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
-from orchestrator.analysis.metrics import LAST_SECONDS
-from orchestrator.analysis.signals import APPLIED, COMMANDED, tracking_error
-from orchestrator.errors import InputError
+from orchestrator.analysis.signals import ACTUATORS, AXES, COMMANDED
 from orchestrator.experiments.preparation import loaded
 from orchestrator.master.table import Table
 from orchestrator.paper.choices import END_TIMES, OF_RUNS, SIGNALS, Choice, options_of, runs
@@ -18,55 +15,19 @@ from orchestrator.paper.measures import Way, way
 from orchestrator.paper.sensitivity import PUBLISHED, Sensitivity
 from orchestrator.paper.workers import Workers
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import Run
+from orchestrator.studies.engine import Outcome, Run
 from orchestrator.studies.sweep import check_installed
 
 #: Runs that a worker makes at a time.
 _BLOCK = 16
 
+#: Indices of an outcome.
+_EFFORT = [f"l2_effort.{k}" for k in ACTUATORS]
+_ERROR = [f"final_error.{k}" for k in AXES]
+_REACHED = "time_to_reach"
+
 #: u, r and q of (u, q, r).
 _EXCHANGED = [0, 2, 1]
-
-
-class Course(NamedTuple):
-    """What the printed numbers are read off: a row at t = 0, and one after each step.
-
-    Attributes:
-        time: [s].
-        commanded, applied: (tau_u, tau_q, tau_r) of the step that ends with the row [N, N.m].
-        error: e = y - y_d with the true control point [m].
-
-    """
-
-    time: np.ndarray
-    commanded: np.ndarray
-    applied: np.ndarray
-    error: np.ndarray
-
-    @property
-    def way(self) -> Way | None:
-        """To the reference."""
-        return way(self.time, self.error, self.applied[:, 0])
-
-    def numbers(self) -> np.ndarray:
-        """Three L2 efforts and three e_f, an axis each for SIGNALS and END_TIMES before the six."""
-        step = self.time[1]
-        ends = np.searchsorted(self.time, np.subtract(END_TIMES, 0.5 * step))
-        last = round(LAST_SECONDS / step) + 1
-        windows = np.lib.stride_tricks.sliding_window_view(np.abs(self.error), last, axis=0)
-        error = windows[ends + 1 - last].max(axis=-1)
-        h = np.diff(self.time)[:, np.newaxis]
-        applied, commanded = (
-            np.sqrt(np.cumsum(signal[1:] ** 2 * h, axis=0)[ends - 1])
-            for signal in (self.applied, self.commanded)
-        )
-        efforts = (applied, commanded, applied[:, _EXCHANGED])
-        return np.stack([np.hstack((effort, error)) for effort in efforts])
-
-
-def course_of(table: Table) -> Course:
-    """The course of a run."""
-    return Course(table.time, table.group(*COMMANDED), table.group(*APPLIED), tracking_error(table))
 
 
 def all_variants(crew: Workers, of_runs: Sequence[Choice] = OF_RUNS) -> Sensitivity:
@@ -108,11 +69,31 @@ def taken_of(engine: BatchEngine, block: Sequence[Run]) -> tuple[np.ndarray, np.
     numbers = np.full((len(block), len(SIGNALS), len(END_TIMES), 6), np.nan)
     ways = np.full((len(block), len(Way._fields)), np.nan)
     for i, run in enumerate(block):
-        try:
+        outcomes = engine.outcomes_at(run, END_TIMES)
+        if outcomes[-1].failure is None:
             table = engine.table(run)
-        except InputError:
-            continue
-        if table.ending.failure is None:
-            course = course_of(table)
-            numbers[i], ways[i] = course.numbers(), course.way or np.nan
+            numbers[i] = numbers_of(outcomes, table)
+            ways[i] = way(table, outcomes[-1].indices.get(_REACHED)) or np.nan
     return numbers, ways
+
+
+def numbers_of(outcomes: Sequence[Outcome], table: Table) -> np.ndarray:
+    """Three L2 efforts and three e_f, an axis each for SIGNALS and END_TIMES before the six.
+
+    Args:
+        outcomes: of a run, at each of END_TIMES.
+        table: its rows, for what no index is of.
+
+    """
+    applied, error = (
+        np.array([[outcome.indices[name] for name in names] for outcome in outcomes])
+        for names in (_EFFORT, _ERROR)
+    )
+    h = np.diff(table.time)[:, np.newaxis]
+    squares = np.cumsum(table.group(*COMMANDED)[1:] ** 2 * h, axis=0)
+    # The steps that end there: half a step is more than times are rounded by.
+    ends = np.searchsorted(table.time[1:], np.subtract(END_TIMES, 0.5 * table.time[1]))
+    commanded = np.sqrt(squares[ends])
+    return np.stack(
+        [np.hstack((effort, error)) for effort in (applied, commanded, applied[:, _EXCHANGED])]
+    )
