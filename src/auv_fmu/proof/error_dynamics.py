@@ -27,7 +27,8 @@ def chi_1(
 
     """
     damping = d(vehicle, theta, psi, w, dy_r, ell) - d(vehicle, theta, psi, w, dy_r + r_1, ell)
-    return damping - C_2(vehicle, theta, psi, dy_r, ell) @ r_1
+    lumped: Matrix = damping - C_2(vehicle, theta, psi, dy_r, ell) @ r_1
+    return lumped
 
 
 def chi_2(
@@ -48,12 +49,13 @@ def chi_2(
 
     """
     damping = d(vehicle, theta, psi, w, dy_r, ell) - d(vehicle, theta, psi, w, dy_r + r_1, ell)
-    return (
+    lumped: Matrix = (
         C_2(vehicle, theta, psi, dy_r + r_1, ell) @ r_2
         - C_2(vehicle, theta, psi, r_1, ell) @ (2.0 * dy_r + r_1)
         - D_2(vehicle, theta, psi, ell) @ r_1
         + damping
     )
+    return lumped
 
 
 def xi(
@@ -74,7 +76,7 @@ def xi(
         disturbance: tau_w2 of (15) [N].
 
     """
-    return (
+    lumped: Matrix = (
         -M_2(vehicle, theta, psi, ell) @ ddy_r
         - C_2(vehicle, theta, psi, dy_r, ell) @ dy_r
         - d(vehicle, theta, psi, w, dy_r, ell)
@@ -82,3 +84,4 @@ def xi(
         - G_2(vehicle, theta, psi, ell)
         - disturbance
     )
+    return lumped

@@ -51,9 +51,9 @@ def at_least(vehicle: Vehicle, ell: float, lambda_: float) -> Zetas:
         lambda_: diagonal entry of Lambda [m/s].
 
     """
-    m11, m22, m33, m55, m66, *_ = vehicle
-    yaw = _chi_2(m66 / ell**2, vehicle.d66 / ell**2, m11 / m22, ell, lambda_)
-    pitch = _chi_2(m55 / ell**2, vehicle.d55 / ell**2, m11 / m33, ell, lambda_)
+    square, m11 = ell**2, vehicle.m11
+    yaw = _chi_2(vehicle.m66 / square, vehicle.d66 / square, m11 / vehicle.m22, ell, lambda_)
+    pitch = _chi_2(vehicle.m55 / square, vehicle.d55 / square, m11 / vehicle.m33, ell, lambda_)
     return Zetas(0.5 * coupling(vehicle, ell) * hypot(1.0, lambda_), max(yaw, pitch))
 
 
