@@ -172,7 +172,8 @@ def d(vehicle: Vehicle, theta: float, psi: float, w: Matrix, dy: Matrix, ell: fl
     J_inverse: Matrix = np.linalg.inv(J(theta, psi, ell))
     v, v_delta = J_inverse @ dy, drift(ell) @ w
     coriolis = model.C_1_bar(v) @ v - 2.0 * model.C_1_bar(v_delta) @ v
-    return J_inverse.T @ (model.C_1(w) @ v + _forced_drift(model, coriolis, ell))
+    force: Matrix = J_inverse.T @ (model.C_1(w) @ v + _forced_drift(model, coriolis, ell))
+    return force
 
 
 def d_missing(
@@ -193,7 +194,8 @@ def d_missing(
     v, v_delta = J_inverse @ dy, drift(ell) @ w
     coriolis = model.C_1_bar(v_delta) @ v - model.C_1_bar(v) @ v_delta
     turning = C_2(vehicle, theta, psi, J_delta(theta, psi, w), ell) @ dy
-    return J_inverse.T @ _forced_drift(model, coriolis, ell) - turning
+    force: Matrix = J_inverse.T @ _forced_drift(model, coriolis, ell) - turning
+    return force
 
 
 def tau_w2(
@@ -218,7 +220,8 @@ def tau_w2(
     unactuated = model.D_1_bar @ w + tau_w1_bar + model.C_1_bar(v_delta) @ v_delta
     actuated = tau_w1 - model.C_1(w) @ v_delta - model.D_1 @ v_delta
     J_inverse: Matrix = np.linalg.inv(J(theta, psi, ell))
-    return J_inverse.T @ (actuated + _forced_drift(model, unactuated, ell))
+    force: Matrix = J_inverse.T @ (actuated + _forced_drift(model, unactuated, ell))
+    return force
 
 
 def _forced_drift(model: ActuatedDynamics, force: Matrix, ell: float) -> Matrix:
