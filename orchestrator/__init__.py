@@ -30,10 +30,16 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from orchestrator.experiments.preparation import load
     from orchestrator.experiments.result import Result, simulate
+    from orchestrator.studies.sweep import sweep
 
-__all__ = ["Result", "load", "simulate"]
+__all__ = ["Result", "load", "simulate", "sweep"]
 
-_MODULES = {"Result": "result", "load": "preparation", "simulate": "result"}
+_MODULES = {
+    "Result": "experiments.result",
+    "load": "experiments.preparation",
+    "simulate": "experiments.result",
+    "sweep": "studies.sweep",
+}
 
 
 def __dir__() -> list[str]:
@@ -47,4 +53,4 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module  # noqa: PLC0415
 
-    return getattr(import_module(f"orchestrator.experiments.{_MODULES[name]}"), name)
+    return getattr(import_module(f"orchestrator.{_MODULES[name]}"), name)

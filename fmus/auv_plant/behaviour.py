@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple, TypedDict
 
 from auv_fmu import plant
-from auv_fmu.actuators import limit, limit_all
+from auv_fmu.actuators import limit
 from auv_fmu.attitude import rotation_from_quaternion
-from auv_fmu.plant import PlantState
+from auv_fmu.plant import Parameters, PlantState
 from auv_fmu.types import Rotation, Vector3, Vector6
-from fmus.auv_plant.ports import Parameters
 from fmus.ports.port import Refusal
 
 #: By how much the square of the length of a normalised quaternion is off.
@@ -37,11 +36,14 @@ class Outputs(TypedDict):
 
 
 def check(parameters: Parameters) -> None:
-    """Refuse limits that leave an actuator nothing."""
+    """Refuse limits that leave an actuator nothing, and a start with a roll that is held."""
     lower, upper = parameters.limits
     _check_limits("u", lower[0], upper[0])
     _check_limits("q", lower[1], upper[1])
     _check_limits("r", lower[2], upper[2])
+    if not parameters.roll.rolls:
+        _check_roll("eta0.phi", parameters.eta0[3])
+        _check_roll("nu0.p", parameters.nu0[3])
 
 
 def _check_limits(k: str, tau_min: float, tau_max: float) -> None:
@@ -49,12 +51,15 @@ def _check_limits(k: str, tau_min: float, tau_max: float) -> None:
         raise Refusal(f"tau_min.{k} = {tau_min:g} must be below tau_max.{k} = {tau_max:g}")
 
 
+def _check_roll(name: str, value: float) -> None:
+    if value:
+        raise Refusal(f"{name} = {value:g} must be 0 where roll is false")
+
+
 def begin(parameters: Parameters, inputs: Inputs) -> tuple[PlantState, Rotation, Outputs]:
     """State, its attitude and outputs at the start."""
-    x, y, z, phi, theta, psi = parameters.eta0
-    state = plant.initial_state((x, y, z), (phi, theta, psi), parameters.nu0)
-    rotation = rotation_from_quaternion(state.quaternion)
-    return state, rotation, _seen(parameters, state, rotation, _limited(parameters, inputs.tau))
+    state, rotation = plant.begin(parameters, plant.applied(parameters, inputs.tau))
+    return state, rotation, _seen(parameters, state, rotation)
 
 
 def derive(state: PlantState) -> Rotation:
@@ -66,14 +71,9 @@ def advance(
     parameters: Parameters, state: PlantState, derived: Rotation, inputs: Inputs, h: float, n: int
 ) -> tuple[PlantState, Rotation, Outputs]:
     """State, its attitude and outputs after n steps of h seconds."""
-    tau = _limited(parameters, inputs.tau)
-    while n > 0:
-        state = plant.step(
-            parameters.vehicle, parameters.roll, state, derived, tau, inputs.tau_w, h
-        )
-        derived = rotation_from_quaternion(state.quaternion)
-        n -= 1
-    return state, derived, _seen(parameters, state, derived, tau)
+    tau = plant.applied(parameters, inputs.tau)
+    state, derived = plant.steps(parameters, state, derived, tau, inputs.tau_w, h, n)
+    return state, derived, _seen(parameters, state, derived)
 
 
 def seed(parameters: Parameters) -> int:
@@ -92,8 +92,9 @@ def expected(parameters: Parameters, state: PlantState, outputs: Outputs) -> Out
     if not abs(a * a + b * b + c * c + d * d - 1.0) <= _ROUNDING:
         raise Refusal("its quaternion is not of length one")
     rotation = rotation_from_quaternion(state.quaternion)
-    tau = _limited(parameters, outputs["tau_applied"])
-    seen = _seen(parameters, state, rotation, tau)
+    if not parameters.roll.rolls:
+        _check_level(state, rotation)
+    seen = _seen(parameters, state, rotation)
     most = _MOST_DEVIATIONS * parameters.noise.std
     y, noisy = seen["y"], outputs["y"]
     return {
@@ -105,20 +106,22 @@ def expected(parameters: Parameters, state: PlantState, outputs: Outputs) -> Out
             y[2] + limit(noisy[2] - y[2], -most, most),
         ),
         "dy": seen["dy"],
-        "tau_applied": tau,
+        "tau_applied": plant.applied(parameters, seen["tau_applied"]),
     }
 
 
-def _limited(parameters: Parameters, tau: Vector3) -> Vector3:
-    return limit_all(tau, parameters.limits.tau_min, parameters.limits.tau_max)
+def _check_level(state: PlantState, rotation: Rotation) -> None:
+    """Refuse a state that rolls: the starboard axis is no longer level."""
+    if state.nu[3] or not abs(rotation[1][2]) <= _ROUNDING:
+        raise Refusal("its roll, which is held at zero, is not zero")
 
 
-def _seen(parameters: Parameters, state: PlantState, rotation: Rotation, tau: Vector3) -> Outputs:
-    euler, y, dy = plant.outputs(state, rotation, parameters.ell)
+def _seen(parameters: Parameters, state: PlantState, rotation: Rotation) -> Outputs:
+    euler, y, dy, nu = plant.outputs(parameters, state, rotation)
     return {
         "eta": (*state.position, *euler),
-        "nu": state.nu,
+        "nu": nu,
         "y": y,
         "dy": dy,
-        "tau_applied": tau,
+        "tau_applied": state.tau,
     }

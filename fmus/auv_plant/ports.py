@@ -2,38 +2,40 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from auv_fmu.actuators import Limits
-from auv_fmu.plant import ETA_0, NU_0, Localisation, RollAxis
-from auv_fmu.types import Vector6
-from auv_fmu.vehicle import Vehicle
+from auv_fmu.plant import ETA_0, NU_0, Localisation, Parameters, RollAxis
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters
-from fmus.ports.quantities import ETA, NU, POSITION, TAU, TAU_W, VELOCITY
+from fmus.ports.quantities import ETA, LAG, NU, POSITION, TAU, TAU_W, VELOCITY
 from fmus.ports.vehicle import CONTROL_POINT, VEHICLE
 
 DESCRIPTION = "Autonomous underwater vehicle with limited actuators and noisy position sensor"
 
-_ROLL, _LIMITS, _LOCALISATION = RollAxis(), Limits(), Localisation()
+_ROLL, _LIMITS, _LOCALISATION, _DEFAULTS = RollAxis(), Limits(), Localisation(), Parameters()
 
 #: Largest standard deviation [m]: with it, no finite position becomes an infinite measurement.
 _FARTHEST = 1e6
 
 _COMMAND = inputs("tau", TAU, "Commanded force and moments")
 
-
-class Parameters(NamedTuple):
-    """What the parameters of AuvPlant mean."""
-
-    vehicle: Vehicle
-    roll: RollAxis
-    ell: float
-    limits: Limits
-    eta0: Vector6
-    nu0: Vector6
-    noise: Localisation
-
+_ROLLS = Port(
+    "roll",
+    "parameter",
+    "fixed",
+    "Boolean",
+    "Whether the vehicle rolls; if not, it is that of (1) and (2). Not in the paper",
+    start=_ROLL.rolls,
+)
+_CURRENT = parameters(
+    "current", _DEFAULTS.current, VELOCITY, "Ocean current in the earth frame; not in the paper"
+)
+_LAGS = parameters(
+    "actuator.T",
+    _DEFAULTS.T,
+    LAG,
+    "Time constant of the actuator behind its limits, 0: none; not in the paper (Remark 2)",
+    minimum=0.0,
+)
 
 PARAMETERS = ParameterSet(
     Parameters,
@@ -48,6 +50,7 @@ PARAMETERS = ParameterSet(
             "N.m",
             "Righting moment in roll; the paper gives none, ours is that of pitch",
         ),
+        rolls=_ROLLS,
     ),
     ell=CONTROL_POINT,
     limits=ParameterSet(
@@ -76,7 +79,11 @@ PARAMETERS = ParameterSet(
             start=_LOCALISATION.seed,
         ),
     ),
+    current=_CURRENT,
+    T=_LAGS,
 )
+
+_LATER = (_ROLLS, *_CURRENT, *_LAGS)
 
 PORTS: tuple[Port, ...] = (
     *_COMMAND,
@@ -86,6 +93,7 @@ PORTS: tuple[Port, ...] = (
     *outputs("y", POSITION, "Measured control point, with noise"),
     *outputs("dy", VELOCITY, "True velocity of the control point"),
     *outputs("tau_applied", TAU, "Force and moments after the limits of (3)", _COMMAND),
-    *PARAMETERS.ports,
+    *PARAMETERS.before(*_LATER),
     H_MAX,
+    *_LATER,
 )

@@ -7,11 +7,11 @@ from random import Random
 from typing import Any
 
 from auv_fmu import plant
-from auv_fmu.plant import PlantState
+from auv_fmu.plant import Parameters, PlantState
 from auv_fmu.types import Rotation, Vector3
 from fmus.auv_plant import behaviour
 from fmus.auv_plant.behaviour import Inputs, Outputs
-from fmus.auv_plant.ports import DESCRIPTION, PARAMETERS, PORTS, Parameters
+from fmus.auv_plant.ports import DESCRIPTION, PARAMETERS, PORTS
 from fmus.ports.groups import slices
 from fmus.ports.port import Refusal
 from fmus.slave.component import Component

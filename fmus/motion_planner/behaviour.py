@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TypedDict
 
 from auv_fmu import motion_planner
-from auv_fmu.motion_planner import Motion, PlannerState
+from auv_fmu.motion_planner import Motion, Parameters, PlannerState
 from auv_fmu.types import Vector3, Vector5
-from fmus.motion_planner.ports import Parameters
 
 
 class Outputs(TypedDict):
@@ -21,8 +20,7 @@ class Outputs(TypedDict):
 
 def begin(parameters: Parameters) -> tuple[PlannerState, Motion, Outputs]:
     """State, its motion and outputs at the start."""
-    state = motion_planner.initial_state(parameters.eta0)
-    moving = derive(parameters, state)
+    state, moving = motion_planner.begin(parameters)
     return state, moving, _seen(parameters, state, moving)
 
 
@@ -35,10 +33,7 @@ def advance(
     parameters: Parameters, state: PlannerState, derived: Motion, h: float, n: int
 ) -> tuple[PlannerState, Motion, Outputs]:
     """State, its motion and outputs after n steps of h seconds."""
-    while n > 0:
-        state = motion_planner.step(state, derived, h)
-        derived = derive(parameters, state)
-        n -= 1
+    state, derived = motion_planner.steps(parameters, state, derived, h, n)
     return state, derived, _seen(parameters, state, derived)
 
 

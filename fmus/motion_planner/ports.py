@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-from auv_fmu.motion_planner import ETA_D0, TAU_D
-from auv_fmu.types import Vector3, Vector5
-from auv_fmu.vehicle import Vehicle
+from auv_fmu.motion_planner import ETA_D0, NU_D0, TAU_D, Parameters
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, Port, outputs, parameters
-from fmus.ports.quantities import ACCELERATION, ETA_WITHOUT_ROLL, POSITION, TAU, VELOCITY
+from fmus.ports.quantities import (
+    ACCELERATION,
+    ETA_WITHOUT_ROLL,
+    NU_WITHOUT_ROLL,
+    POSITION,
+    TAU,
+    VELOCITY,
+)
 from fmus.ports.vehicle import CONTROL_POINT, VEHICLE
 
 DESCRIPTION = "Motion planner: helical reference with velocity and acceleration"
 
 
-class Parameters(NamedTuple):
-    """What the parameters of MotionPlanner mean."""
-
-    tau_d: Vector3
-    eta0: Vector5
-    vehicle: Vehicle
-    ell: float
-
+_NU0 = parameters("nu0", NU_D0, NU_WITHOUT_ROLL, "Initial velocity in the body frame")
 
 PARAMETERS = ParameterSet(
     Parameters,
@@ -30,6 +26,7 @@ PARAMETERS = ParameterSet(
     eta0=parameters("eta0", ETA_D0, ETA_WITHOUT_ROLL, "Initial posture"),
     vehicle=VEHICLE,
     ell=CONTROL_POINT,
+    nu0=_NU0,
 )
 
 PORTS: tuple[Port, ...] = (
@@ -37,6 +34,7 @@ PORTS: tuple[Port, ...] = (
     *outputs("dy_d", VELOCITY, "Desired velocity"),
     *outputs("ddy_d", ACCELERATION, "Desired acceleration, in closed form"),
     *outputs("eta_d", ETA_WITHOUT_ROLL, "Posture of the reference vehicle"),
-    *PARAMETERS.ports,
+    *PARAMETERS.before(*_NU0),
     H_MAX,
+    *_NU0,
 )

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from auv_fmu.motion_planner import Motion, PlannerState
+from auv_fmu.motion_planner import Motion, Parameters, PlannerState
 from fmus.motion_planner import behaviour
 from fmus.motion_planner.behaviour import Outputs
-from fmus.motion_planner.ports import DESCRIPTION, PARAMETERS, PORTS, Parameters
+from fmus.motion_planner.ports import DESCRIPTION, PARAMETERS, PORTS
 from fmus.ports.groups import Nothing
 from fmus.slave.component import Component
 

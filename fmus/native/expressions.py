@@ -23,10 +23,13 @@ _COMPARE = {
 }  # fmt: skip
 
 #: Functions that never raise, and those of arithmetic.h for the others.
-_PLAIN = {math.atan2: "atan2", math.copysign: "copysign", math.tanh: "tanh", abs: "fabs"}
+_PLAIN = {
+    math.atan: "atan", math.atan2: "atan2", math.copysign: "copysign", math.tanh: "tanh",
+    abs: "fabs",
+}  # fmt: skip
 _RAISING = {
-    math.asin: "ASIN", math.cos: "COS", math.exp: "EXP", math.log: "LOG", math.log1p: "LOG1P",
-    math.sin: "SIN", math.sqrt: "SQRT",
+    math.asin: "ASIN", math.cos: "COS", math.exp: "EXP", math.expm1: "EXPM1", math.log: "LOG",
+    math.log1p: "LOG1P", math.sin: "SIN", math.sqrt: "SQRT",
 }  # fmt: skip
 
 

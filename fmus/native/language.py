@@ -12,8 +12,11 @@ from typing import Any, NamedTuple
 
 #: Functions of `math` that equations may use.
 MATHEMATICS = frozenset(
-    ("asin", "atan2", "copysign", "cos", "degrees", "exp", "log", "log1p", "sin", "sqrt", "tanh")
-)
+    (
+        "asin", "atan", "atan2", "copysign", "cos", "degrees", "exp", "expm1", "log", "log1p",
+        "sin", "sqrt", "tanh",
+    )
+)  # fmt: skip
 
 #: What else may be called without being imported.
 BUILT_IN = frozenset(("abs",))
@@ -21,6 +24,7 @@ BUILT_IN = frozenset(("abs",))
 #: Functions that stand among the equations and are none, with the reason.
 OUTSIDE = {
     "plant.white_noise": "makes the generator of the standard library that has the state",
+    "euler.internal_steps": "makes an integer; the runtime in C has a twin, which looks first",
     "closed_loop.closed_loop": "is the generator of instants that all else is held against",
 }
 

@@ -30,7 +30,7 @@ class Outputs(TypedDict):
 
 
 def begin(parameters: Gains, inputs: Measurement) -> tuple[ControllerState, Outputs]:
-    """State and outputs at the start."""
+    """State and outputs at the start, where z = 0 and no gain of the observer matters."""
     state = output_feedback.initial_state(parameters, inputs.y)
     return state, _seen(state, output_feedback.evaluate(parameters, state, inputs))
 
@@ -49,14 +49,10 @@ def advance(
     parameters: Gains, state: ControllerState, inputs: Measurement, h: float, n: int
 ) -> tuple[ControllerState, Outputs]:
     """State after n steps of h seconds, and outputs at the beginning of the first."""
-    signals = output_feedback.evaluate(parameters, state, inputs)
-    outputs = _seen(state, signals)
-    state = output_feedback.step(state, signals, h)
-    while n > 1:
-        signals = output_feedback.evaluate(parameters, state, inputs)
-        state = output_feedback.step(state, signals, h)
-        n -= 1
-    return state, outputs
+    gains = output_feedback.sampled(parameters, h)
+    signals = output_feedback.evaluate(gains, state, inputs)
+    after = output_feedback.steps(gains, state, signals, inputs, h, n)
+    return after, _seen(state, signals)
 
 
 def _seen(state: ControllerState, signals: Signals) -> Outputs:

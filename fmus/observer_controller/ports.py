@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from auv_fmu.observer import FORMS
 from auv_fmu.output_feedback import Gains
 from auv_fmu.saturation import SATURATIONS
 from fmus.ports.controllers import (
@@ -25,6 +26,16 @@ DESCRIPTION = "Saturated output-feedback tracking controller with velocity obser
 
 _GAINS = Gains()
 
+_OBSERVER = Port(
+    "observer",
+    "parameter",
+    "fixed",
+    "String",
+    "Form of the observer: (51) by Euler's scheme, with k_d exact over a step, or (24) as printed",
+    start="euler",
+    choices=FORMS,
+)
+
 PARAMETERS = ParameterSet(
     Gains,
     K1=parameters("K1", _GAINS.K1, per_axis("N"), "Diagonal of K_1", POSITIVE, tunable=True),
@@ -41,7 +52,7 @@ PARAMETERS = ParameterSet(
         "parameter",
         "fixed",
         "String",
-        "Saturation function of Definition 2: tanh or algebraic",
+        "Saturation function of Definition 2: tanh, algebraic or arctan",
         start="tanh",
         choices=SATURATIONS,
     ),
@@ -54,6 +65,7 @@ PARAMETERS = ParameterSet(
         minimum=0.0,
         tunable=True,
     ),
+    form=_OBSERVER,
 )
 
 PORTS: tuple[Port, ...] = (
@@ -64,6 +76,7 @@ PORTS: tuple[Port, ...] = (
     *THETA_HAT,
     *TRACKING_ERROR,
     *outputs("z", POSITION, "Estimation error y - y_hat", Y),
-    *PARAMETERS.ports,
+    *PARAMETERS.before(_OBSERVER),
     H_MAX,
+    _OBSERVER,
 )

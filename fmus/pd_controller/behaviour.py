@@ -39,13 +39,8 @@ def advance(
     """State after n steps of h seconds, and outputs at the beginning of the first."""
     theta_hat = state.theta_hat
     signals = pd.evaluate(parameters, theta_hat, inputs)
-    outputs = _seen(theta_hat, signals)
-    theta_hat = pd.step(theta_hat, signals, h)
-    while n > 1:
-        signals = pd.evaluate(parameters, theta_hat, inputs)
-        theta_hat = pd.step(theta_hat, signals, h)
-        n -= 1
-    return PdState(theta_hat), outputs
+    after = pd.steps(parameters, theta_hat, signals, inputs, h, n)
+    return PdState(after), _seen(theta_hat, signals)
 
 
 def _seen(theta_hat: Vector4, signals: PdSignals) -> Outputs:

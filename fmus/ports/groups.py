@@ -135,6 +135,13 @@ class ParameterSet(Generic[T]):
         """All parameters, in the order of their declaration."""
         return tuple(port for field in self._fields.values() for port in _ports(field))
 
+    def before(self, *later: Port) -> tuple[Port, ...]:
+        """The parameters but for some that have come later: these stand at the end of all ports.
+
+        So the value references of the others are what they were.
+        """
+        return tuple(port for port in self.ports if port not in later)
+
     @property
     def paths(self) -> dict[str, tuple[str | int, ...]]:
         """Where each parameter lies in the set, by its name: fields, and places in tuples."""

@@ -24,10 +24,14 @@ ETA_WITHOUT_ROLL: Members = {member: unit for member, unit in ETA.items() if mem
 
 #: Velocity of the vehicle, and what acts on it, in the body frame.
 NU: Members = {"u": "m/s", "v": "m/s", "w": "m/s", "p": "rad/s", "q": "rad/s", "r": "rad/s"}
+NU_WITHOUT_ROLL: Members = {member: unit for member, unit in NU.items() if member != "p"}
 TAU_W: Members = {"u": "N", "v": "N", "w": "N", "p": "N.m", "q": "N.m", "r": "N.m"}
 
 #: What the actuators can do: no sway, heave or roll.
 TAU: Members = {member: TAU_W[member] for member in ("u", "q", "r")}
+
+#: Of each of them.
+LAG: Members = dict.fromkeys(TAU, "s")
 
 #: Coefficients of (1, |dy_r|, |dy_r|^2, |ddy_r|) in the bound of a force.
 THETA: Members = {1: "N", 2: "kg/s", 3: "kg/m", 4: "kg"}

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from math import ceil, isfinite
+from math import isfinite
 from typing import Any, ClassVar, Generic, TypeVar, get_args, get_origin
 from xml.etree.ElementTree import Element
 
 from pythonfmu import DefaultExperiment
 
+from auv_fmu.euler import internal_steps, longest_step
 from fmus.ports.description import ABOUT, EXPERIMENT
 from fmus.ports.description_fmi2 import complete
 from fmus.ports.groups import ParameterSet, packing, slices, unpacking
@@ -33,9 +34,6 @@ from fmus.slave.callbacks import (
 )
 from fmus.slave.shape import measuring
 from fmus.slave.state import Snapshot, checked, from_bytes, nearly_equal, to_bytes, unusable
-
-#: A step may exceed `h_max` by this share without being split: hosts round their time.
-ROUNDING = 1e-9
 
 #: Longest step of a component that has no internal steps [s].
 _NO_LIMIT = 1e300
@@ -194,7 +192,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         """What the values of all parameters come to, and the longest step with them [s]."""
         parameters = self.parameter_set.of(values)
         self.check(parameters)
-        return parameters, float(values.get(H_MAX.name, _NO_LIMIT)) * (1.0 + ROUNDING)
+        return parameters, longest_step(float(values.get(H_MAX.name, _NO_LIMIT)))
 
     def _retune(self, parameters: dict[str, Value]) -> None:
         self._adopt(parameters, self._meaning(parameters))
@@ -252,7 +250,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
             raise Refusal(f"time {current_time} and step {step_size} must be finite")
         if step_size < 0.0:
             raise Refusal(f"step {step_size:g} s is negative")
-        n = ceil(step_size / self._longest_step)
+        n = internal_steps(step_size, self._longest_step)
         if n > MOST_INTERNAL_STEPS:
             raise Refusal(f"step {step_size:g} s needs {n} internal steps; raise h_max")
         return n

@@ -116,9 +116,9 @@ class _Effort:
         if not len(time):
             return
         h = np.diff(time, prepend=self._time)[:, np.newaxis]
-        self._square = _continued(self._square, applied**2 * h)
+        self._square = continued(self._square, applied**2 * h)
         differences = np.diff(np.vstack((self._applied, applied)), axis=0)
-        self._variation = _continued(self._variation, np.abs(differences))
+        self._variation = continued(self._variation, np.abs(differences))
         self._peak = np.maximum(self._peak, np.abs(commanded).max(axis=0))
         self._outside += ((commanded < self._lower) | (commanded > self._upper)).sum(axis=0)
         self.steps += len(time)
@@ -134,7 +134,7 @@ class _Effort:
         }
 
 
-def _continued(total: np.ndarray, terms: np.ndarray) -> np.ndarray:
+def continued(total: np.ndarray, terms: np.ndarray) -> np.ndarray:
     """A sum over rows, continued in their order."""
     continued: np.ndarray = np.vstack((total, terms)).sum(axis=0)
     return continued

@@ -33,6 +33,8 @@ POSITION, ATTITUDE = _group("plant.eta", AXES), _group("plant.eta", EULER)
 POSTURE = (*POSITION, *ATTITUDE)
 #: nu [m/s, rad/s], body frame.
 NU = _group("plant.nu", DIRECTIONS)
+#: Sway and heave, of which nothing is commanded.
+DRIFT = _group("plant.nu", ("v", "w"))
 #: Velocity of the control point [m/s].
 DY = _group("plant.dy", AXES)
 #: tau as commanded, and as (3) lets it through [N, N.m].

@@ -10,6 +10,7 @@ from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import FMI, KINDS, NATIVE, PYTHON
 from orchestrator.experiments.preparation import Request
 from orchestrator.master.experiment import ORDERS
+from orchestrator.master.loop import LOOPS
 from orchestrator.master.observer import Ending
 from orchestrator.system.names import PortName, port_name
 
@@ -54,6 +55,17 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
         default=PYTHON,
         help="of the bundle's FMUs: Python sources, or their translation to C, with the same "
         f"numbers; default: {PYTHON}",
+    )
+
+
+def add_loop(parser: argparse.ArgumentParser) -> None:
+    """What makes the steps."""
+    parser.add_argument(
+        "--loop",
+        choices=LOOPS,
+        default=LOOPS[0],
+        help="what makes the steps: Python, or a loop in C; the rows are the same; default: auto, "
+        "the compiled one where it is to be had",
     )
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from orchestrator.analysis.metrics import LAST_SECONDS
 from orchestrator.commands.options import (
     add_experiment,
+    add_loop,
     add_out,
     add_set,
     add_system,
@@ -27,7 +28,6 @@ from orchestrator.experiments.run import Files, run_into
 from orchestrator.master.files import FORMATS
 from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.isolated import STEP_TIMEOUT, isolation_of
-from orchestrator.master.loop import LOOPS
 
 
 def add_to(commands: Any) -> None:
@@ -67,13 +67,7 @@ def add_to(commands: Any) -> None:
         help="how long an isolated FMU may take for one call [s]; "
         f"default: {STEP_TIMEOUT:g}; needs --isolate",
     )
-    run.add_argument(
-        "--loop",
-        choices=LOOPS,
-        default=LOOPS[0],
-        help="what makes the steps: Python, or a loop in C; the rows are the same; default: auto, "
-        "the compiled one where it is to be had",
-    )
+    add_loop(run)
     run.set_defaults(action=_run)
 
 

@@ -3,6 +3,7 @@
 ========================  ============================================================
 module                    what it holds
 ========================  ============================================================
+:mod:`.entries`           what a file of the user's may hold
 :mod:`.scenario`          scenario files
 :mod:`.scenario_page`     their reference page
 :mod:`.wiring`            which FMUs there are, and which ports feed which

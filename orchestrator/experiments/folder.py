@@ -61,7 +61,7 @@ def replaced(folder: Path, keep: Callable[[], bool] = lambda: False) -> Iterator
     made = not os.path.exists(folder)  # noqa: PTH110  # Path.exists raises without permission
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with _locked(folder):
+        with locked(folder):
             # Whoever has left these was killed: the lock is ours.
             for left in folder.glob(f"{_UNFINISHED}*"):
                 rmtree(left)
@@ -102,7 +102,7 @@ def settle(folder: Path) -> None:
     """
     if any((place / _WHOLE).is_dir() for place in (folder, folder / INCOMPLETE)):
         try:
-            with _locked(folder):
+            with locked(folder):
                 _settle(folder)
         except OSError as error:
             raise InputError(_cannot_write(folder, error)) from error
@@ -149,7 +149,7 @@ def to_disk(path: Path) -> None:
 
 
 @contextmanager
-def _locked(folder: Path) -> Iterator[None]:
+def locked(folder: Path) -> Iterator[None]:
     """Keep other runs out; the lock ends with the process, however it ends."""
     try:
         with claimed(folder):

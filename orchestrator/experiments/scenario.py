@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from orchestrator.errors import InputError, did_you_mean, shortened
+from orchestrator.errors import InputError, did_you_mean
+from orchestrator.experiments.entries import (
+    Entry,
+    are_names,
+    check_entries,
+    flattened,
+    is_number,
+    is_table,
+    is_text,
+)
 from orchestrator.reading import explained, text_of
 from orchestrator.system.names import PortName, port_name
 
@@ -50,81 +59,46 @@ class Scenario:
         return self.label or self.name
 
 
-class Entry(NamedTuple):
-    """An entry of a scenario file.
-
-    Attributes:
-        kind: what its value is, in words.
-        fits: whether a value is of that kind.
-        meaning: what it does.
-        default: what goes without it, in words.
-
-    """
-
-    kind: str
-    fits: Callable[[Any], bool]
-    meaning: str
-    default: str
-
-
-def _is_text(value: Any) -> bool:
-    return isinstance(value, str)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
-def _are_names(value: Any) -> bool:
-    return isinstance(value, list) and all(map(_is_text, value))
-
-
-def _is_table(value: Any) -> bool:
-    return isinstance(value, dict)
-
-
 def _is_table_of_names(value: Any) -> bool:
-    return isinstance(value, dict) and all(map(_is_text, value.values()))
+    return is_table(value) and all(map(is_text, value.values()))
 
 
 def _is_table_of_wires(value: Any) -> bool:
-    return isinstance(value, dict) and all(_is_text(v) or v is False for v in value.values())
+    return is_table(value) and all(is_text(v) or v is False for v in value.values())
 
 
 #: What a scenario file may hold, in the order of the reference page.
 ENTRIES: dict[str, Entry] = {
     "title": Entry(
         "text",
-        _is_text,
+        is_text,
         "Heading of the figures and of the section in the report.",
         "the name of the file",
     ),
     "label": Entry(
         "text",
-        _is_text,
+        is_text,
         "Name of its lines where two runs are drawn together.",
         "the name of the file",
     ),
-    "figure": Entry("text", _is_text, "Which figure to draw.", "`tracking`"),
+    "figure": Entry("text", is_text, "Which figure to draw.", "`tracking`"),
     "compare": Entry(
         "text",
-        _is_text,
+        is_text,
         "A scenario that is run and drawn together with this one: a name, or the path of a .toml "
         "file, relative to this one. What this scenario and the command line set goes for both, "
         "as far as both have it.",
         "none",
     ),
-    "stop_time": Entry("number", _is_number, "End of the run [s].", "100 s"),
-    "step": Entry("number", _is_number, "Communication step [s].", "0.02 s"),
+    "stop_time": Entry("number", is_number, "End of the run [s].", "100 s"),
+    "step": Entry("number", is_number, "Communication step [s].", "0.02 s"),
     "only": Entry(
         "list of names",
-        _are_names,
+        are_names,
         "The components to keep; the wires of the others go with them.",
         "all of them",
     ),
-    "remark": Entry(
-        "text", _is_text, "What the report says below the figure, in Markdown.", "none"
-    ),
+    "remark": Entry("text", is_text, "What the report says below the figure, in Markdown.", "none"),
     "components": Entry(
         "table of names",
         _is_table_of_names,
@@ -143,14 +117,14 @@ ENTRIES: dict[str, Entry] = {
     ),
     "parameters": Entry(
         "table of values",
-        _is_table,
+        is_table,
         "Parameters, and inputs that nothing feeds, as `component.parameter = value`. Names with "
         'brackets are quoted: `"controller.K1[1]" = 12.0`.',
         "the FMUs' own",
     ),
     "ours": Entry(
         "table of texts",
-        _is_table,
+        is_table,
         'Which of the values above are not the paper\'s, and why: `stop_time = "why"`, '
         '`plant.noise.std = "why"`.',
         "none",
@@ -183,19 +157,11 @@ def read_scenario(name: str) -> Scenario:
 
 def _scenario(path: Path, text: str) -> Scenario:
     content = tomllib.loads(text)
-    for key, value in content.items():
-        if key not in ENTRIES:
-            hint = did_you_mean(key, ENTRIES) or f"; use {', '.join(ENTRIES)}"
-            raise InputError(f"{path}: unknown entry {key!r}{hint}")
-        if not ENTRIES[key].fits(value):
-            shown = shortened(repr(value))
-            raise InputError(
-                f"{path}: {key} = {shown} is of the wrong type, not a {ENTRIES[key].kind}"
-            )
+    check_entries(path, content, ENTRIES)
     content["parameters"] = {
-        port_name(key): value for key, value in _flattened(content.get("parameters", {}))
+        port_name(key): value for key, value in flattened(content.get("parameters", {}))
     }
-    content["ours"] = {key: str(why) for key, why in _flattened(content.get("ours", {}))}
+    content["ours"] = {key: str(why) for key, why in flattened(content.get("ours", {}))}
     content["components"] = {
         component: str(path.parent / fmu) if fmu.endswith(".fmu") else fmu
         for component, fmu in content.get("components", {}).items()
@@ -203,12 +169,3 @@ def _scenario(path: Path, text: str) -> Scenario:
     if content.get("compare", "").endswith(".toml"):
         content["compare"] = str(path.parent / content["compare"])
     return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
-
-
-def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    for key, value in table.items():
-        name = f"{prefix}.{key}" if prefix else key
-        if isinstance(value, dict):
-            yield from _flattened(value, name)
-        else:
-            yield name, value

@@ -165,3 +165,16 @@ def held_interrupts(
     heeded = [n for n in _STOPS if signal.getsignal(n) not in (signal.SIG_IGN, None)]
     with _handled(heeded, interrupts.take):
         yield interrupts
+
+
+@contextmanager
+def without_interrupt() -> Iterator[None]:
+    """Threads and processes that are started here never see Ctrl-C, which is for this to answer."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

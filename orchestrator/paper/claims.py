@@ -23,6 +23,7 @@ from orchestrator.paper.measures import (
     largest_estimate,
     total_variation_until,
     turning_radius,
+    way_of,
 )
 from orchestrator.paper.outcomes import Outcome
 from orchestrator.paper.published import (
@@ -33,6 +34,7 @@ from orchestrator.paper.published import (
     TURNING_RADIUS,
 )
 from orchestrator.paper.runs import Run
+from orchestrator.studies.engine import REACHED
 
 #: The runs of the figures, and what the claims change in them.
 FIVE, FIVE_PD = Run("fig5"), Run("fig5-pd")
@@ -188,6 +190,29 @@ def effort_as_printed(five: Outcome, pd: Outcome) -> Finding:
     return Finding(
         f"{actuator_values(proposed)}, and {actuator_values(baseline)}",
         f"{said(bool(holds))}: an RMS of signals within 80 cannot exceed 80 (reading 6)",
+    )
+
+
+@claim(
+    "4.2: the surge efforts, against the impulse that the way to the reference takes",
+    f"{EFFORT_PROPOSED[0]:g}, and {EFFORT_PD[0]:g} N{_SQUARED}",
+    FIVE,
+    FIVE_PD,
+)
+def effort_of_the_way(five: Outcome, pd: Outcome) -> Finding:
+    """No course of the force gives that impulse in that time with the printed effort."""
+    ways = [found for run in (five, pd) if (found := way_of(run.table))]
+    published = EFFORT_PROPOSED[0], EFFORT_PD[0]
+    if len(ways) < len(published):
+        return Finding(f"|e| does not come to {REACHED:g} m", "none")
+    least = [found.least_effort for found in ways]
+    soonest = [found.soonest(effort) for found, effort in zip(ways, published, strict=True)]
+    took = ", and ".join(f"{found.impulse:.4g} N·s in {found.duration:.3g} s" for found in ways)
+    return Finding(
+        f"{took}, until |e| is {REACHED:g} m: not below {numbers(least)} N{_SQUARED} (Cauchy and "
+        "Schwarz)",
+        f"{said(all(np.less_equal(least, published)))}: the printed efforts give these impulses in "
+        f"{numbers(soonest)} s at the soonest",
     )
 
 

@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 from tqdm import tqdm
 
 from orchestrator.errors import InputError, reason
-from orchestrator.master.interrupts import Interrupts, held_interrupts
+from orchestrator.master.interrupts import Interrupts, held_interrupts, without_interrupt
 from orchestrator.system.leftovers import process_folder
 
 #: How long the loop waits before it asks whether it shall stop [s].
@@ -54,7 +54,7 @@ class Workers:
         with tqdm(total=len(tasks), unit=unit, disable=None) as bar:
             while True:
                 # No more than can be begun: what a process has been given it cannot give back.
-                with _without_interrupt(), _started():
+                with without_interrupt(), _started():
                     for key, task in islice(left, self._n - len(keys)):
                         keys[self._pool.submit(task)] = key
                 if not keys:
@@ -114,19 +114,6 @@ def _started() -> Iterator[None]:
         yield
     except (OSError, RuntimeError) as error:
         raise InputError(f"no process can be started: {reason(error)}") from error
-
-
-@contextmanager
-def _without_interrupt() -> Iterator[None]:
-    """Processes that are started here never see Ctrl-C, which is for this one to answer."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin() -> None:

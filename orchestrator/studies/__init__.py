@@ -4,7 +4,14 @@
 module              what it holds
 ==================  ==================================================================
 :mod:`.engine`      a run of a study, what comes out of it, and what makes it
+:mod:`.study`       a study file, read and checked
+:mod:`.space`       the runs of a study: which values each of them has
+:mod:`.fmu_engine`  runs of FMUs
+:mod:`.indices`     what comes out of a run, from its rows
+:mod:`.store`       what has come out of a study, as it comes and at the end
+:mod:`.cluster`     who makes which runs, and where: Dask
+:mod:`.sweep`       a study as a whole
 ==================  ==================================================================
 
-A study needs the packages of the extra `studies`.
+A study needs the packages of the extra `studies`, which are imported when they are needed.
 """

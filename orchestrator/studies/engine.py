@@ -95,7 +95,16 @@ class Engine(Protocol):
     It is pickled, and travels to workers with everything that it needs, FMUs included: they share
     no file system with whoever sends it. What is unpacked or compiled on a worker is kept there for
     the runs that follow.
+
+    Attributes:
+        digest: of everything that the numbers depend on; it also names what is kept on workers.
+
     """
+
+    @property
+    def digest(self) -> str:
+        """A text in hexadecimal digits."""
+        ...
 
     def outcomes(self, runs: Sequence[Run]) -> Iterator[Outcome]:
         """Make some runs, in their order.

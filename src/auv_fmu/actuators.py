@@ -1,7 +1,8 @@
-"""The limits of the actuators: equation (3)."""
+"""The limits of the actuators, equation (3), and the dynamics that Remark 2 leaves out."""
 
 from __future__ import annotations
 
+from math import exp
 from typing import NamedTuple
 
 from auv_fmu.types import Vector3
@@ -35,4 +36,26 @@ def limit_all(tau: Vector3, tau_min: Vector3, tau_max: Vector3) -> Vector3:
         limit(tau[0], tau_min[0], tau_max[0]),
         limit(tau[1], tau_min[1], tau_max[1]),
         limit(tau[2], tau_min[2], tau_max[2]),
+    )
+
+
+def respond(before: float, tau_k: float, T: float, h: float) -> float:
+    """One actuator of first order, T dtau_a/dt = tau_k - tau_a, after a step: exactly.
+
+    Args:
+        before: what it gave at the beginning of the step [N, N.m].
+        tau_k: what it is to give, held during the step, within the limits of (3).
+        T: its time constant [s]; 0: it follows at once.
+        h: step [s].
+
+    """
+    return tau_k + (before - tau_k) * exp(-h / T) if T else tau_k
+
+
+def respond_all(before: Vector3, tau: Vector3, T: Vector3, h: float) -> Vector3:
+    """The actuators u, q, r after a step."""
+    return (
+        respond(before[0], tau[0], T[0], h),
+        respond(before[1], tau[1], T[1], h),
+        respond(before[2], tau[2], T[2], h),
     )

@@ -51,6 +51,17 @@ def rotate(rotation: Rotation, x: Vector3) -> Vector3:
     )
 
 
+def rotate_back(rotation: Rotation, x: Vector3) -> Vector3:
+    """R^T x: a vector from the earth frame to the body frame."""
+    (a0, a1, a2), (b0, b1, b2), (c0, c1, c2) = rotation
+    x0, x1, x2 = x
+    return (
+        a0 * x0 + a1 * x1 + a2 * x2,
+        b0 * x0 + b1 * x1 + b2 * x2,
+        c0 * x0 + c1 * x1 + c2 * x2,
+    )
+
+
 def quaternion_from_euler(phi: float, theta: float, psi: float) -> Vector4:
     """Unit quaternion (scalar first) of the same rotation as :func:`rotation_from_euler`."""
     c_phi, s_phi = cos(phi / 2), sin(phi / 2)
@@ -84,6 +95,12 @@ def euler_from_rotation(rotation: Rotation) -> Vector3:
     # A product of rounded quaternion components can leave [-1, 1] by one unit in the last place.
     sin_theta = -1.0 if r31 > 1.0 else 1.0 if r31 < -1.0 else -r31
     return atan2(r32, r33), asin(sin_theta), atan2(r21, r11)
+
+
+def euler_without_roll(rotation: Rotation) -> Vector3:
+    """Roll, pitch and yaw [rad] of a rotation whose roll is zero: beyond the vertical, too."""
+    (_, _, r31), (r12, r22, _), (_, _, r33) = rotation
+    return 0.0, atan2(-r31, r33), atan2(-r12, r22)
 
 
 def quaternion_rates(quaternion: Vector4, omega: Vector3) -> Vector4:

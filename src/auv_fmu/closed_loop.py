@@ -1,38 +1,47 @@
 """The paper's Fig. 2 as one straight line of Python: no FMI, no master, no ports.
 
-Everything else that runs this loop is held against it.
+Everything else that runs this loop is held against it. What happens at an instant and between two
+of them is written as functions of the language of equations, so that it can be compiled;
+:func:`closed_loop` puts them in a row.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
-from auv_fmu import motion_planner, output_feedback, plant
-from auv_fmu.actuators import Limits, limit_all
-from auv_fmu.attitude import rotation_from_quaternion
+from auv_fmu import motion_planner, output_feedback, pd, plant
 from auv_fmu.disturbance import Disturbance, disturbance
-from auv_fmu.euler import STEP
-from auv_fmu.motion_planner import ETA_D0, TAU_D, PlannerState, Reference
+from auv_fmu.euler import STEP, internal_steps, longest_step
+from auv_fmu.motion_planner import Motion, PlannerState, Reference
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement, Signals
-from auv_fmu.plant import ETA_0, NU_0, Localisation, PlantOutputs, PlantState, RollAxis
-from auv_fmu.types import Vector3, Vector5, Vector6
-from auv_fmu.vehicle import Vehicle
+from auv_fmu.pd import PdGains, PdMeasurement, PdSignals
+from auv_fmu.plant import PlantOutputs, PlantState
+from auv_fmu.types import Rotation, Vector3, Vector4, Vector6
+
+#: Before the first instant.
+_NO_COMMAND: Vector3 = (0.0, 0.0, 0.0)
+
+
+class LongestSteps(NamedTuple):
+    """Largest internal step of each component [s]; a longer step is split evenly."""
+
+    plant: float = STEP
+    controller: float = STEP
+    planner: float = STEP
 
 
 class Setting(NamedTuple):
-    """Parameters of every block of Fig. 2, with the values of section 4.1: the run of Fig. 4."""
+    """Parameters of every block of Fig. 2, with the values of section 4.1: the run of Fig. 4.
 
-    vehicle: Vehicle = Vehicle()  #: also the planner's
-    roll: RollAxis = RollAxis()
-    limits: Limits = Limits()
-    eta_0: Vector6 = ETA_0  #: initial posture (x, y, z, phi, theta, psi) [m, rad]
-    nu_0: Vector6 = NU_0  #: initial velocity (u, v, w, p, q, r) [m/s, rad/s]
-    localisation: Localisation = Localisation()
+    Each block has its own, the distance ell and the vehicle too, as the components have.
+    """
+
+    plant: plant.Parameters = plant.Parameters()
+    controller: Gains | PdGains = Gains()  #: the proposed controller, or the PD one
     disturbance: Disturbance = Disturbance()
-    gains: Gains = Gains()  #: with the distance ell of all control points
-    tau_d: Vector3 = TAU_D  #: drives the reference (u, q, r) [N, N.m]
-    eta_d0: Vector5 = ETA_D0  #: initial posture of the reference (x, y, z, theta, psi) [m, rad]
+    planner: motion_planner.Parameters = motion_planner.Parameters()
+    h_max: LongestSteps = LongestSteps()
     h: float = STEP  #: [s]
 
 
@@ -40,55 +49,214 @@ class Setting(NamedTuple):
 PAPER = Setting()
 
 
+class Splits(NamedTuple):
+    """How many internal steps each component makes of a step."""
+
+    plant: int
+    controller: int
+    planner: int
+
+
+def splits(setting: Setting, h: float) -> Splits:
+    """How a step of h seconds is split."""
+    longest = setting.h_max
+    return Splits(
+        internal_steps(h, longest_step(longest.plant)),
+        internal_steps(h, longest_step(longest.controller)),
+        internal_steps(h, longest_step(longest.planner)),
+    )
+
+
+class Vehicles(NamedTuple):
+    """The vehicle and that of the reference."""
+
+    plant: PlantState
+    rotation: Rotation  #: attitude of the first, body to earth
+    planner: PlannerState
+    moving: Motion  #: of the second
+
+
+class Scene(NamedTuple):
+    """What both show at one instant."""
+
+    plant: PlantOutputs
+    y: Vector3  #: measured control point [m]
+    reference: Reference
+    tau_w: Vector6  #: disturbance (u, v, w, p, q, r) [N, N.m]
+
+
+def begin(setting: Setting) -> Vehicles:
+    """Both vehicles at the start."""
+    state, rotation = plant.begin(setting.plant, _NO_COMMAND)
+    planned, moving = motion_planner.begin(setting.planner)
+    return Vehicles(state, rotation, planned, moving)
+
+
+def scene(setting: Setting, vehicles: Vehicles, t: float, n: Vector3) -> Scene:
+    """What is seen of both vehicles at time t [s].
+
+    Args:
+        setting: of the loop.
+        vehicles: at that time.
+        t: time [s].
+        n: three independent standard normal numbers, of the localisation system.
+
+    """
+    seen = plant.outputs(setting.plant, vehicles.plant, vehicles.rotation)
+    return Scene(
+        seen,
+        plant.measure(seen.y, n, setting.plant.noise.std),
+        motion_planner.reference(vehicles.planner, vehicles.moving, setting.planner.ell),
+        disturbance(setting.disturbance, seen.nu, t),
+    )
+
+
+def move(
+    setting: Setting, vehicles: Vehicles, tau: Vector3, tau_w: Vector6, h: float, parts: Splits
+) -> Vehicles:
+    """Both vehicles one step later.
+
+    Args:
+        setting: of the loop.
+        vehicles: at the beginning of the step.
+        tau: (tau_u, tau_q, tau_r) after the limits of (3) [N, N.m].
+        tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
+        h: step [s].
+        parts: that the step is split into.
+
+    """
+    state, rotation = plant.steps(
+        setting.plant,
+        vehicles.plant,
+        vehicles.rotation,
+        tau,
+        tau_w,
+        h / parts.plant,
+        parts.plant,
+    )
+    planned, moving = motion_planner.steps(
+        setting.planner, vehicles.planner, vehicles.moving, h / parts.planner, parts.planner
+    )
+    return Vehicles(state, rotation, planned, moving)
+
+
+def sampled(gains: Gains, h: float) -> Gains:
+    """Gains of the proposed controller for steps of h seconds."""
+    return output_feedback.sampled(gains, h)
+
+
+def start(gains: Gains, seen: Scene) -> ControllerState:
+    """State of the proposed controller at the start."""
+    return output_feedback.initial_state(gains, seen.y)
+
+
+def command(gains: Gains, state: ControllerState, seen: Scene) -> tuple[ControllerState, Signals]:
+    """What the proposed controller goes on from at an instant, and its signals."""
+    state = output_feedback.gated(gains, state, seen.y)
+    return state, output_feedback.evaluate(gains, state, measurement(seen))
+
+
+def steps(
+    gains: Gains, state: ControllerState, signals: Signals, seen: Scene, h: float, n: int
+) -> ControllerState:
+    """State of the proposed controller after n steps of h seconds."""
+    return output_feedback.steps(gains, state, signals, measurement(seen), h, n)
+
+
+def measurement(seen: Scene) -> Measurement:
+    """What the proposed controller is told."""
+    y_d, dy_d, ddy_d = seen.reference
+    return Measurement(seen.y, seen.plant.euler, y_d, dy_d, ddy_d)
+
+
+def pd_sampled(gains: PdGains, h: float) -> PdGains:
+    """Gains of the PD controller for steps of h seconds."""
+    return gains
+
+
+def pd_start(gains: PdGains, seen: Scene) -> Vector4:
+    """State of the PD controller at the start."""
+    return gains.theta_0
+
+
+def pd_command(gains: PdGains, theta_hat: Vector4, seen: Scene) -> tuple[Vector4, PdSignals]:
+    """What the PD controller goes on from at an instant, and its signals."""
+    return theta_hat, pd.evaluate(gains, theta_hat, pd_measurement(seen))
+
+
+def pd_steps(
+    gains: PdGains, theta_hat: Vector4, signals: PdSignals, seen: Scene, h: float, n: int
+) -> Vector4:
+    """State of the PD controller after n steps of h seconds."""
+    return pd.steps(gains, theta_hat, signals, pd_measurement(seen), h, n)
+
+
+def pd_measurement(seen: Scene) -> PdMeasurement:
+    """What the PD controller is told."""
+    y_d, dy_d, ddy_d = seen.reference
+    return PdMeasurement(seen.y, seen.plant.euler, y_d, dy_d, ddy_d, seen.plant.dy)
+
+
+class Law(NamedTuple):
+    """A controller in the loop: how it starts, what it commands, how its state goes on.
+
+    All are given the gains of a step, which the first makes of those that are set.
+    """
+
+    sampled: Callable[[Any, float], Any]
+    start: Callable[[Any, Scene], Any]
+    command: Callable[[Any, Any, Scene], tuple[Any, Any]]
+    steps: Callable[[Any, Any, Any, Scene, float, int], Any]
+
+
+#: The controller that goes with a set of gains.
+LAWS: dict[type, Law] = {
+    Gains: Law(sampled, start, command, steps),
+    PdGains: Law(pd_sampled, pd_start, pd_command, pd_steps),
+}
+
+
 class Instant(NamedTuple):
     """All signals of Fig. 2 at one time t_k."""
 
     t: float  #: [s]
-    plant_state: PlantState
-    plant_outputs: PlantOutputs
-    planner_state: PlannerState
-    reference: Reference
-    measurement: Measurement
-    controller_state: ControllerState
-    signals: Signals
-    tau: Vector3  #: applied (tau_u, tau_q, tau_r), after the limits of (3) [N, N.m]
-    tau_w: Vector6  #: disturbance (u, v, w, p, q, r) [N, N.m]
+    vehicles: Vehicles
+    scene: Scene
+    controller_state: ControllerState | Vector4  #: of the PD controller theta_hat
+    signals: Signals | PdSignals
+    command: Vector3  #: (tau_u, tau_q, tau_r) as it reaches the actuators [N, N.m]
+    tau: Vector3  #: what the limits of (3) leave of it [N, N.m]
+    tau_w: Vector6  #: disturbance that acts (u, v, w, p, q, r) [N, N.m]
 
 
-def closed_loop(steps: int, setting: Setting = PAPER) -> Iterator[Instant]:
+def closed_loop(count: int, setting: Setting = PAPER, delayed: bool = False) -> Iterator[Instant]:
     """The loop in the paper's Euler scheme: all signals at t_k, then all states advance.
 
     Args:
-        steps: to take.
+        count: steps to take.
         setting: of the loop.
+        delayed: the command and the disturbance act one step late, as in Jacobi order (reading 5).
 
     Yields:
-        The instants t_0 = 0 to t_steps, one more than steps.
+        The instants t_0 = 0 to t_count, one more than steps.
 
     """
-    vehicle, gains, tau_d, h = setting.vehicle, setting.gains, setting.tau_d, setting.h
-    roll, waves = setting.roll, setting.disturbance
-    tau_min, tau_max = setting.limits
-    std, seed = setting.localisation
-    gauss = plant.white_noise(seed).gauss
-    state = plant.initial_state(setting.eta_0[:3], setting.eta_0[3:], setting.nu_0)
-    planned = motion_planner.initial_state(setting.eta_d0)
-    for k in range(steps + 1):
-        rotation = rotation_from_quaternion(state.quaternion)
-        seen = plant.outputs(state, rotation, gains.ell)
-        y = plant.measure(seen.y, (gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)), std)
-        moving = motion_planner.motion(vehicle, planned, tau_d)
-        reference = motion_planner.reference(planned, moving, gains.ell)
-        measurement = Measurement(y, seen.euler, *reference)
+    law, h = LAWS[type(setting.controller)], setting.h
+    gauss = plant.white_noise(setting.plant.noise.seed).gauss
+    parts = splits(setting, h)
+    gains = law.sampled(setting.controller, h / parts.controller)
+    vehicles = begin(setting)
+    before = None
+    for k in range(count + 1):
+        n = gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)
+        seen = scene(setting, vehicles, k * h, n)
         if k == 0:
-            control = output_feedback.initial_state(gains, y)
-        control = output_feedback.gated(gains, control, y)
-        signals = output_feedback.evaluate(gains, control, measurement)
-        tau = limit_all(signals.tau, tau_min, tau_max)
-        tau_w = disturbance(waves, state.nu, k * h)
-        yield Instant(
-            k * h, state, seen, planned, reference, measurement, control, signals, tau, tau_w
-        )
-        control = output_feedback.step(control, signals, h)
-        state = plant.step(vehicle, roll, state, rotation, tau, tau_w, h)
-        planned = motion_planner.step(planned, moving, h)
+            control = law.start(gains, seen)
+        control, signals = law.command(gains, control, seen)
+        now = signals.tau, seen.tau_w
+        told, tau_w = before if before and delayed else now
+        before = now
+        tau = plant.applied(setting.plant, told)
+        yield Instant(k * h, vehicles, seen, control, signals, told, tau, tau_w)
+        control = law.steps(gains, control, signals, seen, h / parts.controller, parts.controller)
+        vehicles = move(setting, vehicles, tau, tau_w, h, parts)

@@ -6,10 +6,36 @@ module takes each state x to x + h dx/dt.
 
 from __future__ import annotations
 
+from math import ceil
+
 from auv_fmu.types import Vector3, Vector4
 
 #: The time step h of section 4.1 [s].
 STEP = 0.02
+
+#: A step may exceed the largest internal one by this share without being split: hosts round time.
+ROUNDING = 1e-9
+
+
+def longest_step(h_max: float) -> float:
+    """The longest step that is not split [s].
+
+    Args:
+        h_max: largest internal step [s].
+
+    """
+    return h_max * (1.0 + ROUNDING)
+
+
+def internal_steps(h: float, longest: float) -> int:
+    """How many equal internal steps a step is split into.
+
+    Args:
+        h: step, not negative [s].
+        longest: that is not split [s].
+
+    """
+    return ceil(h / longest)
 
 
 def advance(x: Vector3, dx: Vector3, h: float) -> Vector3:

@@ -11,7 +11,7 @@ from math import degrees, radians
 from typing import NamedTuple
 
 from auv_fmu.attitude import rotate, rotation_from_euler
-from auv_fmu.control_point import control_point, control_point_velocity
+from auv_fmu.control_point import ELL, control_point, control_point_velocity
 from auv_fmu.types import Rotation, Vector3, Vector5
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 
@@ -20,6 +20,9 @@ TAU_D: Vector3 = (5.0, 1.0, 2.0)
 
 #: Initial posture of section 4.1: x, y, z [m], theta, psi [rad].
 ETA_D0: Vector5 = (0.0, 0.0, -2.0, 0.0, 0.0)
+
+#: Initial velocity (u, v, w, q, r) [m/s, rad/s]: at rest, which section 4.1 does not say.
+NU_D0: Vector5 = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 #: Steepest pitch of the reference [rad]. At 90 degrees (1) has a pole: near it the yaw turns as
 #: fast as one likes, and a step leaps over it.
@@ -30,6 +33,16 @@ _UNDISTURBED = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 class SteepReference(ArithmeticError):
     """The reference vehicle stands on its nose or on its tail."""
+
+
+class Parameters(NamedTuple):
+    """All parameters of the planner."""
+
+    tau_d: Vector3 = TAU_D  #: driving force and moments (u, q, r) [N, N.m]
+    eta0: Vector5 = ETA_D0  #: initial posture (x, y, z, theta, psi) [m, rad]
+    vehicle: Vehicle = Vehicle()  #: the reference vehicle
+    ell: float = ELL  #: distance of its control point [m]
+    nu0: Vector5 = NU_D0  #: initial velocity (u, v, w, q, r) [m/s, rad/s]
 
 
 class PlannerState(NamedTuple):
@@ -56,10 +69,10 @@ class Reference(NamedTuple):
     ddy_d: Vector3  #: [m/s2]
 
 
-def initial_state(eta_d: Vector5) -> PlannerState:
-    """State at rest in the posture eta_d = (x, y, z, theta, psi) [m, rad]."""
+def initial_state(eta_d: Vector5, nu_d: Vector5) -> PlannerState:
+    """State in the posture eta_d = (x, y, z, theta, psi) [m, rad] with the velocity nu_d."""
     x, y, z, theta, psi = eta_d
-    return PlannerState((x, y, z), theta, psi, (0.0, 0.0, 0.0, 0.0, 0.0))
+    return PlannerState((x, y, z), theta, psi, nu_d)
 
 
 def motion(vehicle: Vehicle, state: PlannerState, tau_d: Vector3) -> Motion:
@@ -103,6 +116,31 @@ def step(state: PlannerState, moving: Motion, h: float) -> PlannerState:
         psi + h * dpsi,
         (u + h * du, v + h * dv, w + h * dw, q + h * dq, r + h * dr),
     )
+
+
+def begin(parameters: Parameters) -> tuple[PlannerState, Motion]:
+    """State at the start, and its motion."""
+    state = initial_state(parameters.eta0, parameters.nu0)
+    return state, motion(parameters.vehicle, state, parameters.tau_d)
+
+
+def steps(
+    parameters: Parameters, state: PlannerState, moving: Motion, h: float, n: int
+) -> tuple[PlannerState, Motion]:
+    """State after n steps of h seconds, and its motion.
+
+    Args:
+        parameters: of the planner.
+        state, moving: at the beginning.
+        h: step [s].
+        n: how many.
+
+    """
+    while n > 0:
+        state = step(state, moving, h)
+        moving = motion(parameters.vehicle, state, parameters.tau_d)
+        n -= 1
+    return state, moving
 
 
 def reference(state: PlannerState, moving: Motion, ell: float) -> Reference:

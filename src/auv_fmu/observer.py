@@ -7,7 +7,24 @@ function here has the name of the signal that it states; ddy_hat_o is the rate o
 
 from __future__ import annotations
 
+from math import expm1
+
 from auv_fmu.types import Vector3
+
+#: A form of the observer as a value: which one of these.
+Form = int
+
+#: (51) in Euler's scheme (reading 4).
+EULER: Form = 0
+
+#: The same, with the term -k_d z of the error integrated exactly: :func:`exact_gain`.
+EXACT: Form = 1
+
+#: (24) as it is printed, with an integral that begins at zero.
+INTEGRAL: Form = 2
+
+#: All by the names users select them with.
+FORMS: dict[str, Form] = {"euler": EULER, "exact": EXACT, "integral": INTEGRAL}
 
 
 def dy_hat(dy_hat_o: Vector3, s_z: Vector3, z: Vector3, lambda_: float, k_d: float) -> Vector3:
@@ -62,6 +79,47 @@ def ddy_hat_o(ddy_r: Vector3, s_z: Vector3, lambda_: float, k_d: float) -> Vecto
         ddy_r[1] + k_d * lambda_ * s_z[1],
         ddy_r[2] + k_d * lambda_ * s_z[2],
     )
+
+
+def integrated(dy_r: Vector3, integral: Vector3) -> Vector3:
+    """dy_hat_o = dy_r + k_d Lambda int s(z) [m/s]: equation (24) as it is printed.
+
+    It contradicts the initial condition below it, unless dy_r(0) = 0.
+
+    Args:
+        dy_r: velocity of the virtual reference (16) [m/s].
+        integral: k_d Lambda times the integral of s(z) [m/s].
+
+    """
+    return dy_r[0] + integral[0], dy_r[1] + integral[1], dy_r[2] + integral[2]
+
+
+def integrand(s_z: Vector3, lambda_: float, k_d: float) -> Vector3:
+    """k_d Lambda s(z) [m/s2]: what (24) integrates.
+
+    Args:
+        s_z: s(z) of the estimation error.
+        lambda_: diagonal entry of Lambda [m/s].
+        k_d: observer gain [1/s].
+
+    """
+    return k_d * lambda_ * s_z[0], k_d * lambda_ * s_z[1], k_d * lambda_ * s_z[2]
+
+
+def exact_gain(k_d: float, h: float) -> float:
+    """The gain (1 - exp(-k_d h)) / h [1/s], with which a step takes z to exp(-k_d h) z.
+
+    Not in the paper. It is the mean of k_d exp(-k_d t) over the step, so (23) becomes the mean
+    velocity of a y_hat whose correction k_d z decays as it would between two samples, all else
+    being held. Below 1/h whatever k_d is: no k_d makes the step ring. Holding y itself would not
+    do: (23) would have a vehicle at constant speed k_d h / (1 - exp(-k_d h)) times too fast.
+
+    Args:
+        k_d: observer gain [1/s].
+        h: step [s].
+
+    """
+    return -expm1(-k_d * h) / h
 
 
 def initial_dy_hat_o(s_z: Vector3, z: Vector3, lambda_: float, k_d: float) -> Vector3:

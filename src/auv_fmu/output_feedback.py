@@ -14,6 +14,7 @@ from auv_fmu.adaptation import bound, regressor, robust_force, theta_hat_rate
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import ELL, actuator_command
 from auv_fmu.euler import advance, advance_4
+from auv_fmu.observer import EULER, EXACT, INTEGRAL, Form
 from auv_fmu.saturation import TANH, Saturation, saturation
 from auv_fmu.types import Vector3, Vector4
 from auv_fmu.vectors import difference, distance, norm
@@ -34,6 +35,7 @@ class Gains(NamedTuple):
     s: Saturation = TANH  #: saturation function of Definition 2
     printed_jacobian: bool = False  #: (11) as printed, for zero roll (reading 3)
     innovation_gate: float = 1.0  #: largest credible |y - y_hat| [m], not in the paper; 0: none
+    form: Form = EULER  #: of the observer
 
 
 class Measurement(NamedTuple):
@@ -50,7 +52,7 @@ class ControllerState(NamedTuple):
     """States of the observer and of the adaptive law."""
 
     y_hat: Vector3  #: estimated control point [m]
-    dy_hat_o: Vector3  #: velocity of (23) and (24) [m/s]; dy_o of (18) is another (reading 15)
+    dy_hat_o: Vector3  #: of (23) and (24), or its integral [m/s]; dy_o is another (reading 15)
     theta_hat: Vector4  #: estimated parameters [N, kg/s, kg/m, kg]
 
 
@@ -61,7 +63,7 @@ class Signals(NamedTuple):
     dy_hat: Vector3  #: estimated velocity of the control point [m/s]
     e: Vector3  #: tracking error y - y_d [m]
     z: Vector3  #: estimation error y - y_hat [m]
-    ddy_hat_o: Vector3  #: rate of dy_hat_o [m/s2]
+    ddy_hat_o: Vector3  #: rate of the state dy_hat_o [m/s2]
     dtheta_hat: Vector4  #: rate of theta_hat
 
 
@@ -107,6 +109,33 @@ def restarted(gains: Gains, state: ControllerState, y: Vector3) -> ControllerSta
 def gated(gains: Gains, state: ControllerState, y: Vector3) -> ControllerState:
     """The state, with a restarted observer if the measurement y [m] is not credible."""
     return state if credible(gains, state, y) else restarted(gains, state, y)
+
+
+def sampled(gains: Gains, h: float) -> Gains:
+    """The gains of a step: where the form of the observer is `exact`, k_d follows from the step.
+
+    Args:
+        gains: of the controller.
+        h: step [s].
+
+    """
+    if gains.form != EXACT:
+        return gains
+    return Gains(
+        gains.K1,
+        gains.K2,
+        gains.lambda_,
+        observer.exact_gain(gains.k_d, h),
+        gains.gamma,
+        gains.sigma,
+        gains.theta_0,
+        gains.eps_t,
+        gains.ell,
+        gains.s,
+        gains.printed_jacobian,
+        gains.innovation_gate,
+        gains.form,
+    )
 
 
 def virtual_velocity(dy_d: Vector3, s_ez: Vector3, lambda_: float) -> Vector3:
@@ -188,20 +217,22 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement) -> 
     """The control law at one instant: (16) to (24), or (48) to (51).
 
     Args:
-        gains: of the controller.
+        gains: of the controller, :func:`sampled` for the step that begins there.
         state: of observer and adaptive law.
         measurement: at the same instant.
 
     """
-    K1, K2, lambda_, k_d, gamma, sigma, theta_0, eps_t, ell, s, printed_jacobian, _ = gains
+    K1, K2, lambda_, k_d, gamma, sigma, theta_0, eps_t, ell, s, printed_jacobian, _, form = gains
     y, (phi, theta, psi), y_d, dy_d, ddy_d = measurement
     y_hat, dy_hat_o, theta_hat = state
     e, z = difference(y, y_d), difference(y, y_hat)  # above (16)
     s_z, _ = saturation(s, z)
     s_ez, slope_ez = saturation(s, difference(y_hat, y_d))  # e - z = y_hat - y_d
+    dy_r = virtual_velocity(dy_d, s_ez, lambda_)  # (16)
+    if form == INTEGRAL:
+        dy_hat_o = observer.integrated(dy_r, dy_hat_o)  # (24) as printed
     dy_hat = observer.dy_hat(dy_hat_o, s_z, z, lambda_, k_d)  # (23)
     dy_o = observer.dy_o(dy_hat, s_z, lambda_)  # (18)
-    dy_r = virtual_velocity(dy_d, s_ez, lambda_)  # (16)
     ddy_r = virtual_acceleration(ddy_d, dy_d, dy_hat, slope_ez, lambda_)  # Remark 3
     r_hat_sum = estimated_error_sum(dy_hat, dy_d, s_ez, s_z, lambda_)  # below (21)
     G = regressor(dy_r, ddy_r)  # below (20)
@@ -213,6 +244,8 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement) -> 
     tau = actuator_command(rotation, F, ell)  # (21), J^T F
     dtheta_hat = theta_hat_rate(G, norm(r_hat_sum), theta_hat, theta_0, gamma, sigma)  # (22)
     ddy_hat_o = observer.ddy_hat_o(ddy_r, s_z, lambda_, k_d)  # (51), for (24): reading 4
+    if form == INTEGRAL:
+        ddy_hat_o = observer.integrand(s_z, lambda_, k_d)  # (24) as printed
     return Signals(tau, dy_hat, e, z, ddy_hat_o, dtheta_hat)
 
 
@@ -231,3 +264,28 @@ def step(state: ControllerState, signals: Signals, h: float) -> ControllerState:
         advance(dy_hat_o, signals.ddy_hat_o, h),
         advance_4(theta_hat, signals.dtheta_hat, h),
     )
+
+
+def steps(
+    gains: Gains,
+    state: ControllerState,
+    signals: Signals,
+    measurement: Measurement,
+    h: float,
+    n: int,
+) -> ControllerState:
+    """State after n steps of h seconds under a held measurement.
+
+    Args:
+        gains: of the controller.
+        state, signals: at the beginning.
+        measurement: held.
+        h: step [s].
+        n: how many, one at least.
+
+    """
+    state = step(state, signals, h)
+    while n > 1:
+        state = step(state, evaluate(gains, state, measurement), h)
+        n -= 1
+    return state

@@ -104,3 +104,28 @@ def step(theta_hat: Vector4, signals: PdSignals, h: float) -> Vector4:
 
     """
     return advance_4(theta_hat, signals.dtheta_hat, h)
+
+
+def steps(
+    gains: PdGains,
+    theta_hat: Vector4,
+    signals: PdSignals,
+    measurement: PdMeasurement,
+    h: float,
+    n: int,
+) -> Vector4:
+    """theta_hat after n steps of h seconds under a held measurement.
+
+    Args:
+        gains: of the controller.
+        theta_hat, signals: at the beginning.
+        measurement: held.
+        h: step [s].
+        n: how many, one at least.
+
+    """
+    theta_hat = step(theta_hat, signals, h)
+    while n > 1:
+        theta_hat = step(theta_hat, evaluate(gains, theta_hat, measurement), h)
+        n -= 1
+    return theta_hat

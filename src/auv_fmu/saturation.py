@@ -6,7 +6,7 @@ its value and its slope together, because Remark 3 needs both.
 
 from __future__ import annotations
 
-from math import exp, log, log1p, sqrt, tanh
+from math import atan, exp, log, log1p, pi, sqrt, tanh
 
 from auv_fmu.types import Vector3
 
@@ -17,11 +17,17 @@ Saturation = int
 TANH: Saturation = 0
 ALGEBRAIC: Saturation = 1
 
-#: The same by the names users select them with.
-SATURATIONS: dict[str, Saturation] = {"tanh": TANH, "algebraic": ALGEBRAIC}
+#: One more, whose slope is another: Theorem 2 weighs K_1 with it.
+ARCTAN: Saturation = 2
+
+#: All by the names users select them with.
+SATURATIONS: dict[str, Saturation] = {"tanh": TANH, "algebraic": ALGEBRAIC, "arctan": ARCTAN}
+
+#: Scales the arc tangent to the bound M = 1; its slope at 0.
+_SCALE = 2.0 / pi
 
 #: Largest slope s'_M of Lemma 1 of each.
-MAXIMUM_SLOPE: dict[str, float] = {"tanh": 1.0, "algebraic": 1.0}
+MAXIMUM_SLOPE: dict[str, float] = {"tanh": 1.0, "algebraic": 1.0, "arctan": _SCALE}
 
 #: From here on 1 + xi^2 is xi^2 but for rounding, and not much later too large for a float.
 _LARGE = 1e9
@@ -29,9 +35,11 @@ _LARGE = 1e9
 
 def saturation(s: Saturation, xi: Vector3) -> tuple[Vector3, Vector3]:
     """s(xi) and the diagonal of S'(xi), for the saturation function s."""
+    if s == TANH:
+        return hyperbolic_tangent(xi)
     if s == ALGEBRAIC:
         return algebraic(xi)
-    return hyperbolic_tangent(xi)
+    return arc_tangent(xi)
 
 
 def hyperbolic_tangent(xi: Vector3) -> tuple[Vector3, Vector3]:
@@ -53,6 +61,19 @@ def algebraic(xi: Vector3) -> tuple[Vector3, Vector3]:
     )
 
 
+def arc_tangent(xi: Vector3) -> tuple[Vector3, Vector3]:
+    """(2 / pi) atan(xi_i) and its slopes (2 / pi) / (1 + xi_i^2): M = 1, s'_M = 2 / pi."""
+    xi_1, xi_2, xi_3 = xi
+    return (
+        (_SCALE * atan(xi_1), _SCALE * atan(xi_2), _SCALE * atan(xi_3)),
+        (
+            _SCALE / (1.0 + xi_1 * xi_1),
+            _SCALE / (1.0 + xi_2 * xi_2),
+            _SCALE / (1.0 + xi_3 * xi_3),
+        ),
+    )
+
+
 def root(xi: float) -> float:
     """sqrt(1 + xi^2), without overflow."""
     return sqrt(1.0 + xi * xi) if abs(xi) < _LARGE else abs(xi)
@@ -60,9 +81,11 @@ def root(xi: float) -> float:
 
 def integral(s: Saturation, xi: float) -> float:
     """Integral of s_i from 0 to xi, items (i) and (ii) of Lemma 1."""
+    if s == TANH:
+        return log_cosh(xi)
     if s == ALGEBRAIC:
         return root(xi) - 1.0
-    return log_cosh(xi)
+    return _SCALE * (xi * atan(xi) - log(root(xi)))
 
 
 def log_cosh(xi: float) -> float:

@@ -17,7 +17,8 @@ from auv_fmu import motion_planner, plant
 from auv_fmu.attitude import rotation_from_quaternion
 from auv_fmu.motion_planner import PlannerState
 from auv_fmu.plant import PlantState
-from fmus.motion_planner.ports import PARAMETERS
+from fmus.auv_plant.ports import PARAMETERS as OF_THE_PLANT
+from fmus.motion_planner.ports import PARAMETERS as OF_THE_PLANNER
 from support import states
 from support.calls import CHOICES
 from support.raw import Description, Variable
@@ -174,16 +175,20 @@ def _is_unit(vector: Sequence[float]) -> bool:
 
 
 def _plant(said: dict[str, Any]) -> Iterator[str]:
-    position, quaternion, nu = said["state"]
+    position, quaternion, nu, acting = said["state"]
     if not _is_unit(quaternion):
         yield f"a quaternion that is no unit: {quaternion}"
         return
     yield from _generator(said["hidden"])
     parameters, outputs = said["parameters"], said["outputs"]
-    state = PlantState(position, quaternion, nu)
-    euler, y, dy = plant.outputs(state, rotation_from_quaternion(quaternion), parameters["ell"])
+    state = PlantState(tuple(position), tuple(quaternion), tuple(nu), tuple(acting))
+    rotation = rotation_from_quaternion(state.quaternion)
+    euler, y, dy, over_ground = plant.outputs(OF_THE_PLANT.of(parameters), state, rotation)
+    if not parameters["roll"] and (nu[3] or abs(rotation[1][2]) > TOLERANCE):
+        yield "roll where there is none"
     eta, found_nu, found_y, found_dy, tau = (outputs[i:j] for i, j in pairwise(_PLANT_OUTPUTS))
-    if not _near([*eta, *found_nu, *found_dy], [*position, *euler, *nu, *dy]):
+    shown = [*eta, *found_nu, *found_dy, *tau]
+    if not _near(shown, [*position, *euler, *over_ground, *dy, *acting]):
         yield "outputs that are not those of the state"
     most = _MOST_SIGMAS * parameters["noise.std"] + TOLERANCE * hypot(*y)
     if any(abs(measured - true) > most for measured, true in zip(found_y, y, strict=True)):
@@ -215,7 +220,7 @@ def _generator(hidden: Any) -> Iterator[str]:
 
 def _planner(said: dict[str, Any]) -> Iterator[str]:
     position, theta, psi, nu = said["state"]
-    parameters = PARAMETERS.of(said["parameters"])
+    parameters = OF_THE_PLANNER.of(said["parameters"])
     state = PlannerState(tuple(position), theta, psi, tuple(nu))
     moving = motion_planner.motion(parameters.vehicle, state, parameters.tau_d)
     reference = motion_planner.reference(state, moving, parameters.ell)

@@ -17,33 +17,35 @@ def nodes(tree: ast.AST, kind: type) -> Iterator:
     return (node for node in ast.walk(tree) if isinstance(node, kind))
 
 
-#: Names of the fields of every named tuple.
+#: Names of the fields of every named tuple, by its module and name.
 FIELDS = {
-    node.name: [field.target.id for field in nodes(node, ast.AnnAssign)]
-    for tree in MODULES.values()
+    (module, node.name): [field.target.id for field in nodes(node, ast.AnnAssign)]
+    for module, tree in MODULES.items()
     for node in nodes(tree, ast.ClassDef)
     if "NamedTuple" in map(ast.unparse, node.bases)
 }
 
 
-def named_tuples(function: ast.FunctionDef) -> dict[str, list[str]]:
-    """Arguments of a function that are named tuples, with their fields."""
+def named_tuples(module: str, function: ast.FunctionDef) -> dict[str, list[str]]:
+    """Arguments of a function of a module that are named tuples, with their fields."""
+    known = {name: fields for (where, name), fields in FIELDS.items() if where != module}
+    known |= {name: fields for (where, name), fields in FIELDS.items() if where == module}
     return {
-        argument.arg: FIELDS[ast.unparse(argument.annotation)]
+        argument.arg: known[ast.unparse(argument.annotation)]
         for argument in function.args.args
-        if argument.annotation and ast.unparse(argument.annotation) in FIELDS
+        if argument.annotation and ast.unparse(argument.annotation) in known
     }
 
 
 def test_the_vehicle_is_among_them():
     functions = {f.name: f for f in nodes(MODULES["vehicle"], ast.FunctionDef)}
-    assert "vehicle" in named_tuples(functions["accelerations"])
+    assert "vehicle" in named_tuples("vehicle", functions["accelerations"])
 
 
 @pytest.mark.parametrize("module", MODULES)
 def test_named_tuples_are_unpacked_whole_and_by_the_names_of_their_fields(module):
     for function in nodes(MODULES[module], ast.FunctionDef):
-        arguments = named_tuples(function)
+        arguments = named_tuples(module, function)
         for assignment in nodes(function, ast.Assign):
             fields = arguments.get(ast.unparse(assignment.value))
             if fields and isinstance(assignment.targets[0], ast.Tuple):
@@ -57,5 +59,5 @@ def test_named_tuples_are_unpacked_whole_and_by_the_names_of_their_fields(module
 @pytest.mark.parametrize("module", MODULES)
 def test_named_tuples_are_never_indexed(module):
     for function in nodes(MODULES[module], ast.FunctionDef):
-        named = {*named_tuples(function), "self.vehicle"}
+        named = {*named_tuples(module, function), "self.vehicle"}
         assert not named & {ast.unparse(node.value) for node in nodes(function, ast.Subscript)}

@@ -41,7 +41,10 @@ Arguments = dict[str, Any]
 UNKNOWN = 4_294_967_295
 
 #: Texts that a port takes, which modelDescription.xml has no place for.
-CHOICES = {"saturation": ("tanh", "algebraic")}
+CHOICES = {
+    "saturation": ("tanh", "algebraic", "arctan"),
+    "observer": ("euler", "exact", "integral"),
+}
 
 #: Byte 0xff, which no UTF-8 has, as a string that keeps it (`surrogateescape`).
 NOT_UTF_8 = "\udcff"

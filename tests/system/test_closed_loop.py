@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
-from auv_fmu.closed_loop import Instant, closed_loop
+from auv_fmu.closed_loop import Instant, closed_loop, measurement
 from orchestrator.analysis.metrics import indices
 from orchestrator.analysis.signals import tracking_error, true_control_point
 from orchestrator.experiments.wiring import closed_loop as wired
@@ -51,30 +51,31 @@ def row(now: Instant, before: Instant) -> dict[str, float]:
         for name in names:
             group(name, members, numbers)
 
-    signals, state, measurement = before.signals, before.controller_state, before.measurement
-    seen, planned = now.plant_outputs, now.planner_state
+    signals, state, told = before.signals, before.controller_state, measurement(before.scene)
+    vehicle, seen = now.vehicles.plant, now.scene.plant
+    planned, reference = now.vehicles.planner, now.scene.reference
     both(("plant.tau", "controller.tau"), UQR, signals.tau)
     both(("plant.tau_w", "disturbance.tau_w"), "uvwpqr", before.tau_w)
-    group("disturbance.nu", "uvwpqr", before.plant_state.nu)
-    group("plant.eta", (*XYZ, "phi", "theta", "psi"), (*now.plant_state.position, *seen.euler))
-    group("plant.nu", "uvwpqr", now.plant_state.nu)
-    group("plant.y", XYZ, now.measurement.y)
+    group("disturbance.nu", "uvwpqr", before.vehicles.plant.nu)
+    group("plant.eta", (*XYZ, "phi", "theta", "psi"), (*vehicle.position, *seen.euler))
+    group("plant.nu", "uvwpqr", vehicle.nu)
+    group("plant.y", XYZ, now.scene.y)
     group("plant.dy", XYZ, seen.dy)
     group("plant.tau_applied", UQR, before.tau)
-    group("controller.y", XYZ, measurement.y)
-    group("controller.eta", ("phi", "theta", "psi"), measurement.euler)
-    group("controller.y_d", XYZ, measurement.y_d)
-    group("controller.dy_d", XYZ, measurement.dy_d)
-    group("controller.ddy_d", XYZ, measurement.ddy_d)
+    group("controller.y", XYZ, told.y)
+    group("controller.eta", ("phi", "theta", "psi"), told.euler)
+    group("controller.y_d", XYZ, told.y_d)
+    group("controller.dy_d", XYZ, told.dy_d)
+    group("controller.ddy_d", XYZ, told.ddy_d)
     group("controller.y_hat", XYZ, state.y_hat)
     group("controller.dy_hat", XYZ, signals.dy_hat)
     for i, estimate in enumerate(state.theta_hat, start=1):
         values[f"controller.theta_hat[{i}]"] = estimate
     group("controller.e", XYZ, signals.e)
     group("controller.z", XYZ, signals.z)
-    group("planner.y_d", XYZ, now.reference.y_d)
-    group("planner.dy_d", XYZ, now.reference.dy_d)
-    group("planner.ddy_d", XYZ, now.reference.ddy_d)
+    group("planner.y_d", XYZ, reference.y_d)
+    group("planner.dy_d", XYZ, reference.dy_d)
+    group("planner.ddy_d", XYZ, reference.ddy_d)
     group("planner.eta_d", (*XYZ, "theta", "psi"), (*planned.position, planned.theta, planned.psi))
     return values
 

@@ -73,6 +73,12 @@ static inline double exponential(double x, Error *error) {
     return y;
 }
 
+static inline double exponential_m1(double x, Error *error) {
+    double y = expm1(x);
+    if (isinf(y) && !isinf(x)) raise_error(error, "OverflowError: math range error");
+    return y;
+}
+
 static inline double logarithm(double x, Error *error) {
     if (x <= 0.0) raise_domain_error(error);
     return log(x);
@@ -89,6 +95,7 @@ static inline double logarithm_1p(double x, Error *error) {
 #define SIN(x) sine(x, error)
 #define ASIN(x) arcsine(x, error)
 #define EXP(x) exponential(x, error)
+#define EXPM1(x) exponential_m1(x, error)
 #define LOG(x) logarithm(x, error)
 #define LOG1P(x) logarithm_1p(x, error)
 

@@ -8,23 +8,23 @@ import pytest
 from auv_fmu.closed_loop import Setting, closed_loop
 from auv_fmu.disturbance import Disturbance
 from auv_fmu.output_feedback import Gains
-from auv_fmu.plant import Localisation
+from auv_fmu.plant import Localisation, Parameters
 from auv_fmu.saturation import ALGEBRAIC, TANH
 
-QUIET = Localisation(std=0.0)
+QUIET = Parameters(noise=Localisation(std=0.0))
 
 
 def test_loop_starts_where_section_4_1_says():
     """At rest, level and without noise; sin(0) = sign(0) = 0 leave nothing of (56)."""
-    [start] = closed_loop(0, Setting(localisation=QUIET))
+    [start] = closed_loop(0, Setting(plant=QUIET))
     y, origin = (2.35, 6.0, 0.0), (0.0, 0.0, 0.0)
     assert start.t == 0.0
-    assert start.plant_state == ((2.0, 6.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0,) * 6)
-    assert start.plant_outputs == (origin, y, origin)
-    assert start.planner_state == ((0.0, 0.0, -2.0), 0.0, 0.0, (0.0,) * 5)
+    assert start.vehicles.plant == ((2.0, 6.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0,) * 6, origin)
+    assert start.scene.plant == (origin, y, origin)
+    assert start.vehicles.planner == ((0.0, 0.0, -2.0), 0.0, 0.0, (0.0,) * 5)
     assert start.controller_state == (y, origin, (0.0,) * 4)
-    assert start.measurement.y == y
-    assert start.reference.y_d == (0.35, 0.0, -2.0)
+    assert start.scene.y == y
+    assert start.scene.reference.y_d == (0.35, 0.0, -2.0)
     assert start.signals.e == (2.0, 6.0, 2.0)
     assert start.signals.z == (0.0, 0.0, 0.0)
     assert start.tau_w == (0.0,) * 6
@@ -32,17 +32,17 @@ def test_loop_starts_where_section_4_1_says():
 
 def test_first_step_moves_no_position_but_all_velocities():
     """Euler from rest: positions follow one step after the velocities."""
-    start, first = closed_loop(1, Setting(localisation=QUIET))
+    start, first = closed_loop(1, Setting(plant=QUIET))
     assert first.t == 0.02
-    assert first.plant_state.position == start.plant_state.position
+    assert first.vehicles.plant.position == start.vehicles.plant.position
     tau_u, tau_q, tau_r = start.tau
     expected = (0.02 * tau_u / 25.0, 0.0, 0.0, 0.0, 0.02 * tau_q / 22.5, 0.02 * tau_r / 15.0)
-    assert first.plant_state.nu == pytest.approx(expected, rel=1e-12)
+    assert first.vehicles.plant.nu == pytest.approx(expected, rel=1e-12)
 
 
 def test_disturbance_acts_at_the_time_of_its_instant():
     """(56) without friction, at t_k = k h."""
-    setting = Setting(disturbance=Disturbance(0.0, 2.0, 3.0), localisation=QUIET, h=0.05)
+    setting = Setting(disturbance=Disturbance(0.0, 2.0, 3.0), plant=QUIET, h=0.05)
     for k, instant in enumerate(closed_loop(20, setting)):
         assert instant.t == pytest.approx(0.05 * k)
         assert instant.tau_w == pytest.approx((2.0 * sin(3.0 * 0.05 * k),) * 6)
@@ -51,8 +51,8 @@ def test_disturbance_acts_at_the_time_of_its_instant():
 def test_measurement_has_white_noise_of_the_localisation_systems_deviation():
     """Mean and deviation within five of their own standard deviations, on each axis."""
     std, n = 0.01, 2000
-    run = closed_loop(n - 1, Setting(localisation=Localisation(std, seed=3)))
-    noise = np.array([np.subtract(k.measurement.y, k.plant_outputs.y) for k in run]) / std
+    run = closed_loop(n - 1, Setting(plant=Parameters(noise=Localisation(std, seed=3))))
+    noise = np.array([np.subtract(k.scene.y, k.scene.plant.y) for k in run]) / std
     assert np.abs(noise.mean(axis=0)).max() < 5.0 / sqrt(n)
     assert np.abs(noise.std(axis=0) - 1.0).max() < 5.0 / sqrt(2 * n)
     neighbours = np.corrcoef(np.hstack([noise[:-1], noise[1:]]), rowvar=False)
@@ -61,8 +61,8 @@ def test_measurement_has_white_noise_of_the_localisation_systems_deviation():
 
 def test_noise_is_that_of_its_seed():
     def first(seed):
-        [start] = closed_loop(0, Setting(localisation=Localisation(seed=seed)))
-        return start.measurement.y
+        [start] = closed_loop(0, Setting(plant=Parameters(noise=Localisation(seed=seed))))
+        return start.scene.y
 
     seeds = [1, 2, -1, 0, 2**31 - 1, -(2**31)]
     assert [first(seed) for seed in seeds] == [first(seed) for seed in seeds]
@@ -72,5 +72,5 @@ def test_noise_is_that_of_its_seed():
 @pytest.mark.parametrize("s", [TANH, ALGEBRAIC])
 def test_closed_loop_of_either_saturation_function_converges(s):
     """Theorem 2: the tracking error ends in a ball; 10 cm in 60 s from 6 m for our numbers."""
-    *_, last = closed_loop(3000, Setting(gains=Gains(s=s), localisation=QUIET))
+    *_, last = closed_loop(3000, Setting(controller=Gains(s=s), plant=QUIET))
     assert np.abs(last.signals.e).max() < 0.1

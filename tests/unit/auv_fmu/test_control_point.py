@@ -14,7 +14,7 @@ from auv_fmu.control_point import (
     control_point_velocity,
     jacobian,
 )
-from auv_fmu.plant import RollAxis, initial_state, outputs, step
+from auv_fmu.plant import Parameters, begin, outputs, steps
 from auv_fmu.vehicle import Vehicle
 from support.strategies import angles, forces, lengths, pitch_angles, speeds, vectors
 
@@ -86,12 +86,13 @@ def test_command_does_the_work_of_the_force(euler, force, ell):
 def test_velocity_is_the_derivative_of_the_position_of_a_rolling_vehicle():
     """(10) with the full rotation against a central difference of (9) along a motion."""
     nu, h = (0.8, -0.3, 0.2, 0.7, -0.5, 0.9), 1e-5
-    state = initial_state((1.0, 2.0, 3.0), (0.9, -0.6, 2.0), nu)
-    rotation = rotation_from_quaternion(state.quaternion)
+    parameters = Parameters(eta0=(1.0, 2.0, 3.0, 0.9, -0.6, 2.0), nu0=nu)
+    undriven = (0.0,) * 3
+    state, rotation = begin(parameters, undriven)
 
     def moved_y(dt):
-        moved = step(Vehicle(), RollAxis(), state, rotation, (0.0,) * 3, (0.0,) * 6, dt)
-        return outputs(moved, rotation_from_quaternion(moved.quaternion), 0.35).y
+        moved = steps(parameters, state, rotation, undriven, (0.0,) * 6, dt, 1)
+        return outputs(parameters, *moved).y
 
     difference = np.subtract(moved_y(h), moved_y(-h)) / (2 * h)
-    np.testing.assert_allclose(outputs(state, rotation, 0.35).dy, difference, atol=1e-8)
+    np.testing.assert_allclose(outputs(parameters, state, rotation).dy, difference, atol=1e-8)

@@ -12,8 +12,16 @@ from auv_fmu.output_feedback import ControllerState, Gains, Measurement
 from auv_fmu.saturation import SATURATIONS
 from support.strategies import angles, speeds, vectors
 
-NUMPY = {"tanh": np.tanh, "algebraic": lambda x: x / np.sqrt(1 + x**2)}
-SLOPES = {"tanh": lambda x: 1 / np.cosh(x) ** 2, "algebraic": lambda x: (1 + x**2) ** -1.5}
+NUMPY = {
+    "tanh": np.tanh,
+    "algebraic": lambda x: x / np.sqrt(1 + x**2),
+    "arctan": lambda x: 2 / np.pi * np.arctan(x),
+}
+SLOPES = {
+    "tanh": lambda x: 1 / np.cosh(x) ** 2,
+    "algebraic": lambda x: (1 + x**2) ** -1.5,
+    "arctan": lambda x: 2 / np.pi / (1 + x**2),
+}
 three = vectors(speeds, 3)
 
 

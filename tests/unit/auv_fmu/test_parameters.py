@@ -7,9 +7,10 @@ import pytest
 
 import auv_fmu
 from auv_fmu import control_point, euler
+from auv_fmu.observer import EULER
 from auv_fmu.saturation import TANH
 
-TEN, ZERO_3, ZERO_4, ZERO_6 = (10.0,) * 3, (0.0,) * 3, (0.0,) * 4, (0.0,) * 6
+TEN, ZERO_3, ZERO_4, ZERO_5, ZERO_6 = (10.0,) * 3, *((0.0,) * n for n in (3, 4, 5, 6))
 CONTROLLER = {
     "K1": TEN,
     "lambda_": 1.0,
@@ -38,26 +39,36 @@ SECTION_4_1 = {
     "Disturbance": {"A_f": 0.5, "A_d": 1.0, "omega_d": 0.1},
     "Gains": {**CONTROLLER, "K2": TEN, "k_d": 50.0, "s": TANH},
     "PdGains": CONTROLLER,
-    "Setting": {
-        "eta_0": (2.0, 6.0, 0.0, 0.0, 0.0, 0.0),
+    "plant.Parameters": {"ell": 0.35, "eta0": (2.0, 6.0, 0.0, 0.0, 0.0, 0.0)},
+    "motion_planner.Parameters": {
+        "ell": 0.35,
         "tau_d": (5.0, 1.0, 2.0),
-        "eta_d0": (0.0, 0.0, -2.0, 0.0, 0.0),
-        "h": 0.02,
+        "eta0": (0.0, 0.0, -2.0, 0.0, 0.0),
     },
+    "LongestSteps": dict.fromkeys(("plant", "controller", "planner"), 0.02),
+    "Setting": {"h": 0.02},
 }
 OURS = {
-    "RollAxis": {"righting_roll": 5.0},
+    "RollAxis": {"righting_roll": 5.0, "rolls": True},
     "Localisation": {"std": 0.001, "seed": 1},
-    "Gains": {"printed_jacobian": False, "innovation_gate": 1.0},
+    "Gains": {"printed_jacobian": False, "innovation_gate": 1.0, "form": EULER},
     "PdGains": {"printed_jacobian": False},
-    "Setting": {"nu_0": ZERO_6},
+    "plant.Parameters": {"nu0": ZERO_6, "current": ZERO_3, "T": ZERO_3},
+    "motion_planner.Parameters": {"nu0": ZERO_5},
 }
+
+
+def name_of(kind: type) -> str:
+    """Its name, with its module's where several have it."""
+    module = kind.__module__.rpartition(".")[2]
+    return f"{module}.{kind.__name__}" if kind.__name__ == "Parameters" else kind.__name__
+
 
 #: Every named tuple of the package that has defaults.
 SETS = {
-    name: found
+    name_of(found): found
     for module in walk_packages(auv_fmu.__path__, "auv_fmu.")
-    for name, found in vars(import_module(module.name)).items()
+    for found in vars(import_module(module.name)).values()
     if isinstance(found, type) and getattr(found, "_field_defaults", None)
 }
 
@@ -67,22 +78,33 @@ def test_defaults_are_the_papers_or_named_as_ours(name):
     plain = {
         field: value
         for field, value in SETS[name]._field_defaults.items()
-        if type(value).__name__ not in SETS
+        if name_of(type(value)) not in SETS
     }
     assert plain == {**SECTION_4_1.get(name, {}), **OURS.get(name, {})}
 
 
+def nested(value):
+    return [inner for inner in value if name_of(type(inner)) in SETS]
+
+
 def test_sets_within_the_setting_of_the_loop_are_those_with_all_defaults():
-    nested = [value for value in SETS["Setting"]() if type(value).__name__ in SETS]
-    assert [type(value).__name__ for value in nested] == [
+    blocks = nested(SETS["Setting"]())
+    assert [name_of(type(block)) for block in blocks] == [
+        "plant.Parameters",
+        "Gains",
+        "Disturbance",
+        "motion_planner.Parameters",
+        "LongestSteps",
+    ]
+    inner = [value for block in blocks for value in nested(block)]
+    assert [name_of(type(value)) for value in inner] == [
         "Vehicle",
         "RollAxis",
         "Limits",
         "Localisation",
-        "Disturbance",
-        "Gains",
+        "Vehicle",
     ]
-    assert all(value == type(value)() for value in nested)
+    assert all(value == type(value)() for value in (*blocks, *inner))
 
 
 def test_constants_are_those_of_section_4_1():

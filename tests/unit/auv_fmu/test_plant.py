@@ -9,7 +9,7 @@ from hypothesis import given
 
 from auv_fmu import plant
 from auv_fmu.attitude import rotation_from_euler, rotation_from_quaternion
-from auv_fmu.plant import RollAxis
+from auv_fmu.plant import Parameters, RollAxis
 from auv_fmu.vehicle import Vehicle, accelerations
 from support.strategies import angles, forces, pitch_angles, speeds, vectors
 
@@ -19,6 +19,7 @@ MASSES = np.array([VEHICLE.m11, VEHICLE.m22, VEHICLE.m33, ROLL.m44, VEHICLE.m55,
 DAMPING = np.array([VEHICLE.d11, VEHICLE.d22, VEHICLE.d33, ROLL.d44, VEHICLE.d55, VEHICLE.d66])
 AT_REST = (0.0,) * 6
 UNDRIVEN = (0.0,) * 3
+PARAMETERS = Parameters(VEHICLE, ROLL)
 
 
 @given(nu=vectors(speeds, 6), euler=vectors(angles, 3))
@@ -93,19 +94,23 @@ def test_coriolis_terms_are_those_of_a_diagonal_mass_matrix(nu, euler):
     np.testing.assert_allclose(actual, expected, rtol=1e-12, atol=1e-12)
 
 
-def moved(state, tau, tau_w, h):
+def started(eta0, nu0, parameters=PARAMETERS):
+    return plant.begin(parameters._replace(eta0=eta0, nu0=nu0), UNDRIVEN)[0]
+
+
+def moved(state, tau, tau_w, h, parameters=PARAMETERS, n=1):
     rotation = rotation_from_quaternion(state.quaternion)
-    return plant.step(VEHICLE, ROLL, state, rotation, tau, tau_w, h)
+    return plant.steps(parameters, state, rotation, tau, tau_w, h, n)[0]
 
 
-def seen(state):
-    return plant.outputs(state, rotation_from_quaternion(state.quaternion), 0.35)
+def seen(state, parameters=PARAMETERS):
+    return plant.outputs(parameters, state, rotation_from_quaternion(state.quaternion))
 
 
 def test_surge_under_constant_force_follows_the_analytic_solution_of_euler():
     """u_k = tau/d (1 - (1 - h d/m)^k) when nothing turns."""
     h, tau_u, n = 0.02, 10.0, 500
-    state = plant.initial_state((0.0,) * 3, (0.0,) * 3, AT_REST)
+    state = started((0.0,) * 6, AT_REST)
     for _ in range(n):
         state = moved(state, (tau_u, 0.0, 0.0), AT_REST, h)
     expected = tau_u / VEHICLE.d11 * (1 - (1 - h * VEHICLE.d11 / VEHICLE.m11) ** n)
@@ -114,7 +119,7 @@ def test_surge_under_constant_force_follows_the_analytic_solution_of_euler():
 
 
 def test_vehicle_that_passes_the_vertical_keeps_a_unit_quaternion_and_does_not_jump():
-    state = plant.initial_state((0.0,) * 3, (0.0, 1.3, 0.2), (1.0, 0.0, 0.0, 0.01, 0.9, 0.01))
+    state = started((0.0, 0.0, 0.0, 0.0, 1.3, 0.2), (1.0, 0.0, 0.0, 0.01, 0.9, 0.01))
     steepest, largest_move = 0.0, 0.0
     for _ in range(200):
         before = seen(state)
@@ -140,7 +145,7 @@ def test_seed_is_a_32_bit_integer_read_without_its_sign(seed, same):
 
 @given(euler=vectors(angles, 3), position=vectors(speeds, 3))
 def test_initial_attitude_is_the_one_asked_for(euler, position):
-    state = plant.initial_state(position, euler, AT_REST)
+    state = started((*position, *euler), AT_REST)
     assert state.position == position
     np.testing.assert_allclose(
         rotation_from_quaternion(state.quaternion), rotation_from_euler(*euler), atol=1e-15

@@ -12,8 +12,11 @@ from support.strategies import vectors
 
 numbers = st.floats(-50.0, 50.0)
 positive = st.floats(0.01, 20.0)
-both = pytest.mark.parametrize("name", SATURATIONS)
+every = pytest.mark.parametrize("name", SATURATIONS)
 ROUNDING = 1e-12
+
+#: Below it the products of numbers are rounded to no digits of their own.
+SMALLEST = 1e-300
 
 
 def s(name, xi):
@@ -26,7 +29,7 @@ def slope(name, xi):
     return saturation(SATURATIONS[name], (xi, 0.0, 0.0))[1][0]
 
 
-@both
+@every
 @given(xi=vectors(numbers, 3))
 def test_vectors_are_saturated_component_by_component(name, xi):
     values, slopes = saturation(SATURATIONS[name], xi)
@@ -34,7 +37,7 @@ def test_vectors_are_saturated_component_by_component(name, xi):
     assert slopes == tuple(slope(name, xi_i) for xi_i in xi)
 
 
-@both
+@every
 @given(xi=st.floats(allow_nan=False, allow_infinity=False), other=numbers)
 def test_definition_2(name, xi, other):
     value = s(name, xi)
@@ -44,7 +47,7 @@ def test_definition_2(name, xi, other):
     assert (value <= s(name, other)) or xi > other
 
 
-@both
+@every
 @given(xi=numbers)
 def test_slope_is_the_derivative(name, xi):
     h = 1e-5
@@ -53,7 +56,7 @@ def test_slope_is_the_derivative(name, xi):
     assert 0.0 <= slope(name, xi) <= MAXIMUM_SLOPE[name] == slope(name, 0.0)
 
 
-@both
+@every
 @given(xi=numbers, k=positive)
 def test_lemma_1_i_and_ii(name, xi, k):
     """The integral of s(k r) from 0 to xi is that of s from 0 to k xi, over k."""
@@ -62,10 +65,11 @@ def test_lemma_1_i_and_ii(name, xi, k):
     assert s(name, k * xi) ** 2 / (2 * k * s_M) <= area + slack
     assert area <= k * s_M * xi**2 / 2 + slack
     assert area > 0.0 or abs(k * xi) < 1e-7
-    assert area >= abs(xi) - 1.0 / k - slack
+    # It grows without bound: s has its half of the bound at 1, and does not decrease.
+    assert area >= 0.5 * (abs(xi) - 1.0 / k) - slack
 
 
-@both
+@every
 @given(xi=st.floats(-20.0, 20.0))
 def test_integral_is_the_area_under_the_function(name, xi):
     """Simpson's rule on 2000 intervals."""
@@ -81,7 +85,7 @@ def test_integral_of_tanh_is_the_logarithm_of_cosh(xi):
     assert integral(SATURATIONS["tanh"], xi) == pytest.approx(log(cosh(xi)), abs=1e-12)
 
 
-@both
+@every
 @given(x=numbers, y=numbers, k_1=positive, k_2=positive)
 def test_lemma_1_iii(name, x, y, k_1, k_2):
     s_M = MAXIMUM_SLOPE[name]
@@ -90,21 +94,22 @@ def test_lemma_1_iii(name, x, y, k_1, k_2):
     assert abs(s(name, x) - s(name, x - y)) <= s_M * abs(y) + ROUNDING
 
 
-@both
+@every
 @given(x=vectors(numbers, 3), k=positive, psi=vectors(positive, 3))
 def test_lemma_1_iv_to_vi(name, x, k, psi):
     s_M = MAXIMUM_SLOPE[name]
     for xi in x:
-        assert abs(s(name, k * xi)) <= s_M * k * abs(xi) * (1 + ROUNDING)
+        assert abs(s(name, k * xi)) <= s_M * k * abs(xi) * (1 + ROUNDING) + SMALLEST
         assert s(name, xi) ** 2 <= s_M * xi * s(name, xi) * (1 + ROUNDING)
-        assert s(name, xi) ** 2 <= s_M * xi**2 * (1 + ROUNDING)
+        # As printed (vi) has no square on s'_M; by (iv) it belongs there.
+        assert s(name, xi) ** 2 <= s_M**2 * xi**2 * (1 + ROUNDING)
     values = np.array(saturation(SATURATIONS[name], x)[0])
     left = np.array(x) @ np.diag(psi) @ values
     assert left >= min(psi) * (values @ values) * (1 - ROUNDING)
 
 
-@both
+@every
 @pytest.mark.parametrize("xi", [1e8, 1e9, 1e154, 1e160, 1.7e308])
 def test_no_argument_is_too_large(name, xi):
-    assert s(name, xi) == 1.0 and s(name, -xi) == -1.0
-    assert slope(name, xi) == pytest.approx(0.0, abs=1e-20)
+    assert 1.0 - 1.0 / xi <= s(name, xi) == -s(name, -xi) <= 1.0
+    assert 0.0 <= slope(name, xi) <= 1.0 / xi / xi

@@ -32,7 +32,7 @@ def value(kind: Any, random: Random, wild: float = 0.3) -> Any:
     if kind is float:
         return number(random) if random.random() < wild else random.uniform(-3.0, 3.0)
     if kind in (int, bool):
-        return random.randrange(2)
+        return random.randrange(3 if kind is int else 2)
     if get_origin(kind) is tuple:
         return tuple(value(k, random, wild) for k in get_args(kind))
     parts = {name: value(k, random, wild) for name, k in get_type_hints(kind).items()}

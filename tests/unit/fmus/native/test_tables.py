@@ -90,10 +90,12 @@ def at(structure: Any, member: str) -> Any:
 
 def test_choices_are_the_texts_and_the_numbers_of_the_equations():
     text = tables("fmus.observer_controller")
-    [row] = [row for row in rows("fmus.observer_controller") if row["kind"] == "STRING"]
-    [choices] = re.findall(rf"choice {row['choices']}\[\] = \{{(.*)\}};", text)
-    [port] = [port for port in ports("fmus.observer_controller") if port.kind == "String"]
-    found = {name: int(number) for name, number in re.findall(r'\{"(\w+)", (\d+)\}', choices)}
-    assert found == dict(port.choices)
-    assert float(row["start"]) == found[str(port.start)]
-    assert int(row["n"]) == len(found)
+    described = [row for row in rows("fmus.observer_controller") if row["kind"] == "STRING"]
+    declared = [port for port in ports("fmus.observer_controller") if port.kind == "String"]
+    for row, port in zip(described, declared, strict=True):
+        [choices] = re.findall(rf"choice {row['choices']}\[\] = \{{(.*)\}};", text)
+        numbers = re.findall(r'\{"(\w+)", (\d+)\}', choices)
+        found = {name: int(number) for name, number in numbers}
+        assert found == dict(port.choices)
+        assert float(row["start"]) == found[str(port.start)]
+        assert int(row["n"]) == len(found)

@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.master.table import Table
 from orchestrator.paper import effects
-from orchestrator.paper.effects import EFFECTS, NOISE_LEVELS, show_effect
+from orchestrator.paper.effects import EFFECTS, NOISE_LEVELS, STEPS, show_effect
 from orchestrator.paper.outcomes import Outcome, Outcomes
 
 
@@ -64,6 +64,22 @@ def test_order(tables):
     runs = made(tables["effect-order"], *({"total_variation": each} for each in variations))
     shown = effects.order(*runs)
     assert "proposed 3 in Gauss-Seidel order and 6 in Jacobi order; PD 9 and 408." in shown.text
+
+
+def test_step(tables):
+    """The proposed controller moves by 5 %; tau_q of the PD controller falls from 8 to 5."""
+    proposed = [{"l2_effort": (100.0 - 5.0 * (i > 0), 1.0, 2.0)} for i in range(len(STEPS))]
+    pd = [{"l2_effort": (9.0, 8.0 - i, 7.0)} for i in range(len(STEPS))]
+    shown = effects.step(*made(tables["effect-step"], *proposed, *pd))
+    assert "in tau_q is 8, 7, 6, 5 N·m·√s" in shown.text
+    assert "change by 5 % at most" in shown.text
+    [line, *_] = shown.figure.axes[0].lines
+    assert dict(zip(*line.get_data(), strict=True)) == {
+        0.02: 100.0,
+        0.01: 95.0,
+        0.005: 95.0,
+        0.002: 95.0,
+    }
 
 
 def test_noise(tables):

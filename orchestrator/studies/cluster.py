@@ -1,0 +1,286 @@
+"""Who makes which runs, and where: processes of this machine, or those of a Dask cluster.
+
+Runs go out in blocks, which are tasks of Dask; the outcomes of a block come back together. A block
+whose worker is lost is made again by another worker.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import CancelledError
+from contextlib import ExitStack, contextmanager, suppress
+from itertools import islice
+from logging import CRITICAL
+from queue import Empty, SimpleQueue
+from threading import Lock
+from time import monotonic
+from typing import Any
+
+from dask.system import CPU_COUNT
+from distributed import Client, Future, KilledWorker, LocalCluster, WorkerPlugin, get_worker
+from distributed.utils import silence_logging_cmgr
+
+from auv_fmu import __version__
+from orchestrator.errors import InputError, reason
+from orchestrator.master.interrupts import without_interrupt
+from orchestrator.studies.engine import Engine, Outcome, Run
+from orchestrator.system.leftovers import process_folder
+
+#: How long a block shall take [s]: long beside the millisecond that a task costs, short for who
+#: waits for the last one, or loses it.
+_SECONDS = 1.5
+
+#: A scheduler shall not have to deal with more blocks a second than this: on large clusters they
+#: get longer.
+_RATE = 200.0
+
+#: The most runs of a block, however fast they are.
+_MOST_RUNS = 10_000
+
+#: Blocks under way for each thread of the workers: the one it makes, and the one that is next.
+_AHEAD = 2
+
+#: How often workers are counted [s], how long there may be none [s], and how long it may take to
+#: find the scheduler [s].
+_GLANCE, _PATIENCE, _CONNECT = 2.0, 120.0, 15.0
+
+#: How long a process of this machine has to leave when the study is broken off [s].
+_FAREWELL = 0.5
+
+#: What is said of a run that no worker has survived.
+FATAL = "every process that made it died"
+
+
+@contextmanager
+def making(
+    engine: Engine,
+    runs: Iterable[Run],
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
+) -> Iterator[Iterator[list[Outcome]]]:
+    """The outcomes of runs, block by block as they are done, for the time of the context.
+
+    Runs are taken from their iterator as they are needed. Each has one outcome; those that end the
+    process which makes them have one as well, at the very end.
+
+    Args:
+        engine: what makes them.
+        runs: to be made.
+        scheduler: address of a Dask scheduler; None for processes of this machine.
+        workers: how many processes of this machine; None for one a core.
+
+    Raises:
+        InputError: there is no such scheduler, or nobody is left to make the runs.
+
+    """
+    with silence_logging_cmgr(CRITICAL), ExitStack() as stack:
+        client = stack.enter_context(
+            _local(workers) if scheduler is None else _remote(scheduler, workers)
+        )
+        # Under a name of its own: another client may be at the same study.
+        name = f"auv-fmu-{client.id}"
+        try:
+            client.register_plugin(_Share(engine, quiet=scheduler is None), name)
+        except Exception as error:
+            # Whatever is raised by a worker with other packages than this process has.
+            raise InputError(f"a worker cannot take the study: {reason(error)}") from error
+        stack.callback(_forget, client, name)
+        yield _Making(client, name).outcomes(runs)
+
+
+@contextmanager
+def _remote(address: str, workers: int | None) -> Iterator[Client]:
+    if workers is not None:
+        raise InputError(
+            "--workers is for processes of this machine: those of a scheduler are started with it"
+        )
+    try:
+        client = Client(address, timeout=_CONNECT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise InputError(f"no scheduler answers at {address}: {reason(error)}") from error
+    with client:
+        yield client
+
+
+@contextmanager
+def _local(workers: int | None) -> Iterator[Client]:
+    if workers is not None and workers < 1:
+        raise InputError(f"--workers {workers}: must be at least 1")
+    try:
+        with without_interrupt():
+            cluster = LocalCluster(
+                n_workers=workers or CPU_COUNT,
+                threads_per_worker=1,
+                dashboard_address=None,
+                memory_limit=0,
+                silence_logs=CRITICAL,
+                local_directory=process_folder(),
+                env={"TMPDIR": process_folder()},
+            )
+            client = Client(cluster, set_as_default=False)
+    except (OSError, RuntimeError) as error:
+        raise InputError(f"no process can be started: {reason(error)}") from error
+    with cluster, client:
+        try:
+            yield client
+        except BaseException:
+            _end(cluster)
+            raise
+
+
+def _end(cluster: LocalCluster) -> None:
+    """End processes whatever they do: what they have begun nobody wants any more."""
+    for nanny in cluster.workers.values():
+        with suppress(OSError, TimeoutError):
+            cluster.sync(nanny.kill, timeout=_FAREWELL)
+
+
+def _forget(client: Client, name: str) -> None:
+    """Have workers forget what they were sent, if there is still somebody to tell."""
+    with suppress(OSError, ValueError, TimeoutError):
+        client.unregister_worker_plugin(name)
+
+
+class _Share(WorkerPlugin):  # type: ignore[misc]
+    """What every worker has of a study, those included that come while it is under way.
+
+    The scheduler has it in its keeping: it is not lost with a worker, as scattered data would be.
+    """
+
+    def __init__(self, engine: Engine, quiet: bool) -> None:
+        self._engine, self._quiet, self._version = engine, quiet, __version__
+
+    def setup(self, worker: Any) -> None:
+        # Runs of one process are made one after the other: an FMU is a library of the process.
+        self._lock, self._address = Lock(), worker.address
+        if self._quiet:
+            # Nothing of it belongs on the terminal of who waits for the study.
+            for stream in (1, 2):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+
+    def outcomes(self, runs: list[Run]) -> tuple[float, list[Outcome]]:
+        """What comes out of runs, and how long it took [s]."""
+        if __version__ != self._version:
+            raise InputError(
+                f"the worker at {self._address} has auv-fmu {__version__}, and who sends the study "
+                f"{self._version}: install the same version everywhere"
+            )
+        with self._lock:
+            start = monotonic()
+            outcomes = list(self._engine.outcomes(runs))
+            return monotonic() - start, outcomes
+
+
+def _outcomes(name: str, runs: bytes) -> tuple[float, list[Outcome]]:
+    """A task: the outcomes of some runs, pickled so that nobody looks into them on their way."""
+    made: tuple[float, list[Outcome]] = get_worker().plugins[name].outcomes(pickle.loads(runs))
+    return made
+
+
+class _Making:
+    """Blocks of runs on their way to workers and back."""
+
+    def __init__(self, client: Client, name: str) -> None:
+        self._client, self._name = client, name
+        self._pace = float("inf")  # seconds for a step
+        self._threads, self._counted, self._seen = 1, float("-inf"), monotonic()
+
+    def outcomes(self, runs: Iterable[Run]) -> Iterator[list[Outcome]]:
+        """The outcomes of runs, block by block as they are done."""
+        lost: list[Run] = []
+        for block, outcomes in self._made(self._blocks(runs), self._room):
+            if outcomes is None:
+                lost.extend(block)
+            else:
+                yield outcomes
+        # Alone, so that none is held to blame for another that ends the process of both.
+        for (run,), outcomes in self._made(([run] for run in lost), lambda: 1):
+            yield outcomes or [Outcome(run.number, {}, FATAL)]
+
+    def _blocks(self, runs: Iterable[Run]) -> Iterator[list[Run]]:
+        """Runs in their order, as many together as make a task of a good length."""
+        block: list[Run] = []
+        steps = 0.0
+        for run in runs:
+            block.append(run)
+            steps += run.stop_time / run.step
+            wanted = max(_SECONDS, self._threads / _RATE)
+            if steps * self._pace >= wanted or len(block) == _MOST_RUNS:
+                yield block
+                block, steps = [], 0.0
+        if block:
+            yield block
+
+    def _made(
+        self, blocks: Iterator[list[Run]], room: Callable[[], int]
+    ) -> Iterator[tuple[list[Run], list[Outcome] | None]]:
+        """Blocks as they are done and their outcomes, or None where each worker has died.
+
+        Args:
+            blocks: of runs.
+            room: how many blocks may be under way.
+
+        """
+        under_way: dict[Future, list[Run]] = {}
+        done: SimpleQueue[Future] = SimpleQueue()
+        while True:
+            for block in islice(blocks, max(0, room() - len(under_way))):
+                future = self._client.submit(_outcomes, self._name, pickle.dumps(block), pure=False)
+                under_way[future] = block
+                future.add_done_callback(done.put)
+            if not under_way:
+                return
+            future = self._next(done)
+            block = under_way.pop(future)
+            yield block, self._result(future, block)
+
+    def _room(self) -> int:
+        self._count()
+        return max(1, _AHEAD * self._threads)
+
+    def _next(self, done: SimpleQueue[Future]) -> Future:
+        while True:
+            with suppress(Empty):
+                return done.get(timeout=_GLANCE)
+            self._count()
+
+    def _count(self) -> None:
+        """Count the workers' threads now and then.
+
+        Raises:
+            InputError: there have been none for long.
+
+        """
+        now = monotonic()
+        if now - self._counted < _GLANCE:
+            return
+        self._counted = now
+        try:
+            self._threads = sum(self._client.nthreads().values())
+        except OSError as error:
+            raise _gone("scheduler") from error
+        if self._threads:
+            self._seen = now
+        elif now - self._seen > _PATIENCE:
+            raise _gone("last worker")
+
+    def _result(self, future: Future, block: list[Run]) -> list[Outcome] | None:
+        try:
+            seconds, outcomes = future.result(_PATIENCE)
+        except KilledWorker:
+            return None
+        except CancelledError as error:
+            raise _gone("scheduler") from error
+        except TimeoutError as error:
+            # The worker was lost between its word that the block is done and the block.
+            raise _gone("last worker") from error
+        self._pace = seconds / sum(run.stop_time / run.step for run in block)
+        made: list[Outcome] = outcomes
+        return made
+
+
+def _gone(who: str) -> InputError:
+    return InputError(f"the {who} is gone; what is done is kept: start the study again to go on")

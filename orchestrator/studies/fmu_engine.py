@@ -1,0 +1,106 @@
+"""Runs of FMUs, of any system."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from orchestrator.errors import InputError
+from orchestrator.experiments.bill_of_materials import digest_of
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.loop import LOOPS, chosen
+from orchestrator.master.simulation import simulate
+from orchestrator.studies.engine import Outcome, Run
+from orchestrator.studies.indices import Indices
+from orchestrator.system.leftovers import process_folder
+from orchestrator.system.names import port_name
+from orchestrator.system.structure import System
+
+
+class FmuEngine:
+    """Makes runs with FMUs in the process that it is called in; it takes them along."""
+
+    def __init__(self, systems: Mapping[str, System], loop: str = LOOPS[0]) -> None:
+        """Take systems.
+
+        Args:
+            systems: by the names that runs have for their scenarios.
+            loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
+
+        """
+        self._systems, self._loop = dict(systems), loop
+
+    @property
+    def digest(self) -> str:
+        """Of the FMUs, of how they are connected, and of their parameters."""
+        content = [
+            (
+                name,
+                [(part.name, digest_of(part.fmu)) for part in system.components.values()],
+                system.connections,
+                system.parameters,
+            )
+            for name, system in self._systems.items()
+        ]
+        return sha256(repr(content).encode()).hexdigest()
+
+    def outcomes(self, runs: Sequence[Run]) -> Iterator[Outcome]:
+        """Make some runs, in their order.
+
+        Raises:
+            KeyboardInterrupt: somebody wants it to stop.
+
+        """
+        for run in runs:
+            try:
+                yield self._outcome(run)
+            except InputError as error:
+                yield Outcome(run.number, {}, str(error))
+
+    def _outcome(self, run: Run) -> Outcome:
+        system = self._systems[run.scenario].with_parameters(
+            {port_name(name): value for name, value in run.parameters.items()}
+        )
+        experiment = Experiment(run.stop_time, run.step, run.order)
+        indices = Indices()
+        ending = simulate(system, experiment, [indices], loop=chosen(self._loop, experiment))
+        if ending.signals:
+            raise KeyboardInterrupt
+        if ending.failure is not None:
+            return Outcome(run.number, {}, ending.failure)
+        return Outcome(run.number, indices.values())
+
+    def __getstate__(self) -> dict[str, Any]:
+        """With the FMUs, each once, by their digests."""
+        archives = {
+            part.fmu: (digest_of(part.fmu), part.fmu.read_bytes())
+            for system in self._systems.values()
+            for part in system.components.values()
+        }
+        return {"systems": self._systems, "loop": self._loop, "archives": archives}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        """Put the FMUs where this process keeps what is temporary."""
+        places = {fmu: _place(*content) for fmu, content in state["archives"].items()}
+        self._loop = state["loop"]
+        self._systems = {
+            name: replace(
+                system,
+                components={
+                    part.name: replace(part, fmu=places[part.fmu])
+                    for part in system.components.values()
+                },
+            )
+            for name, system in state["systems"].items()
+        }
+
+
+def _place(digest: str, content: bytes) -> Path:
+    """Where an FMU lies that has come from elsewhere."""
+    path = process_folder() / f"{digest}.fmu"
+    if not path.exists():
+        path.write_bytes(content)
+    return path

@@ -1,0 +1,42 @@
+"""An engine whose runs are easily made, and behave as badly as their parameters say."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from orchestrator.studies.engine import Outcome, Run
+
+
+class Toy(NamedTuple):
+    """Squares `toy.x` of a run, and says which process did it.
+
+    Attributes:
+        seconds: that a run takes, unless it says itself what `toy.seconds` is.
+
+    """
+
+    seconds: float = 0.0
+
+    def outcomes(self, runs: Sequence[Run]) -> Iterator[Outcome]:
+        for run in runs:
+            time.sleep(run.parameters.get("toy.seconds", self.seconds))
+            if run.parameters.get("toy.talks"):
+                os.write(1, b"out of a run\n")
+                os.write(2, b"out of a run\n")
+            if run.parameters.get("toy.fatal"):
+                os.kill(os.getpid(), signal.SIGKILL)
+            yield outcome(run, os.getpid())
+
+
+def outcome(run: Run, process: int = 0) -> Outcome:
+    """What a run comes to."""
+    return Outcome(run.number, {"square": run.parameters["toy.x"] ** 2, "process": process})
+
+
+def run(number: int, parameters: Mapping[str, Any] = {}) -> Run:
+    """A run of a second's steps."""
+    return Run(number, "toy", {"toy.x": 0.1 * number, **parameters}, 1.0, 0.02)
