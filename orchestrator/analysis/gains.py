@@ -19,10 +19,11 @@ _NOTE = """\
 The conditions are sufficient, and Remark 4 calls them conservative: a run may well be stable
 where they are violated. The zetas of (26) and (29) are known from below only: a condition that is
 open with the least of them may be violated with the true ones, and none that has them can be met
-for certain, because C_2 has a pole at the vertical. docs/paper.md has the proofs."""
+for certain, because C_2 has a pole at the vertical. The report has the proofs, under "What is wrong
+in the paper"; so has docs/paper.md."""
 
 _PAPER = """\
-These are the paper's own gains, and they miss (30): lambda_min(K_2 Lambda) = 10 is not above 15."""
+These are the paper's own gains: they miss (30), and no gains meet (31) for this vehicle."""
 
 
 def evaluate(system: System) -> Theorem:
@@ -91,7 +92,7 @@ def stated(found: Theorem) -> Iterator[str]:
     )
     yield (
         "(42)  with zetas for a part of the states alone: holds for |x| < "
-        f"{found.x_at_most:.4g} at most, with any gains for |x| < {found.x_of_any_gains:.4g}"
+        f"{found.x_at_most:.3g} at most, with any gains for |x| < {found.x_of_any_gains:.3g}"
     )
 
 

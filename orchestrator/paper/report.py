@@ -15,7 +15,7 @@ from orchestrator.experiments.bundle import PYTHON, current_fmus
 from orchestrator.experiments.folder import replaced
 from orchestrator.experiments.record import PACKAGES, Clock, write_files
 from orchestrator.experiments.wiring import closed_loop
-from orchestrator.paper import readings
+from orchestrator.paper import errata, readings
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS, show_effect
 from orchestrator.paper.formatting import table
@@ -138,6 +138,8 @@ def _text(
         yield "\n".join(f"- `auv-fmu run {outcomes.label(run)}`" for run in effect.runs)
     yield "## Gain conditions"
     yield f"`auv-fmu gains`:\n\n```\n{gains.check(closed_loop(fmus))}\n```"
+    yield "## What is wrong in the paper"
+    yield errata.section()
     yield "## Readings"
     yield readings.section()
     yield "## Versions and commands"

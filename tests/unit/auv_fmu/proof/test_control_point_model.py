@@ -242,6 +242,28 @@ def test_no_c_2_has_both_p2_2_and_p2_3():
     assert y @ C(x, y) == pytest.approx(-VEHICLE.m66 / (2.0 * ELL**3))
 
 
+@given(theta=pitch_angles, psi=angles, x=vectors(speeds, 3), y=vectors(speeds, 3))
+def test_christoffel_symbols_have_both_p2_2_and_p2_3(theta, psi, x, y):
+    """<C(x) y, z> = (D_x M(y, z) + D_y M(x, z) - D_z M(x, y)) / 2, with D M = C_2 + C_2^T.
+
+    P2.3 is its symmetry. It does the work of C_2 at z = y = x: what (15) has beside it does none.
+    """
+
+    def rate(a):
+        C = C_2(VEHICLE, theta, psi, a, ELL)
+        return C + C.T
+
+    def symbols(a, b):
+        along = np.array([a @ rate(e) @ b for e in np.eye(3)])
+        return (rate(a) @ b + rate(b) @ a - along) / 2.0
+
+    x, y = np.array(x), np.array(y)
+    product = C_2(VEHICLE, theta, psi, x, ELL) @ x
+    scale = 1.0 + np.abs(rate(x)).max() * 30.0 + np.abs(rate(y)).max() * 30.0
+    assert y @ rate(x) @ y == pytest.approx(2.0 * y @ symbols(x, y), abs=1e-9 * scale)
+    assert x @ product == pytest.approx(x @ symbols(x, x), abs=1e-9 * scale)
+
+
 @pytest.mark.parametrize("degrees", [0.0, 80.0, 89.0])
 def test_p2_4_fails_at_the_vertical(degrees):
     """Yaw at r = 1 / ell rolls the axes of (1) at r tan(theta): C_2 has m55 tan(theta) / ell^3."""
