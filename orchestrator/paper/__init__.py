@@ -13,6 +13,10 @@ module                  what it holds
 :mod:`.measures`        numbers of a run that claims speak of
 :mod:`.claims`          each claim of the paper, judged by the runs named beside it
 :mod:`.effects`         what runs show when they are compared
+:mod:`.choices`         what the paper leaves open of the runs behind its table
+:mod:`.sensitivity`     how the printed numbers move with it
+:mod:`.courses`         the runs of all combinations, and what is read off them
+:mod:`.printed_table`   the printed table beside them
 :mod:`.sections`        a section for each scenario
 :mod:`.page`            Markdown as one HTML page
 :mod:`.report`          all of it put together

@@ -9,13 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 from orchestrator.analysis.metrics import LAST_SECONDS
-from orchestrator.analysis.signals import APPLIED, COMMANDED
-from orchestrator.experiments.result import simulate
+from orchestrator.analysis.signals import APPLIED, COMMANDED, tracking_error
+from orchestrator.errors import InputError
+from orchestrator.experiments.preparation import loaded
+from orchestrator.master.table import Table
 from orchestrator.paper.choices import END_TIMES, OF_RUNS, SIGNALS, Choice, options_of, runs
 from orchestrator.paper.measures import Way, way
 from orchestrator.paper.sensitivity import PUBLISHED, Sensitivity
 from orchestrator.paper.workers import Workers
+from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Run
+from orchestrator.studies.sweep import check_installed
 
 #: Runs that a worker makes at a time.
 _BLOCK = 16
@@ -60,6 +64,11 @@ class Course(NamedTuple):
         return np.stack([np.hstack((effort, error)) for effort in efforts])
 
 
+def course_of(table: Table) -> Course:
+    """The course of a run."""
+    return Course(table.time, table.group(*COMMANDED), table.group(*APPLIED), tracking_error(table))
+
+
 def all_variants(crew: Workers, of_runs: Sequence[Choice] = OF_RUNS) -> Sensitivity:
     """Make the runs of all combinations.
 
@@ -68,12 +77,15 @@ def all_variants(crew: Workers, of_runs: Sequence[Choice] = OF_RUNS) -> Sensitiv
         of_runs: choices that they depend on.
 
     Raises:
+        InputError: a package is missing.
         KeyboardInterrupt: the user does not want to wait.
 
     """
+    check_installed()
+    engine = BatchEngine({scenario: loaded(scenario)[1] for scenario in PUBLISHED})
     wanted = {scenario: list(runs(scenario, of_runs)) for scenario in PUBLISHED}
     blocks = {
-        (scenario, first): partial(taken_of, found[first : first + _BLOCK])
+        (scenario, first): partial(taken_of, engine, found[first : first + _BLOCK])
         for scenario, found in wanted.items()
         for first in range(0, len(found), _BLOCK)
     }
@@ -88,49 +100,19 @@ def all_variants(crew: Workers, of_runs: Sequence[Choice] = OF_RUNS) -> Sensitiv
     return Sensitivity(numbers, ways, of_runs)
 
 
-def taken_of(block: Sequence[Run]) -> tuple[np.ndarray, np.ndarray]:
+def taken_of(engine: BatchEngine, block: Sequence[Run]) -> tuple[np.ndarray, np.ndarray]:
     """Numbers and ways of some runs, an axis for the runs first; a task for a worker.
 
     Those of a run that has failed are not numbers, nor is the way of one that has not arrived.
     """
     numbers = np.full((len(block), len(SIGNALS), len(END_TIMES), 6), np.nan)
-    ways = np.full((len(block), 2), np.nan)
+    ways = np.full((len(block), len(Way._fields)), np.nan)
     for i, run in enumerate(block):
         try:
-            result = simulate(
-                run.scenario,
-                dict(run.parameters),
-                stop_time=run.stop_time,
-                step=run.step,
-                order=run.order,
-                kind="native",
-                loop="compiled",
-            )
-        except ValueError:
+            table = engine.table(run)
+        except InputError:
             continue
-        if result.failure is None:
-            course = Course(
-                result.time, result.group(*COMMANDED), result.group(*APPLIED), _err(result)
-            )
-            numbers[i] = course.numbers()
-            ways[i] = course.way or np.nan
+        if table.ending.failure is None:
+            course = course_of(table)
+            numbers[i], ways[i] = course.numbers(), course.way or np.nan
     return numbers, ways
-
-
-def _err(r):
-    x, y, z, ph, th, ps = r.group(
-        "plant.eta.x",
-        "plant.eta.y",
-        "plant.eta.z",
-        "plant.eta.phi",
-        "plant.eta.theta",
-        "plant.eta.psi",
-    ).T
-    return np.stack(
-        (
-            x + 0.35 * np.cos(th) * np.cos(ps),
-            y + 0.35 * np.cos(th) * np.sin(ps),
-            z - 0.35 * np.sin(th),
-        ),
-        1,
-    ) - r.group("planner.y_d.x", "planner.y_d.y", "planner.y_d.z")

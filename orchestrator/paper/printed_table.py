@@ -115,7 +115,9 @@ def _paragraphs(found: Sensitivity) -> Iterator[str]:
         for title, variant in zip(_TITLES, variants, strict=True)
     )
     yield _verdict(found)
-    yield table(["open", "option", "best score with it", "contradicts"], list(_options(found)))
+    yield table(
+        ["open", "option", "best score", "best of all", "contradicts"], list(_options(found))
+    )
 
 
 def _rows(found: Sensitivity, variants: tuple[Variant, ...]) -> Iterator[list[str]]:
@@ -185,5 +187,7 @@ def _impulse(found: Sensitivity, scenario: str) -> str:
 
 def _options(found: Sensitivity) -> Iterator[list[str]]:
     for axis, choice in enumerate(found.choices[:-1]):
-        for option, best in zip(choice.options, found.best_with_each(axis), strict=True):
-            yield [plain(choice.name), plain(option.text), f"{best:.2f}", plain(option.against)]
+        best = [found.best_with_each(axis, consistent) for consistent in (True, False)]
+        for option, *scores in zip(choice.options, *best, strict=True):
+            written = [f"{score:.2f}" if np.isfinite(score) else "" for score in scores]
+            yield [plain(choice.name), plain(option.text), *written, plain(option.against)]

@@ -43,7 +43,8 @@ _WHY_NUMBERS_DIFFER = """\
 Why the numbers differ: efforts and final errors depend on the end time and the noise, which are \
 not given. The proposed controller's e_f moves with the phase of the waves (period 63 s) at the \
 end of the run, and shrinks with eps_t, as Remark 6 says. The PD controller's e_f is some \
-millimetres, up to a centimetre, for the same reason."""
+millimetres, up to a centimetre, for the same reason. No choice of what is not given brings all of \
+them together: `auv-fmu table` tries them."""
 
 
 def write_report(

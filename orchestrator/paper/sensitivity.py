@@ -97,16 +97,17 @@ class Sensitivity:
             consistent: among those that contradict nothing that is printed; else among all.
 
         """
-        scores = self.scores
-        if consistent:
-            scores = np.where(contradicts_nothing(PROPOSED, self.choices), scores, np.inf)
+        scores = self._scores(consistent)
         best = np.unravel_index(int(scores.argmin()), scores.shape)
         return self.variant(tuple(map(int, best)))
 
-    def best_with_each(self, axis: int) -> np.ndarray:
-        """The least score with each option of a choice."""
+    def best_with_each(self, axis: int, consistent: bool) -> np.ndarray:
+        """The least score with each option of a choice, of variants as :meth:`nearest` takes them.
+
+        It is infinite where there is none.
+        """
         others = tuple(other for other in range(len(self.choices)) if other != axis)
-        best: np.ndarray = self.scores.min(axis=others)
+        best: np.ndarray = self._scores(consistent).min(axis=others)
         return best
 
     def most_within(self, tolerance: float) -> int:
@@ -136,6 +137,11 @@ class Sensitivity:
         ways = self.ways[scenario]
         taken = contradicts_nothing(scenario, self.of_runs) & ~np.isnan(ways[..., 0])
         return [Way(*way) for way in ways[taken].tolist()]
+
+    def _scores(self, consistent: bool) -> np.ndarray:
+        if not consistent:
+            return self.scores
+        return np.where(contradicts_nothing(PROPOSED, self.choices), self.scores, np.inf)
 
     def variant(self, options: tuple[int, ...]) -> Variant:
         """What a combination of options gives."""
