@@ -12,6 +12,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
+from auv_fmu.euler import STEP
+from auv_fmu.output_feedback import Gains
 from orchestrator.analysis.certificates import COLUMNS, certificates
 from orchestrator.analysis.figures import (
     COLOURS,
@@ -43,9 +45,14 @@ _PRINTED = replace(FIVE, parameters={"controller.printed_jacobian": True})
 _JACOBI, _JACOBI_PD = (replace(run, order="jacobi") for run in (FIVE, FIVE_PD))
 _NOISY = tuple(Run("fig4", {"plant.noise.std": level}) for level in NOISE_LEVELS)
 _QUICK = tuple(
-    replace(QUIET, parameters={**QUIET.parameters, "controller.lambda": value}) for value in LAMBDAS
+    QUIET
+    if value == Gains().lambda_
+    else replace(QUIET, parameters={**QUIET.parameters, "controller.lambda": value})
+    for value in LAMBDAS
 )
-_STEPPED = tuple(replace(run, step=step) for run in (FIVE, FIVE_PD) for step in STEPS)
+_STEPPED = tuple(
+    run if step == STEP else replace(run, step=step) for run in (FIVE, FIVE_PD) for step in STEPS
+)
 _ALGEBRAIC = replace(QUIET, parameters={**QUIET.parameters, "controller.saturation": "algebraic"})
 
 
