@@ -79,16 +79,17 @@ def stated(found: Theorem) -> Iterator[str]:
             f"{condition.verdict}"
         )
     if found.zeta_of_any_gains >= known.lambda_d2:
-        yield (f"  by any gains: 0.5 (zeta_1 + zeta_2) is at least {found.zeta_of_any_gains:.4g}")
+        least = f"{known.lambda_d2:.6g} > 0.5 (zeta_1 + zeta_2), at least "
+        yield f"(31), (53)  by any gains: {least}{found.zeta_of_any_gains:.4g}: violated"
     yield ""
     yield (
         f"(40)  alpha_1 = {alphas.alpha_1:.4g}, alpha_2 = {alphas.alpha_2:.4g}, "
         f"alpha_3 <= {alphas.alpha_3:.4g}, alpha_4 <= {alphas.alpha_4:.4g}"
     )
     yield (
-        f"(33)  R_A lies within |vartheta| < {found.radius:.4g}"
+        f"(33)  R_A lies within |vartheta| < {found.radius:.3g}"
         if found.radius
-        else "(33)  alpha_m is not positive: R_A is empty"
+        else "(33)  R_A is empty"
     )
     yield (
         "(42)  with zetas for a part of the states alone: holds for |x| < "

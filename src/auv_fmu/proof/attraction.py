@@ -6,7 +6,7 @@ said here to be covered by no choice is covered by none.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 from typing import NamedTuple
 
 from auv_fmu.output_feedback import Gains
@@ -16,7 +16,7 @@ from auv_fmu.vehicle import Vehicle
 
 
 class Alphas(NamedTuple):
-    """What alpha_1 to alpha_4 of (40) are at most; the first two need no zetas."""
+    """What alpha_1 to alpha_4, which (40) leaves of (37), are at most; two need no zetas."""
 
     alpha_1: float
     alpha_2: float
@@ -54,23 +54,30 @@ def theorem(vehicle: Vehicle, ell: float, gains: Gains, maximum_slope: float) ->
     """
     known, zetas = bounds(vehicle, ell), at_least(vehicle, ell, gains.lambda_)
     found = conditions(known, zetas, gains.K1, gains.K2, gains.lambda_, gains.k_d, maximum_slope)
-    first, second, third = found
     k = coupling(vehicle, ell)
     return Theorem(
         known,
         zetas,
         found,
-        Alphas(
-            first.margin,
-            first.margin + 0.5 * max(gains.K2),
-            second.margin,
-            third.margin * known.lambda_m2,
-        ),
-        reach(second.room, k),
+        alphas(known, found, gains),
+        reach(found[1].room, k),
         reach(known.lambda_d2, k),
         0.5 * at_least(vehicle, ell, 0.0).zeta_1_2,
         stretch(known, gains, maximum_slope),
     )
+
+
+def alphas(known: Bounds, found: tuple[Condition, Condition, Condition], gains: Gains) -> Alphas:
+    """alpha_1 to alpha_4, defined below (40): the margins of (30) to (32), and one more.
+
+    Args:
+        known: eigenvalues of M_2.
+        found: the conditions.
+        gains: of the controller.
+
+    """
+    first, second, third = (condition.margin for condition in found)
+    return Alphas(first, first + 0.5 * max(gains.K2), second, third * known.lambda_m2)
 
 
 def reach(room: float, k: float) -> float:
@@ -102,4 +109,5 @@ def stretch(known: Bounds, gains: Gains, maximum_slope: float) -> float:
     """
     lambda_x = 0.5 * min(min(gains.K2) / maximum_slope, known.lambda_m2)
     lambda_u = 0.5 * max(max(gains.K2) * maximum_slope, known.lambda_M2)
-    return sqrt(max(lambda_u, 0.5 / gains.gamma) / lambda_x)
+    of_theta = 0.5 / gains.gamma if gains.gamma else inf
+    return sqrt(max(lambda_u, of_theta) / lambda_x)

@@ -6,14 +6,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_fmu.output_feedback import Gains
-from auv_fmu.proof.attraction import reach, stretch, theorem
-from auv_fmu.proof.gain_conditions import bounds
+from auv_fmu.proof.attraction import alphas, reach, stretch, theorem
+from auv_fmu.proof.gain_conditions import Bounds, bounds, conditions
+from auv_fmu.proof.zetas import Zetas
 from auv_fmu.vehicle import Vehicle
+from support.strategies import speeds, vectors
 
 ELL = 0.35
 #: A vehicle for which Theorem 1 may hold, and gains that meet (30).
 DAMPED, QUICK = Vehicle(d11=500.0, d55=200.0, d66=200.0), Gains(lambda_=2.1)
 positive = st.floats(0.1, 100.0)
+three = vectors(speeds, 3)
 gains = st.builds(
     lambda k_1, k_2, lambda_, k_d: Gains((k_1,) * 3, (k_2,) * 3, lambda_, k_d),
     *[positive] * 4,
@@ -32,6 +35,36 @@ def test_alphas_are_those_below_40(gains):
         gains.k_d * known.lambda_m2 - 2.0 * k_1 - k_2 - 0.5 * zetas.zeta_3_4,
     )
     assert found.alphas == pytest.approx(expected)
+
+
+@given(
+    t_ez=three,
+    t_z=three,
+    r_1=three,
+    r_2=three,
+    gains=gains,
+    damping=vectors(positive, 3),
+    inertia=vectors(positive, 3),
+)
+def test_alphas_bound_what_is_known_of_37(t_ez, t_z, r_1, r_2, gains, damping, inertia):
+    """The terms of (37) without chi, xi and theta, for any D_2 and M_2, against (40).
+
+    Tanh(e - z) and Tanh(z) are any vectors here.
+    """
+    t_ez, t_z, r_1, r_2 = map(np.array, (t_ez, t_z, r_1, r_2))
+    k_1, k_2, lambda_ = gains.K1[0], gains.K2[0], gains.lambda_
+    pulled = k_1 * np.tanh(r_1 - r_2)
+    exact = (
+        -k_2 * lambda_ * (t_ez @ t_ez + t_z @ t_z - t_ez @ t_z)
+        - r_1 @ (damping * r_1)
+        - gains.k_d * r_2 @ (inertia * r_2)
+        - (r_1 + r_2) @ pulled
+        - k_2 * (r_1 @ t_z + 2.0 * r_2 @ t_ez)
+    )
+    known = Bounds(min(inertia), max(inertia), min(damping), max(damping))
+    found = alphas(known, conditions(known, Zetas(0.0, 0.0), *gains[:4], 1.0), gains)
+    bound = -sum(alpha * (x @ x) for alpha, x in zip(found, (t_ez, t_z, r_1, r_2), strict=True))
+    assert exact <= bound + 1e-9 * (1.0 + abs(bound) + abs(exact))
 
 
 def test_alphas_of_the_paper():
