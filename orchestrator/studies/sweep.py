@@ -21,6 +21,7 @@ from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.preparation import loaded
 from orchestrator.experiments.scenario import Scenario
 from orchestrator.master.loop import LOOPS
+from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Engine
 from orchestrator.studies.figures import Plan, draw_figures, read_figures
 from orchestrator.studies.fmu_engine import FmuEngine
@@ -187,7 +188,7 @@ def _engine(name: str, systems: Mapping[str, tuple[Scenario, System]], means: Me
     if name == FMU:
         return FmuEngine({name: system for name, (_, system) in systems.items()}, means.loop)
     if name == BATCH:
-        raise InputError("engine batch: not there yet")
+        return BatchEngine({name: system for name, (_, system) in systems.items()}, means.kind)
     raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
 
 

@@ -111,7 +111,7 @@ def exact_gain(k_d: float, h: float) -> float:
 
     Not in the paper. It is the mean of k_d exp(-k_d t) over the step, so (23) becomes the mean
     velocity of a y_hat whose correction k_d z decays as it would between two samples, all else
-    being held. Below 1/h whatever k_d is: no k_d makes the step ring. Holding y itself would not
+    being held. It is below 1 / h, so no k_d is too large for the step. Holding y itself would not
     do: (23) would have a vehicle at constant speed k_d h / (1 - exp(-k_d h)) times too fast.
 
     Args:

@@ -10,12 +10,17 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
-from auv_fmu.closed_loop import Instant, closed_loop, measurement
+from auv_fmu import motion_planner, plant
+from auv_fmu.closed_loop import Instant, Setting, closed_loop, measurement
+from auv_fmu.observer import EXACT, INTEGRAL
+from auv_fmu.output_feedback import Gains
+from auv_fmu.plant import RollAxis
+from auv_fmu.saturation import ARCTAN
 from orchestrator.analysis.metrics import indices
 from orchestrator.analysis.signals import tracking_error, true_control_point
 from orchestrator.experiments.wiring import closed_loop as wired
 from orchestrator.master.table import Table
-from orchestrator.system.names import PortName
+from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 from support.instances import unpacked
 from support.runs import final_error, run
@@ -56,12 +61,12 @@ def row(now: Instant, before: Instant) -> dict[str, float]:
     planned, reference = now.vehicles.planner, now.scene.reference
     both(("plant.tau", "controller.tau"), UQR, signals.tau)
     both(("plant.tau_w", "disturbance.tau_w"), "uvwpqr", before.tau_w)
-    group("disturbance.nu", "uvwpqr", before.vehicles.plant.nu)
+    group("disturbance.nu", "uvwpqr", before.scene.plant.nu)
     group("plant.eta", (*XYZ, "phi", "theta", "psi"), (*vehicle.position, *seen.euler))
-    group("plant.nu", "uvwpqr", vehicle.nu)
+    group("plant.nu", "uvwpqr", seen.nu)
     group("plant.y", XYZ, now.scene.y)
     group("plant.dy", XYZ, seen.dy)
-    group("plant.tau_applied", UQR, before.tau)
+    group("plant.tau_applied", UQR, before.tau if now is before else vehicle.tau)
     group("controller.y", XYZ, told.y)
     group("controller.eta", ("phi", "theta", "psi"), told.euler)
     group("controller.y_d", XYZ, told.y_d)
@@ -93,6 +98,42 @@ def test_loop_of_fmus_is_the_straight_line_bit_for_bit(noisy: Table):
         assert np.array_equal(noisy[name], expected), name
     for name in faults:
         assert not noisy[name].any()
+
+
+@pytest.mark.parametrize(
+    ("values", "setting"),
+    [
+        (
+            {"controller.saturation": "arctan", "controller.observer": "exact"},
+            Setting(controller=Gains(s=ARCTAN, form=EXACT)),
+        ),
+        ({"controller.observer": "integral"}, Setting(controller=Gains(form=INTEGRAL))),
+        (
+            {
+                "plant.roll": False,
+                "plant.current.x": 0.2,
+                "plant.actuator.T.u": 0.1,
+                "planner.nu0.u": 0.1,
+            },
+            Setting(
+                plant=plant.Parameters(
+                    roll=RollAxis(rolls=False), current=(0.2, 0.0, 0.0), T=(0.1, 0.0, 0.0)
+                ),
+                planner=motion_planner.Parameters(nu0=(0.1, 0.0, 0.0, 0.0, 0.0)),
+            ),
+        ),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("step", [0.02, 0.05])
+def test_additions_are_the_straight_line_bit_for_bit_too(system, values, setting, step):
+    changes = {port_name(name): value for name, value in values.items()}
+    table = run(system.with_parameters(changes), 200 * step, step)
+    rows = [
+        row(now, before) for before, now in pairwise(closed_loop(200, setting._replace(h=step)))
+    ]
+    for name in rows[0]:
+        assert np.array_equal(table[name][1:], [values[name] for values in rows]), name
 
 
 def test_fig4_without_noise_never_reaches_a_limit(quiet: Table):

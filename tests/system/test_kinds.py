@@ -73,6 +73,12 @@ def test_scenario_is_the_same_to_its_end(dist: Path, native: Path, scenario: str
         ("fig5-pd", {"controller.printed_jacobian": True}),
         ("fig4", {"controller.innovation_gate": 0.0}),
         ("fig4", {"plant.noise.std": 0.0}),
+        ("fig4", {"controller.saturation": "arctan", "controller.observer": "exact"}),
+        ("fig5", {"controller.observer": "integral"}),
+        ("fig5", {"plant.roll": False}),
+        ("fig5-pd", {"plant.roll": False, "plant.actuator.T.q": 0.1}),
+        ("fig4", {"plant.current.x": 0.2, "plant.current.z": -0.1, "planner.nu0.u": 0.2}),
+        ("fig5-pd", {"plant.actuator.T.u": 0.5, "plant.actuator.T.r": 0.001}),
     ],
     ids=str,
 )

@@ -19,11 +19,11 @@ parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra `studie
 
 DATABASE = "unfinished.sqlite"
 
-RUNS = 200
+RUNS = 1000
 
 STUDY = f"""
 scenario = "fig4"
-stop_time = 2.0
+stop_time = 5.0
 [sample]
 method = "random"
 n = {RUNS}
@@ -43,6 +43,7 @@ def sweep(out):
             "orchestrator",
             "sweep",
             "study.toml",
+            "--kind=native",
             "--workers=2",
             f"--out={out}",
         ],

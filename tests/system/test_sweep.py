@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +16,6 @@ from orchestrator.studies.engine import INDICES
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import read_study
-from support.machine import eventually, is_over, members, start
 
 pytest.importorskip("distributed", reason="needs Dask: the extra `studies`")
 
@@ -31,19 +26,6 @@ stop_time = 1.0
 [vary]
 plant.eta0.y = [0.0, 4.0]
 controller.saturation = ["tanh", "algebraic"]
-"""
-
-#: A thousand runs, some seconds of work for two processes. Half of them fail.
-LARGE = """
-scenario = ["fig5", "fig5-pd"]
-stop_time = { base = 4.0, per = { plant.eta0.z = 0.2 } }
-[vary]
-plant.nu0.r = [0.0, 1e99]
-[sample]
-n = 250
-seed = 3
-[sample.range]
-plant.eta0.z = [0.0, 20.0]
 """
 
 
@@ -122,38 +104,3 @@ def test_what_cannot_be_done_is_one_line(study, capfd, arguments, words):
     assert main(["sweep", *arguments, "--kind", "native"]) == 2
     [line] = capfd.readouterr().err.splitlines()
     assert words in line
-
-
-def kept(folder: Path) -> int:
-    """When something has been kept the last time."""
-    path = folder / "unfinished.sqlite-wal"
-    return path.stat().st_mtime_ns if path.exists() else 0
-
-
-def workers(process: subprocess.Popen[str]) -> list[int]:
-    """The processes that make its runs."""
-    return [
-        member
-        for member in members(process.pid)
-        if b"spawn_main" in Path(f"/proc/{member}/cmdline").read_bytes()
-    ]
-
-
-def test_kills_lose_nothing_and_make_nothing_twice(workplace):
-    study, folder = workplace / "large.toml", workplace / "results" / "large"
-    study.write_text(LARGE)
-
-    def is_under_way(process: subprocess.Popen[str], before: int) -> bool:
-        return bool(workers(process)) and kept(folder) > before
-
-    for is_last in (False, False, True):
-        before = kept(folder)
-        process = start("sweep", "large.toml", "--kind", "native", "--workers", "2")
-        assert eventually(partial(is_under_way, process, before))
-        assert not (folder / "runs.parquet").exists()
-        os.kill(workers(process)[0] if is_last else process.pid, signal.SIGKILL)
-        out, err = process.communicate(timeout=120)
-        assert is_over(process.pid)
-    assert (process.returncode, err) == (0, "")
-    assert out.splitlines()[0] == "large: 1,000 runs, of which 500 failed"
-    check(sweep("large.toml", kind="native"), straight(study))

@@ -3,7 +3,7 @@
 ====================  ================================================================
 module                what it holds
 ====================  ================================================================
-:mod:`.runs`          the runs of a study as columns; names of values in figures
+:mod:`.values`        the runs of a study as columns; names of values in figures
 :mod:`.entries`       figures as a study file has them, read and checked
 :mod:`.bins`          values sorted into bins of an axis
 :mod:`.panels`        panels in rows and columns, with their axes
@@ -17,6 +17,6 @@ module                what it holds
 
 from orchestrator.studies.figures.drawing import draw_figures
 from orchestrator.studies.figures.entries import Plan, read_figures
-from orchestrator.studies.figures.runs import Columns
+from orchestrator.studies.figures.values import Columns
 
 __all__ = ["Columns", "Plan", "draw_figures", "read_figures"]

@@ -12,7 +12,7 @@ from orchestrator.analysis.figures.style import COLOURS, STYLES
 from orchestrator.studies.figures.bins import Bins, bins_of, grouped, is_logarithmic
 from orchestrator.studies.figures.entries import Plan
 from orchestrator.studies.figures.panels import legend, paneled, spread
-from orchestrator.studies.figures.runs import VERDICTS, Runs
+from orchestrator.studies.figures.values import VERDICTS, Values
 
 #: Parts of an axis along which runs are counted together.
 _BINS = 30
@@ -26,11 +26,12 @@ _ABREAST = 2
 _HEIGHT = 2.3
 
 
-def bands(plan: Plan, title: str, runs: Runs) -> Figure:
+def bands(plan: Plan, title: str, runs: Values) -> Figure:
     """A row of panels for each value that is shown, a column for each x; runs apart by colours."""
-    columns = len(plan.x) if len(plan.x) > 1 else min(_ABREAST, len(plan.show))
+    abreast = len(plan.x) if len(plan.x) > 1 else min(_ABREAST, len(plan.show))
     shown = list(product(plan.show, plan.x))
-    figure, panels = paneled(title, -(-len(shown) // columns), columns, _HEIGHT)
+    share = "row" if len(plan.x) > 1 else False
+    figure, panels = paneled(title, -(-len(shown) // abreast), abreast, _HEIGHT, sharey=share)
     parts = list(runs.parts(plan.by))
     for axes, (value, x) in zip(panels.flat, shown, strict=False):
         bins = bins_of(runs[x], _BINS)
@@ -38,12 +39,14 @@ def bands(plan: Plan, title: str, runs: Runs) -> Figure:
             _draw(axes, bins, part[x], part[value], value in VERDICTS, (name, colour, style))
         if value in plan.limits:
             axes.axhline(plan.limits[value], color="black", linewidth=0.8)
+        axes.margins(x=0)
         if bins.is_logarithmic:
             spread(axes.xaxis)
         if is_logarithmic(runs[value]):
             spread(axes.yaxis)
-        axes.set(xlabel=runs.label(x), title=runs.label(value))
-        axes.margins(x=0)
+        axes.set_xlabel(runs.label(x))
+        if x == plan.x[0]:
+            axes.set_title(runs.label(value))
     for axes in panels.flat[len(shown) :]:
         axes.remove()
     legend(figure, panels.flat[0])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: Up to so many different values have a bin each; more share as many as a figure asks for.
+#: Up to so many different values have a bin each.
 _GRID = 40
 
 #: An axis is logarithmic if its values are positive, and the largest is so many times the smallest.
@@ -45,14 +45,14 @@ def bins_of(values: np.ndarray, most: int) -> Bins:
 
     Args:
         values: of a grid, or anywhere.
-        most: how many bins there are for values that are no grid.
+        most: how many bins there are for values that are no grid; each then has as many of them.
 
     """
     values = values[np.isfinite(values)]
     wide = is_logarithmic(values)
     places = np.unique(np.log(values) if wide else values)
     if len(places) > _GRID:
-        edges = np.linspace(places[0], places[-1], most + 1)
+        edges = np.quantile(places, np.linspace(0.0, 1.0, most + 1))
         centres = 0.5 * (edges[1:] + edges[:-1])
     else:
         between = 0.5 * (places[1:] + places[:-1])

@@ -14,9 +14,9 @@ from orchestrator.studies.figures.entries import BANDS, FRONT, INFLUENCE, MAPS, 
 from orchestrator.studies.figures.fronts import front
 from orchestrator.studies.figures.influence import influence
 from orchestrator.studies.figures.maps import maps
-from orchestrator.studies.figures.runs import Columns, Runs
+from orchestrator.studies.figures.values import Columns, Values
 
-_DRAW: Mapping[str, Callable[[Plan, str, Runs], Figure]] = {
+_DRAW: Mapping[str, Callable[[Plan, str, Values], Figure]] = {
     BANDS: bands,
     MAPS: maps,
     FRONT: front,
@@ -42,7 +42,7 @@ def draw_figures(
 
     """
     for plan in plans:
-        runs = Runs(columns, plan.labels)
+        runs = Values(columns, plan.labels).where(plan.where)
         values = (*plan.x, *([plan.y] if plan.y else ()), *plan.show)
         lacking = [value for value in values if not np.isfinite(runs[value]).any()]
         if lacking:

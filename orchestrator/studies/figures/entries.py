@@ -17,7 +17,7 @@ from orchestrator.experiments.entries import (
     is_text,
 )
 from orchestrator.studies.engine import INDICES
-from orchestrator.studies.figures.runs import SCENARIO, is_known
+from orchestrator.studies.figures.values import SCENARIO, is_known
 
 #: What a figure can be.
 BANDS, MAPS, FRONT, INFLUENCE = "bands", "maps", "front", "influence"
@@ -44,6 +44,7 @@ class Plan:
     y: str = ""
     show: Sequence[str] = ()
     by: Sequence[str] = ()
+    where: Mapping[str, Any] = field(default_factory=dict)
     limits: Mapping[str, float] = field(default_factory=dict)
     labels: Mapping[str, str] = field(default_factory=dict)
 
@@ -57,15 +58,15 @@ class _Kind(NamedTuple):
 
 #: The kinds of figures, by the names that study files have for them.
 KINDS: Mapping[str, _Kind] = {
-    BANDS: _Kind(("x", "show"), ("by", "limits")),
-    MAPS: _Kind(("x", "y", "show"), ("by", "limits")),
-    FRONT: _Kind(("x", "y"), ("by",)),
-    INFLUENCE: _Kind(("x", "show"), ("by",)),
+    BANDS: _Kind(("x", "show"), ("by", "where", "limits")),
+    MAPS: _Kind(("x", "y", "show"), ("by", "where", "limits")),
+    FRONT: _Kind(("x", "y"), ("by", "where")),
+    INFLUENCE: _Kind(("x", "show"), ("by", "where")),
 }
 
 
 def _are_names(value: Any) -> bool:
-    return is_text(value) or (are_names(value) and bool(value))
+    return is_text(value) or are_names(value)
 
 
 def _are_numbers(value: Any) -> bool:
@@ -87,8 +88,11 @@ ENTRIES: Mapping[str, Entry] = {
     "by": Entry(
         "name, or list of names",
         _are_names,
-        "Columns that tell runs apart, by colours or in panels of their own.",
+        "Columns that tell runs apart, by colours or in panels of their own; `[]` for none.",
         "the scenario, if there are several",
+    ),
+    "where": Entry(
+        "table of values", is_table, "Only runs of which these columns have these values.", "none"
     ),
     "limits": Entry("table of numbers", _are_numbers, "Lines at values of what is shown.", "none"),
 }
@@ -127,6 +131,7 @@ def read_figures(
                 table.get("y", ""),
                 _listed(table.get("show", ())),
                 _listed(table.get("by", by)),
+                dict(flattened(table.get("where", {}))),
                 dict(flattened(table.get("limits", {}))),
                 labels,
             )
@@ -143,7 +148,7 @@ def _check(where: str, table: Any, columns: Sequence[str]) -> None:
     if kind is None:
         raise InputError(f"{where}: lacks kind; there are {', '.join(KINDS)}")
     needs, may = KINDS[kind]
-    if missing := [key for key in needs if key not in table]:
+    if missing := [key for key in needs if not table.get(key)]:
         raise InputError(f"{where}: lacks {' and '.join(missing)}")
     if more := [key for key in table if key not in ("kind", *needs, *may)]:
         raise InputError(f"{where}: {kind} have no {more[0]}")
@@ -155,11 +160,12 @@ def _check(where: str, table: Any, columns: Sequence[str]) -> None:
                 raise InputError(
                     f"{where}: {key}: runs have no {value!r}{did_you_mean(value, columns)}"
                 )
-    for column in _listed(table.get("by", ())):
-        if column not in columns:
-            raise InputError(
-                f"{where}: by: runs have no column {column!r}{did_you_mean(column, columns)}"
-            )
+    for key in ("by", "where"):
+        for column in _listed(table.get(key, ())):
+            if column not in columns:
+                raise InputError(
+                    f"{where}: {key}: runs have no column {column!r}{did_you_mean(column, columns)}"
+                )
 
 
 def _listed(value: Any) -> list[str]:

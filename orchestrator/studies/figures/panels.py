@@ -13,8 +13,8 @@ from orchestrator.analysis.figures.style import WIDTH, heading
 #: Room for a heading, and for a legend or the names of axes [in].
 _HEADING, _NAMES = 0.3, 0.45
 
-#: Numbers along a logarithmic axis.
-_TICKS = 6
+#: Numbers along a logarithmic axis; with less powers of ten than that, 2 and 5 have one as well.
+_TICKS, _FEW = 6, 1.5
 
 
 def paneled(title: str, rows: int, columns: int, height: float, **how: Any) -> tuple[Figure, Any]:
@@ -41,12 +41,19 @@ def spread(axis: Any) -> None:
     """Make an axis logarithmic, with a few powers of ten along it."""
     [name] = axis.axis_name
     getattr(axis.axes, f"set_{name}scale")("log")
-    axis.set_major_locator(LogLocator(numticks=_TICKS))
+    axis.axes.autoscale_view()
+    low, high = axis.get_view_interval()
+    is_short = high < low * 10.0**_FEW
+    axis.set_major_locator(
+        LogLocator(subs=(1.0, 2.0, 5.0) if is_short else (1.0,), numticks=_TICKS)
+    )
     axis.set_minor_locator(NullLocator())
+    if is_short:
+        axis.set_major_formatter("{x:g}")
 
 
 def legend(figure: Figure, axes: Axes) -> None:
-    """Say above all panels what the lines of one mean, if it has several."""
+    """Say below all panels what the lines of one mean, if it has several."""
     handles, labels = axes.get_legend_handles_labels()
     if len(handles) > 1:
-        figure.legend(handles, labels, loc="outside upper right", ncols=min(len(handles), 4))
+        figure.legend(handles, labels, loc="outside lower center", ncols=2)

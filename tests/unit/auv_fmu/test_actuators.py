@@ -1,9 +1,11 @@
-"""(3)."""
+"""(3), and actuators that take their time."""
 
 import numpy as np
+import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
-from auv_fmu.actuators import limit, limit_all
+from auv_fmu.actuators import limit, limit_all, respond
 from support.strategies import forces, vectors
 
 
@@ -20,3 +22,22 @@ def test_limits_of_each_actuator_are_its_own():
     assert limit_all((9.0, 9.0, 9.0), tau_min, tau_max) == tau_max
     assert limit_all((-9.0, -9.0, -9.0), tau_min, tau_max) == tau_min
     assert limit_all((0.5, -0.5, 2.5), tau_min, tau_max) == (0.5, -0.5, 2.5)
+
+
+@given(before=forces, tau=forces, T=st.floats(1e-3, 10.0), h=st.floats(1e-4, 1.0))
+def test_actuator_follows_its_equation_however_time_is_split(before, tau, T, h):
+    """T dtau_a/dt = tau - tau_a: its rate at the end, and two half steps for a whole one."""
+    after = respond(before, tau, T, h)
+    half = respond(respond(before, tau, T, h / 2), tau, T, h / 2)
+    assert after == pytest.approx(half, rel=1e-12, abs=1e-12)
+    small = 1e-4 * T
+    rate = (respond(after, tau, T, small) - after) / small
+    assert T * rate == pytest.approx(tau - after, rel=1e-4, abs=1e-9)
+
+
+@given(before=forces, tau=forces, T=st.floats(0.0, 1.7e308))
+def test_no_time_constant_is_too_small_or_too_large(before, tau, T):
+    low, high = min(before, tau), max(before, tau)
+    assert low - 1e-12 <= respond(before, tau, T, 0.02) <= high + 1e-12
+    assert respond(before, tau, 5e-324, 0.02) == respond(before, tau, 0.0, 0.02) == tau
+    assert respond(before, tau, 1e300, 0.02) == pytest.approx(before, abs=1e-12)

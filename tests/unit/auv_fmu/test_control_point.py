@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from auv_fmu.attitude import rotation_from_euler, rotation_from_quaternion
+from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import (
     actuated_velocity,
     actuator_command,
@@ -15,7 +15,6 @@ from auv_fmu.control_point import (
     jacobian,
 )
 from auv_fmu.plant import Parameters, begin, outputs, steps
-from auv_fmu.vehicle import Vehicle
 from support.strategies import angles, forces, lengths, pitch_angles, speeds, vectors
 
 

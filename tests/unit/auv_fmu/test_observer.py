@@ -1,6 +1,6 @@
 """(18), (23), (24) and (51): the velocity observer."""
 
-from math import exp
+from math import exp, expm1
 
 import numpy as np
 import pytest
@@ -90,3 +90,34 @@ def test_state_of_the_observer_is_equation_24():
         integral += h * np.array(observer.ddy_hat_o(w * np.cos(w * t), s(z), lambda_, k_d))
     expected = np.sin(w * end) + k_d * lambda_ * 0.9 * np.sin(w * end) / w
     np.testing.assert_allclose(integral, expected, rtol=1e-6)
+
+
+@given(k_d=st.floats(0.1, 1e4), h=st.floats(1e-4, 1.0), z=vectors(st.floats(-1e-3, 1e-3), 3))
+def test_exact_gain_takes_the_error_where_the_continuous_observer_takes_it(k_d, h, z):
+    """dz/dt = -k_d z, with a vehicle that moves on as dy_hat_o says: exp(-k_d h) z in any step."""
+    dy = (0.4, -0.2, 0.1)
+    rate = observer.dy_hat(dy, (0.0,) * 3, z, 1.0, observer.exact_gain(k_d, h))
+    after = np.array(z) + h * np.array(dy) - h * np.array(rate)
+    np.testing.assert_allclose(after, np.array(z) * exp(-k_d * h), rtol=1e-9, atol=1e-15)
+
+
+@given(k_d=st.floats(0.1, 1e3), h=st.floats(1e-4, 0.1))
+def test_exact_gain_is_the_mean_of_a_gain_that_decays(k_d, h):
+    """By the midpoint rule; it is k_d for small steps, and below 1 / h for all."""
+    n = 2000
+    t = (np.arange(n) + 0.5) * h / n
+    gain = observer.exact_gain(k_d, h)
+    assert gain == pytest.approx(np.mean(k_d * np.exp(-k_d * t)), rel=1e-3)
+    assert gain <= min(k_d, 1.0 / h) * (1 + 1e-12)
+    assert observer.exact_gain(k_d, 1e-12) == pytest.approx(k_d, rel=1e-8)
+
+
+def test_holding_the_measurement_instead_shows_another_velocity():
+    """The exact solution under a held y, for y = v t: dy_hat settles at k_d h / (1 - exp) v."""
+    k_d, h, v = 50.0, 0.02, 0.4
+    y_hat, shown = 0.0, 0.0
+    for k in range(100):
+        shown = k_d * (k * h * v - y_hat)
+        y_hat -= shown * expm1(-k_d * h) / k_d
+    assert shown == pytest.approx(v * k_d * h / -expm1(-k_d * h), rel=1e-9)
+    assert shown / v == pytest.approx(1.58, abs=0.005)

@@ -1,5 +1,7 @@
 """The proposed controller against the paper's vector form, and its parts against analysis."""
 
+from math import cos, sin
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,6 +10,7 @@ from hypothesis import strategies as st
 from auv_fmu import output_feedback
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import jacobian
+from auv_fmu.observer import EULER, EXACT, INTEGRAL, exact_gain
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement
 from auv_fmu.saturation import SATURATIONS
 from support.strategies import angles, speeds, vectors
@@ -26,7 +29,9 @@ three = vectors(speeds, 3)
 
 
 @pytest.mark.parametrize("name", SATURATIONS)
-@pytest.mark.parametrize("printed_jacobian", [True, False])
+@pytest.mark.parametrize(
+    ("form", "printed_jacobian"), [(EULER, True), (EULER, False), (INTEGRAL, False)]
+)
 @given(
     y=three,
     euler=vectors(angles, 3),
@@ -39,9 +44,12 @@ three = vectors(speeds, 3)
     gains=vectors(st.floats(0.1, 20), 6),
 )
 def test_law_is_48_to_51_in_matrices(
-    name, printed_jacobian, y, euler, y_d, dy_d, ddy_d, y_hat, dy_hat_o, theta_hat, gains
+    name, form, printed_jacobian, y, euler, y_d, dy_d, ddy_d, y_hat, dy_hat_o, theta_hat, gains
 ):
-    """(48), (49), (50), (51) and Remark 3 with numpy matrices, as the paper prints them."""
+    """(48), (49), (50), (51) and Remark 3 with numpy matrices, as the paper prints them.
+
+    Where (24) is integrated as printed, the state is its integral, without dy_r.
+    """
     s, s_slope = NUMPY[name], SLOPES[name]
     k_1, k_2, lam, k_d, eps_t, sigma = gains
     g = Gains(
@@ -55,6 +63,7 @@ def test_law_is_48_to_51_in_matrices(
         theta_0=(0.1, 0.2, 0.3, 0.4),
         s=SATURATIONS[name],
         printed_jacobian=printed_jacobian,
+        form=form,
     )
     state = ControllerState(y_hat, dy_hat_o, theta_hat)
     signals = output_feedback.evaluate(g, state, Measurement(y, euler, y_d, dy_d, ddy_d))
@@ -65,7 +74,7 @@ def test_law_is_48_to_51_in_matrices(
     Lambda, K_1, K_2 = lam * np.eye(3), np.diag(g.K1), np.diag(g.K2)
     e, z = y - y_d, y - y_hat
     dy_r = dy_d - Lambda @ s(e - z)
-    dy_hat = dy_hat_o + Lambda @ s(z) + k_d * z
+    dy_hat = dy_hat_o + Lambda @ s(z) + k_d * z + (dy_r if form == INTEGRAL else 0)
     ddy_r = ddy_d - Lambda @ np.diag(s_slope(y_hat - y_d)) @ (dy_hat - dy_d)
     r = dy_hat - dy_d + Lambda @ s(y_hat - y_d) + Lambda @ s(z)
     G = np.array([1, np.linalg.norm(dy_r), np.linalg.norm(dy_r) ** 2, np.linalg.norm(ddy_r)])
@@ -86,7 +95,7 @@ def test_law_is_48_to_51_in_matrices(
     np.testing.assert_allclose(signals.dy_hat, dy_hat, **exact)
     np.testing.assert_allclose(signals.e, e, **exact)
     np.testing.assert_allclose(signals.z, z, **exact)
-    ddy_hat_o = ddy_r + k_d * Lambda @ s(z)
+    ddy_hat_o = k_d * Lambda @ s(z) + (0 if form == INTEGRAL else ddy_r)
     np.testing.assert_allclose(signals.ddy_hat_o, ddy_hat_o, **exact)
     np.testing.assert_allclose(signals.dtheta_hat, dtheta_hat, **exact)
     np.testing.assert_allclose(moved.y_hat, y_hat + 0.02 * dy_hat, **exact)
@@ -113,3 +122,50 @@ def test_gate_restarts_the_observer_after_a_jump_only():
     restarted = output_feedback.gated(gains, state, (0.6, 0.6, 0.6))
     assert restarted == ((0.6, 0.6, 0.6), (0.0, 0.0, 0.0), state.theta_hat)
     assert output_feedback.gated(gains._replace(innovation_gate=0.0), state, (9.0,) * 3) is state
+
+
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+def estimates(gains, h, end, dy_hat_o=ORIGIN):
+    """dy_hat along y = y_d = (sin t, 0, 0), as the controller's own observer makes it."""
+    state = ControllerState(ORIGIN, dy_hat_o, (0.0,) * 4)
+    found = []
+    for k in range(round(end / h) + 1):
+        t = k * h
+        y, dy, ddy = (sin(t), 0.0, 0.0), (cos(t), 0.0, 0.0), (-sin(t), 0.0, 0.0)
+        signals = output_feedback.evaluate(gains, state, Measurement(y, ORIGIN, y, dy, ddy))
+        state = output_feedback.step(state, signals, h)
+        found.append(signals.dy_hat[0])
+    return np.array(found)
+
+
+def test_printed_24_and_its_rate_51_are_one_where_they_begin_alike():
+    """From dy_hat_o(0) = 0, the integral being -dy_r(0): what differs is Euler's error, O(h)."""
+    differences = []
+    for h in (0.002, 0.001):
+        of_24 = estimates(Gains(form=INTEGRAL), h, 2.0, dy_hat_o=(-1.0, 0.0, 0.0))
+        differences.append(np.abs(of_24 - estimates(Gains(), h, 2.0)).max())
+    assert differences[1] == pytest.approx(differences[0] / 2, rel=0.05)
+    assert differences[1] < 2e-3
+
+
+def test_printed_24_shows_the_desired_velocity_first_and_not_zero():
+    """Its integral begins at zero, so dy_hat(0) = dy_r(0): not the condition below (24)."""
+    assert estimates(Gains(form=INTEGRAL), 0.02, 0.0)[0] == 1.0
+    assert estimates(Gains(), 0.02, 0.0)[0] == 0.0
+
+
+@pytest.mark.parametrize("k_d", [50.0, 500.0, 5000.0])
+def test_exact_observer_follows_with_any_gain_in_steps_of_20_ms(k_d):
+    """sin t is followed as well as k_d h = 1 is by Euler's scheme, which k_d h = 2 breaks."""
+    gains = output_feedback.sampled(Gains(k_d=k_d, form=EXACT), 0.02)
+    assert gains == Gains(k_d=exact_gain(k_d, 0.02), form=EXACT)
+    late = slice(100, None)
+    true = np.cos(np.arange(251) * 0.02)[late]
+    assert np.abs(estimates(gains, 0.02, 5.0)[late] - true).max() < 0.02
+
+
+def test_other_forms_take_the_gains_as_they_are():
+    for gains in (Gains(), Gains(form=INTEGRAL)):
+        assert output_feedback.sampled(gains, 0.02) is gains

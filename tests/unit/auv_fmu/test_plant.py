@@ -1,6 +1,6 @@
 """The plant: (1) and (2) with six degrees of freedom."""
 
-from math import cos, sin
+from math import cos, exp, sin
 from random import Random
 
 import numpy as np
@@ -10,7 +10,7 @@ from hypothesis import given
 from auv_fmu import plant
 from auv_fmu.attitude import rotation_from_euler, rotation_from_quaternion
 from auv_fmu.plant import Parameters, RollAxis
-from auv_fmu.vehicle import Vehicle, accelerations
+from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 from support.strategies import angles, forces, pitch_angles, speeds, vectors
 
 #: Section 4.1 has m44 = m55, behind which terms of roll could hide.
@@ -150,3 +150,92 @@ def test_initial_attitude_is_the_one_asked_for(euler, position):
     np.testing.assert_allclose(
         rotation_from_quaternion(state.quaternion), rotation_from_euler(*euler), atol=1e-15
     )
+
+
+# Not in the paper: roll held at zero, ocean current, dynamics of the actuators
+
+HELD = Parameters(VEHICLE, ROLL._replace(rolls=False))
+H = 0.02
+
+
+def test_held_roll_leaves_1_and_2_as_they_are_printed_beyond_the_vertical_too():
+    """Five states of (1) and (2), with angles that nothing turns back, step by step."""
+    tau, tau_w = (10.0, 12.0, 1.5), (0.3, -0.2, 0.1, 9.0, 0.2, -0.1)
+    position, (theta, psi), nu = np.zeros(3), (0.2, 0.3), np.array([0.5, 0.1, -0.1, 0.0, 0.1])
+    state = started((0.0, 0.0, 0.0, 0.0, theta, psi), (0.5, 0.1, -0.1, 0.0, 0.0, 0.1), HELD)
+    steepest = 0.0
+    for _ in range(400):
+        dnu = accelerations(VEHICLE, tuple(nu), sin(theta), tau, (*tau_w[:3], *tau_w[4:]))
+        dtheta, dpsi = euler_rates(theta, *nu[3:])
+        rotation = np.column_stack(rotation_from_euler(0.0, theta, psi))
+        position = position + H * rotation @ nu[:3]
+        theta, psi, nu = theta + H * dtheta, psi + H * dpsi, nu + H * np.array(dnu)
+        state = moved(state, tau, tau_w, H, HELD)
+        steepest = max(steepest, theta)
+        shown = seen(state, HELD)
+        np.testing.assert_allclose(state.position, position, atol=1e-9)
+        np.testing.assert_allclose(state.nu, np.insert(nu, 3, 0.0), atol=1e-9)
+        assert shown.euler[0] == 0.0
+        np.testing.assert_allclose(np.sin(shown.euler[1:]), np.sin([theta, psi]), atol=1e-9)
+        np.testing.assert_allclose(np.cos(shown.euler[1:]), np.cos([theta, psi]), atol=1e-9)
+    assert np.rad2deg(steepest) > 100.0
+
+
+def test_roll_of_1_does_not_stay_zero_unless_it_is_held():
+    """d phi/dt = p + tan(theta) (q sin(phi) + r cos(phi)): a turn of a pitched vehicle rolls it."""
+    posture, turning = (0.0, 0.0, 0.0, 0.0, 0.5, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.4)
+    h = 1e-5
+    free = moved(started(posture, turning), UNDRIVEN, AT_REST, h)
+    assert seen(free).euler[0] / h == pytest.approx(0.4 * np.tan(0.5), rel=1e-4)
+    held = moved(started(posture, turning, HELD), UNDRIVEN, AT_REST, h, HELD)
+    assert seen(held, HELD).euler[0] == 0.0
+
+
+@pytest.mark.parametrize("parameters", [PARAMETERS, HELD])
+def test_constant_current_carries_the_whole_motion_along(parameters):
+    """Galilei: through the water all is as without it, and over ground it is that plus c t."""
+    current, n = np.array((0.4, -0.3, 0.2)), 300
+    tau, tau_w = (20.0, 3.0, 5.0), (0.5, 0.1, -0.2, 0.0, 0.1, 0.2)
+    eta0, nu0 = (1.0, 2.0, 3.0, 0.0, 0.3, -0.4), np.array((0.5, 0.1, -0.1, 0.0, 0.2, 0.1))
+    carried = parameters._replace(current=tuple(current))
+    drift = np.column_stack(rotation_from_euler(*eta0[3:])).T @ current
+    still = moved(started(eta0, tuple(nu0), parameters), tau, tau_w, H, parameters, n)
+    begun = started(eta0, (*(nu0[:3] + drift), *nu0[3:]), carried)
+    moving = moved(begun, tau, tau_w, H, carried, n)
+    np.testing.assert_allclose(moving.nu, still.nu, atol=1e-12)
+    np.testing.assert_allclose(moving.quaternion, still.quaternion, atol=1e-12)
+    np.testing.assert_allclose(moving.position, still.position + n * H * current, atol=1e-10)
+    without, with_it = seen(still, parameters), seen(moving, carried)
+    np.testing.assert_allclose(with_it.dy, without.dy + current, atol=1e-12)
+    rotation = np.column_stack(rotation_from_euler(*with_it.euler))
+    over_ground = np.concatenate((still.nu[:3] + rotation.T @ current, still.nu[3:]))
+    np.testing.assert_allclose(with_it.nu, over_ground, atol=1e-12)
+
+
+def test_vehicle_at_rest_over_ground_is_dragged_along_as_damping_says():
+    """Surge through the water is -c (1 - h d/m)^k, and the vehicle ends with the current."""
+    c, n = 0.5, 200
+    parameters = PARAMETERS._replace(current=(c, 0.0, 0.0))
+    state = started((0.0,) * 6, AT_REST, parameters)
+    assert seen(state, parameters).nu == AT_REST
+    state = moved(state, UNDRIVEN, AT_REST, H, parameters, n)
+    expected = c - c * (1 - H * VEHICLE.d11 / VEHICLE.m11) ** n
+    assert seen(state, parameters).nu[0] == pytest.approx(expected, rel=1e-12)
+
+
+def test_actuators_with_a_lag_follow_a_step_as_their_equation_does():
+    """tau_0 + (tau - tau_0) (1 - exp(-t / T)) at every instant; the one without follows at once."""
+    tau, T = (40.0, -20.0, 10.0), (0.5, 0.004, 0.0)
+    parameters = PARAMETERS._replace(T=T)
+    state, _ = plant.begin(parameters, tau)
+    assert state.tau == (0.0, 0.0, 10.0)
+    for k in range(1, 50):
+        state = moved(state, tau, AT_REST, H, parameters)
+        expected = [40.0 * (1 - exp(-k * H / 0.5)), -20.0 * (1 - exp(-k * H / 0.004)), 10.0]
+        np.testing.assert_allclose(state.tau, expected, rtol=1e-12)
+
+
+def test_force_that_a_lag_lets_through_is_the_one_that_accelerates():
+    parameters = PARAMETERS._replace(T=(0.1, 0.0, 0.0))
+    state = moved(started((0.0,) * 6, AT_REST, parameters), (40.0, 0, 0), AT_REST, H, parameters)
+    assert state.nu[0] == pytest.approx(H * 40.0 * (1 - exp(-H / 0.1)) / VEHICLE.m11, rel=1e-12)

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from orchestrator.analysis.figures.style import heading
 from orchestrator.errors import InputError
 from orchestrator.experiments.scenario import read_scenario
 from orchestrator.studies.engine import INDICES, REACHED
@@ -66,7 +67,7 @@ VERDICTS: Mapping[str, tuple[str, Callable[[Columns], np.ndarray]]] = {
 }
 
 
-class Runs:
+class Values:
     """The values of some runs.
 
     A value is a column, or one of :data:`VERDICTS`, or is made of columns:
@@ -105,7 +106,7 @@ class Runs:
     def label(self, value: str) -> str:
         """What a value is called, with its unit in brackets."""
         if value in self._labels:
-            return self._labels[value]
+            return heading(self._labels[value])
         if value in VERDICTS:
             return VERDICTS[value][0]
         if len(factors := _factors(value)) > 1:
@@ -128,7 +129,16 @@ class Runs:
         """What a value is called, without its unit."""
         return _UNIT.sub("", self.label(value))
 
-    def parts(self, by: Sequence[str]) -> Iterator[tuple[str, Runs]]:
+    def where(self, values: Mapping[str, Any]) -> Values:
+        """The runs of which some columns have some values."""
+        fitting = [self._columns[name] == value for name, value in values.items()]
+        return self._rows(np.all(fitting, axis=0)) if fitting else self
+
+    def _rows(self, rows: np.ndarray) -> Values:
+        columns = {name: values[rows] for name, values in self._columns.items()}
+        return Values(columns, self._labels)
+
+    def parts(self, by: Sequence[str]) -> Iterator[tuple[str, Values]]:
         """The runs that agree in some columns, and what tells them from the others.
 
         Args:
@@ -138,9 +148,7 @@ class Runs:
         keys = list(zip(*(self._columns[name].tolist() for name in by), strict=True))
         keys = [tuple(None if _is_nan(part) else part for part in key) for key in keys]
         for key in dict.fromkeys(keys):
-            rows = np.array([other == key for other in keys])
-            columns = {name: values[rows] for name, values in self._columns.items()}
-            yield self._name(by, key), Runs(columns, self._labels)
+            yield self._name(by, key), self._rows(np.array([other == key for other in keys]))
         if not by:
             yield "", self
 
