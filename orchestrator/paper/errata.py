@@ -115,7 +115,7 @@ def errata() -> tuple[Erratum, ...]:
             ),
         ),
         Erratum(
-            "P2.2 and P2.3 exclude each other",
+            "P2.2 and P2.3 exclude each other in (15)",
             "P2.3 makes C_2(x) y symmetric in x and y, so the product C_2(dy) dy of (15) fixes it: "
             "it is (C_2(x) y + C_2(y) x) / 2. Take a level vehicle, x ahead and y to starboard. "
             "Under x the vehicle does not turn, so M_2 is at rest and P2.2 asks for "
@@ -258,7 +258,7 @@ def errata() -> tuple[Erratum, ...]:
             ),
         ),
         Erratum(
-            "4.1: the turning radius is a diameter",
+            "4.1: the quoted turning radius has the size of the diameter",
             "(2) at rest under 80 N and 80 N·m has one solution, r = 3.875 rad/s, and turns on a "
             "radius of 0.280 m. Its diameter, 0.561 m, rounds to the printed 0.6 m (reading 11).",
             (

@@ -90,7 +90,7 @@ def test_pd_effort_belongs_to_the_step():
 
 def test_the_circle_is_the_one_of_2():
     """v and u follow from r in (2) at rest; what is left is a polynomial of fifth degree in r."""
-    text = text_of("4.1: the turning radius is a diameter")
+    text = text_of("4.1: the quoted turning radius has the size of the diameter")
     m11, m22, d11, d22, d66 = 25.0, 17.5, 30.0, 30.0, 20.0
     inverse_of_u = np.array([m11 * m22 / d22, 0.0, d11]) / 80.0
     yaw = np.polymul([-d66, 80.0], np.polymul(inverse_of_u, inverse_of_u))
