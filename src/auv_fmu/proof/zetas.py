@@ -40,10 +40,11 @@ def coupling(vehicle: Vehicle, ell: float) -> float:
 def at_least(vehicle: Vehicle, ell: float, lambda_: float) -> Zetas:
     """What zeta_1 + zeta_2 and zeta_3 + zeta_4 are at least, for chi_1 and chi_2 as printed.
 
-    The states: r_1 = (a, b, 0) and s(e) = (-c, 0, 0) give
-    chi_1 = -k b (a + lambda c) e_2, largest at b^2 = 1/2 and c = lambda a;
-    r_1 = (0, b, 0), s(e) = (c, 0, 0), r_2 = (a, 0, 0) give the same in chi_2's own numbers, with
-    the damping of turning, and a term along e_1 that is left out. So does the plane of e_1, e_3.
+    With r_1 = (a, b, 0) and s(e) = (-c, 0, 0), chi_1 = -k b (a + lambda c) e_2 for the k of
+    :func:`coupling`. With r_1 = (0, b, 0), s(e) = (c, 0, 0) and r_2 = (a, 0, 0), chi_2 has the part
+    -b (m66 / ell^3 (a + lambda c (2 - m11 / m22)) + d66 / ell^2) along e_2. Both are taken at
+    b^2 = 1/2, where all but the last term is largest, and with a and c in the ratio of their
+    factors. In the plane of e_1 and e_3 pitch and heave stand for yaw and sway.
 
     Args:
         vehicle: parameters.
@@ -58,5 +59,5 @@ def at_least(vehicle: Vehicle, ell: float, lambda_: float) -> Zetas:
 
 
 def _chi_2(inertia: float, damping: float, ratio: float, ell: float, lambda_: float) -> float:
-    """The component of chi_2 along r_1, for |r_1|^2 = 1/2 and the best share of s(e) and r_2."""
+    """The size of chi_2 along r_1 at |r_1|^2 = 1/2."""
     return 0.5 * inertia / ell * hypot(1.0, lambda_ * (2.0 - ratio)) + damping / sqrt(2.0)
