@@ -18,6 +18,7 @@ module                  what it holds
 :mod:`.courses`         the runs of all combinations, and what is read off them
 :mod:`.printed_table`   the printed table beside them
 :mod:`.sections`        a section for each scenario
+:mod:`.studies`         the ready studies, their figures and what these show
 :mod:`.page`            Markdown as one HTML page
 :mod:`.report`          all of it put together
 ======================  ==============================================================

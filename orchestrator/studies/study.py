@@ -99,6 +99,7 @@ class Study:
     name: str
     scenario: Sequence[str]
     title: str = ""
+    remark: str = ""
     engine: str = FMU
     stop_time: StopTime | None = None
     step: float | None = None
@@ -144,6 +145,9 @@ ENTRIES: dict[str, Entry] = {
         "",
     ),
     "title": Entry("text", is_text, "Heading of the figures.", "the name of the file"),
+    "remark": Entry(
+        "text", is_text, "What the report says below the figures, in Markdown.", "none"
+    ),
     "engine": _one_of(ENGINES)._replace(
         meaning="What makes the runs: the FMUs, or the equations compiled, which know the standard "
         "closed loop alone and give the same numbers."

@@ -91,6 +91,7 @@ def test_input_with_two_sources_is_refused(system: System):
         ("controller.printed_jacobian", "perhaps", "not a Boolean"),
         ("controller.saturation", "sigmoid", "use one of tanh, algebraic"),
         ("plant.tau_min.q", 0.0, None),
+        ("plant.actuator.T.u", -1, "must be at least 0"),
         ("plant.y.x", 1, "is of causality output and cannot be set"),
         ("plant.tau.u", 1, "is fed by controller.tau.u"),
         ("pilot.mood", 1, "no component 'pilot'"),
@@ -104,6 +105,13 @@ def test_wrong_parameter_is_refused_in_one_line(system, name, value, reason):
     with pytest.raises(InputError, match=reason) as error:
         run(system.with_parameters(values), 1.0, 0.02)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["plant.eta0.phi", "plant.nu0.p"])
+def test_roll_that_is_held_cannot_start_otherwise(system, name):
+    values = {port("plant.roll"): False, port(name): 0.1}
+    with pytest.raises(InputError, match="must be 0 where roll is false"):
+        run(system.with_parameters(values), 1.0, 0.02)
 
 
 @pytest.mark.parametrize("experiment", [(0.0, 0.02), (-1.0, 0.02), (1.0, 0.0), (float("nan"), 1.0)])

@@ -14,6 +14,8 @@ from orchestrator.paper.choices import OF_RUNS, PD, PROPOSED, SIGNALS, Choice
 from orchestrator.paper.courses import all_variants
 from orchestrator.paper.measures import way_of
 
+pytest.importorskip("numba", reason="needs the extra `studies`")
+
 #: The first two options of these, and ours of all others.
 TRIED = ("eps_t of the proposed controller", "order")
 

@@ -23,7 +23,7 @@ from orchestrator.studies.figures.values import SCENARIO, is_known
 BANDS, MAPS, FRONT, INFLUENCE = "bands", "maps", "front", "influence"
 
 #: The table that is no figure.
-_LABELS = "labels"
+LABELS = "labels"
 
 #: What is shown of a study whose file does not say it.
 _USUAL = ("late_error", "peak_command", "lost")
@@ -114,7 +114,7 @@ def read_figures(
 
     """
     tables = dict(figures)
-    labels = dict(flattened(tables.pop(_LABELS, {})))
+    labels = dict(flattened(tables.pop(LABELS, {})))
     numbers = [name for name, kind in varied.items() if kind is not str]
     if not tables and numbers:
         tables["influence"] = {"kind": INFLUENCE, "x": numbers, "show": list(_USUAL)}
