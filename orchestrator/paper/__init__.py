@@ -1,9 +1,10 @@
-"""The paper's section 4: printed numbers, claims, effects, report.
+"""The paper's section 4: printed numbers, claims, effects, report, and what is wrong in it.
 
 ======================  ==============================================================
 module                  what it holds
 ======================  ==============================================================
 :mod:`.published`       what the paper prints
+:mod:`.errata`          what is wrong in it, each point with its proof and its test
 :mod:`.readings`        the points where it is silent or contradicts itself, in short
 :mod:`.formatting`      numbers, tables and pictures in Markdown
 :mod:`.workers`         processes on the cores that end when the user says so

@@ -15,7 +15,7 @@ from orchestrator.experiments.bundle import PYTHON, current_fmus
 from orchestrator.experiments.folder import replaced
 from orchestrator.experiments.record import PACKAGES, Clock, write_files
 from orchestrator.experiments.wiring import closed_loop
-from orchestrator.paper import printed_table, readings, studies
+from orchestrator.paper import errata, printed_table, readings, studies
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS, show_effect
 from orchestrator.paper.formatting import table
@@ -157,6 +157,8 @@ def _text(
     yield from shown
     yield "## Gain conditions"
     yield f"`auv-fmu gains`:\n\n```\n{gains.check(closed_loop(fmus))}\n```"
+    yield "## What is wrong in the paper"
+    yield errata.section()
     yield "## Readings"
     yield readings.section()
     yield "## Versions and commands"

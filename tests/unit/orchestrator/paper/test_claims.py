@@ -278,10 +278,17 @@ def test_intolerable_chattering_is_not_said_to_be_seen_where_it_is_not():
     assert claims.intolerable_chattering(rough).verdict == "agrees"
 
 
-def test_gains_of_the_paper_miss_30():
-    """Reading 10: lambda_min(K_2 Lambda) = 10 is not above 0.5 10 1 + 10 = 15."""
-    found = claim_of(claims.gains_meet_the_condition).finding([])
-    assert found.ours == "10, needed: above 15"
+def test_gains_of_the_paper_miss_30_and_31():
+    """Reading 10: lambda_min(K_2 Lambda) = 10 is not above 15, nor lambda_d2 = 30 above 192."""
+    found = claim_of(claims.gains_meet_the_conditions).finding([])
+    assert found.ours.startswith("violated, violated, open: (30) 10, needed above 15; (31) 30,")
+    assert found.verdict.startswith("**differs**")
+
+
+def test_no_gains_make_the_region_arbitrarily_large():
+    """2 lambda_d2 / (m11 m66 / (m22 ell^3)) = 0.12."""
+    found = claim_of(claims.region_is_arbitrarily_large).finding([])
+    assert "lambda_d2 > 124.9, which is 30; (42) holds for |x| < 0.12 at most" in found.ours
     assert found.verdict.startswith("**differs**")
 
 
