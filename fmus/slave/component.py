@@ -18,7 +18,7 @@ from xml.etree.ElementTree import Element
 
 from pythonfmu import DefaultExperiment
 
-from auv_fmu.euler import internal_steps, longest_step
+from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS, internal_steps, longest_step
 from fmus.ports.description import ABOUT, EXPERIMENT
 from fmus.ports.description_fmi2 import complete
 from fmus.ports.groups import ParameterSet, packing, slices, unpacking
@@ -38,19 +38,12 @@ from fmus.slave.state import Snapshot, checked, from_bytes, nearly_equal, to_byt
 #: Longest step of a component that has no internal steps [s].
 _NO_LIMIT = 1e300
 
-#: Largest norm of a state. No vehicle comes near it, and from a state below it a step with sane
-#: inputs is always finite: one wild sample must not be the end of a run.
-LARGEST_STATE = 1e100
-
 #: Why no step is taken in the other modes.
 _NOT_STEPPING = {
     INSTANTIATED: "not initialised",
     INITIALISING: "not initialised",
     TERMINATED: "terminated",
 }
-
-#: More internal steps than this in one communication step are taken for a mistake.
-MOST_INTERNAL_STEPS = 1_000_000
 
 State = TypeVar("State")
 Inputs = TypeVar("Inputs")

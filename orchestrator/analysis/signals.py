@@ -124,7 +124,7 @@ def true_control_point(table: Table) -> np.ndarray:
             control_point((x, y, z), rotation_from_euler(*euler), ell)
             for x, y, z, *euler in table.group(*POSTURE).tolist()
         ]
-    )
+    ).reshape(-1, 3)
 
 
 def tracking_error(table: Table) -> np.ndarray:

@@ -8,9 +8,8 @@ from typing import Any
 
 from orchestrator.commands.options import INTERRUPTED, OK, add_kind, add_loop, add_out
 from orchestrator.commands.streams import say, show
-from orchestrator.studies.store import FAILURE
 from orchestrator.studies.study import ENGINES, read_study, ready_studies
-from orchestrator.studies.sweep import folder_of, swept
+from orchestrator.studies.sweep import Means, folder_of, swept
 
 
 def add_to(commands: Any) -> None:
@@ -44,22 +43,12 @@ def add_to(commands: Any) -> None:
 def _sweep(options: argparse.Namespace) -> int:
     study = read_study(options.study)
     folder = folder_of(study, options.out)
+    means = Means(options.engine, options.kind, options.loop, options.scheduler, options.workers)
     try:
-        runs = swept(
-            study,
-            options.engine,
-            options.kind,
-            options.loop,
-            options.scheduler,
-            options.workers,
-            folder,
-            options.command,
-            progress=True,
-        )
+        result = swept(study, means, folder, options.command, say, progress=True)
     except KeyboardInterrupt:
         say(f"interrupted; {folder} keeps what is done: the same command goes on from there")
         return INTERRUPTED
-    failed = sum(failure is not None for failure in runs[FAILURE])
-    show(f"{study.name}: {len(runs):,} runs, of which {failed:,} failed")
+    show(f"{study.name}: {result.runs:,} runs, of which {result.failed:,} failed")
     show(f"written to {folder}{os.sep}")
     return OK

@@ -10,6 +10,7 @@ module              what it holds
 :mod:`.indices`     what comes out of a run, from its rows
 :mod:`.store`       what has come out of a study, as it comes and at the end
 :mod:`.cluster`     who makes which runs, and where: Dask
+:mod:`.figures`     what is drawn of it
 :mod:`.sweep`       a study as a whole
 ==================  ==================================================================
 

@@ -18,6 +18,7 @@ from threading import Lock
 from time import monotonic
 from typing import Any
 
+from dask import config
 from dask.system import CPU_COUNT
 from distributed import Client, Future, KilledWorker, LocalCluster, WorkerPlugin, get_worker
 from distributed.utils import silence_logging_cmgr
@@ -42,12 +43,14 @@ _MOST_RUNS = 10_000
 #: Blocks under way for each thread of the workers: the one it makes, and the one that is next.
 _AHEAD = 2
 
-#: How often workers are counted [s], how long there may be none [s], and how long it may take to
-#: find the scheduler [s].
-_GLANCE, _PATIENCE, _CONNECT = 2.0, 120.0, 15.0
+#: How often workers are counted [s], and how long there may be none [s].
+_GLANCE, _PATIENCE = 2.0, 120.0
 
 #: How long a process of this machine has to leave when the study is broken off [s].
 _FAREWELL = 0.5
+
+#: Where a server of this machine listens: for this machine alone, and at a port that is free.
+_LOOPBACK = "127.0.0.1:0"
 
 #: What is said of a run that no worker has survived.
 FATAL = "every process that made it died"
@@ -87,7 +90,8 @@ def making(
         except Exception as error:
             # Whatever is raised by a worker with other packages than this process has.
             raise InputError(f"a worker cannot take the study: {reason(error)}") from error
-        stack.callback(_forget, client, name)
+        if scheduler is not None:
+            stack.callback(_forget, client, name)
         yield _Making(client, name).outcomes(runs)
 
 
@@ -98,7 +102,7 @@ def _remote(address: str, workers: int | None) -> Iterator[Client]:
             "--workers is for processes of this machine: those of a scheduler are started with it"
         )
     try:
-        client = Client(address, timeout=_CONNECT, set_as_default=False)
+        client = Client(address, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(f"no scheduler answers at {address}: {reason(error)}") from error
     with client:
@@ -109,20 +113,24 @@ def _remote(address: str, workers: int | None) -> Iterator[Client]:
 def _local(workers: int | None) -> Iterator[Client]:
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers}: must be at least 1")
+    folder = str(process_folder())
     try:
-        with without_interrupt():
+        with without_interrupt(), config.set({"temporary-directory": folder}):
             cluster = LocalCluster(
                 n_workers=workers or CPU_COUNT,
                 threads_per_worker=1,
-                dashboard_address=None,
+                dashboard_address=_LOOPBACK,
+                scheduler_kwargs={"dashboard": False},
                 memory_limit=0,
                 silence_logs=CRITICAL,
-                local_directory=process_folder(),
-                env={"TMPDIR": process_folder()},
+                env={"TMPDIR": folder},
             )
             client = Client(cluster, set_as_default=False)
     except (OSError, RuntimeError) as error:
-        raise InputError(f"no process can be started: {reason(error)}") from error
+        raise InputError(
+            f"no process can be started: {reason(error)} (a script needs `if __name__ == "
+            "'__main__':` around what it does)"
+        ) from error
     with cluster, client:
         try:
             yield client
@@ -139,8 +147,8 @@ def _end(cluster: LocalCluster) -> None:
 
 
 def _forget(client: Client, name: str) -> None:
-    """Have workers forget what they were sent, if there is still somebody to tell."""
-    with suppress(OSError, ValueError, TimeoutError):
+    """Have a cluster forget what it was sent, if there is still somebody to tell."""
+    with suppress(Exception):
         client.unregister_worker_plugin(name)
 
 

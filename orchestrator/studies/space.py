@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
 from math import ceil, floor, log2, prod
 from typing import Any
 
 import numpy as np
+from fmpy.model_description import ModelVariable
 
 from orchestrator.errors import InputError, reason
+from orchestrator.experiments.entries import is_number
 from orchestrator.experiments.preparation import Request, prepare
 from orchestrator.experiments.scenario import Scenario
+from orchestrator.master.experiment import Experiment
 from orchestrator.studies.engine import Run
-from orchestrator.studies.study import LOG, METHODS, STEP, Range, Sample, StopTime, Study
-from orchestrator.system.names import PortName, port_name
+from orchestrator.studies.study import LATIN_HYPERCUBE, LOG, SOBOL, STEP, Range, Sample, Study
+from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value, type_of, typed
 
@@ -49,39 +52,59 @@ class Space:
             InputError: a value does not exist, or cannot be what it shall be.
 
         """
-        self._study, self._scenarios = study, tuple(study.scenario)
-        self._systems = {name: system for name, (_, system) in systems.items()}
-        for name in study.parameters:
-            self._owner(name)
-        self.has_scenarios = len(study.scenario) > 1
-        self.columns = {name: self._kind(name) for name in study.varied}
+        known = _Known([system for _, system in systems.values()])
+        self._stop_time, self._scenarios = study.stop_time, tuple(study.scenario)
+        self.has_scenarios = len(self._scenarios) > 1
+        self.columns = {name: known.kind(name) for name in study.varied}
         self._grid = {
-            name: tuple(self._typed(name, value) for value in values)
+            name: tuple(known.typed(name, value) for value in values)
             for name, values in study.vary.items()
         }
-        self._ranges = dict(study.sample.ranges) if study.sample else {}
-        for name in self._ranges:
-            self._check_range(name)
-        self._shape = tuple(map(len, self._grid.values()))
-        n = prod(self._shape) * (study.sample.n if study.sample else 1) * len(self._scenarios)
-        if n > MOST_RUNS:
-            raise InputError(f"{study.name}: {n:,} runs are more than {MOST_RUNS:,}")
-        self._n = n
-        self._experiments, self._constants = {}, {}
-        for name, (scenario, system) in systems.items():
-            constants = self._of(name, study.parameters)
-            request = Request(
-                self._shortest(study.stop_time), study.step, study.order,
-                {port_name(target): value for target, value in constants.items()},
-            )  # fmt: skip
-            prepared = prepare(scenario, system, request)
-            self._experiments[name] = prepared.experiment
-            self._constants[name] = {
-                target: prepared.system.parameters[port_name(target)] for target in constants
-            }
-            for step in self._ends(STEP) if STEP in study.varied else ():
-                replace(prepared.experiment, step=step)
+        self._ranges = study.sample.ranges if study.sample else {}
+        for name, limits in self._ranges.items():
+            if self.columns[name] not in (float, int):
+                raise InputError(f"{name}: only numbers can be sampled; put it under [vary]")
+            for end in (limits.low, limits.high):
+                known.typed(name, end)
+        samples = study.sample.n if study.sample else 1
+        self._n = prod(map(len, self._grid.values())) * samples * len(self._scenarios)
+        if self._n > MOST_RUNS:
+            raise InputError(f"{study.name}: {self._n:,} runs are more than {MOST_RUNS:,}")
         self._points = drawn(study.sample) if study.sample else np.empty((1, 0))
+        self._constants = {
+            name: known.typed(name, value) for name, value in study.parameters.items()
+        }
+        self._has = {
+            name: known.those_of(system, (*study.parameters, *study.varied))
+            for name, (_, system) in systems.items()
+        }
+        self._experiments = {
+            name: self._experiment(name, study, *system) for name, system in systems.items()
+        }
+
+    def _experiment(
+        self, name: str, study: Study, scenario: Scenario, system: System
+    ) -> Experiment:
+        """The shortest run of a scenario, which can be prepared like any run of it."""
+        _, point = self.point(0)
+        shortest = study.stop_time and study.stop_time.base + sum(
+            min(rate * end for end in self._ends(varied))
+            for varied, rate in study.stop_time.per.items()
+        )
+        values = {
+            port_name(target): value
+            for target, value in {**self._constants, **point}.items()
+            if target in self._has[name]
+        }
+        request = Request(shortest, study.step, study.order, values)
+        experiment = prepare(scenario, system, request).experiment
+        for step in self._ends(STEP) if STEP in self.columns else ():
+            replace(experiment, step=step)
+        return experiment
+
+    def _ends(self, name: str) -> Sequence[float]:
+        """The values of a grid, or the two ends of a range."""
+        return [float(value) for value in self._grid.get(name) or self._ranges[name][:2]]
 
     def __len__(self) -> int:
         """How many runs there are."""
@@ -92,13 +115,12 @@ class Space:
         if not 0 <= number < self._n:
             raise IndexError(number)
         scenario, point = self.point(number)
-        experiment = self._experiments[scenario]
-        stop_time = self._study.stop_time
+        experiment, has = self._experiments[scenario], self._has[scenario]
         return Run(
             number,
             scenario,
-            {**self._constants[scenario], **self._of(scenario, point)},
-            stop_time.of(point) if stop_time else experiment.stop_time,
+            {name: value for name, value in {**self._constants, **point}.items() if name in has},
+            self._stop_time.of(point) if self._stop_time else experiment.stop_time,
             point.get(STEP, experiment.step),
             experiment.order,
         )
@@ -108,82 +130,56 @@ class Space:
         place, scenario = divmod(number, len(self._scenarios))
         combination, sample = divmod(place, len(self._points))
         point: dict[str, Any] = {}
-        indices = np.unravel_index(combination, self._shape) if self._shape else ()
-        for (name, values), i in zip(self._grid.items(), indices, strict=True):
+        for name, values in reversed(self._grid.items()):
+            combination, i = divmod(combination, len(values))
             point[name] = values[i]
-        for (name, limits), u in zip(
-            self._ranges.items(), self._points[sample].tolist(), strict=True
-        ):
-            point[name] = between(limits, u, self.columns[name] is int)
+        shares = self._points[sample].tolist()
+        for (name, limits), share in zip(self._ranges.items(), shares, strict=True):
+            point[name] = between(limits, share, self.columns[name] is int)
         return self._scenarios[scenario], point
 
     @property
     def digest(self) -> str:
-        """Of all values: other runs have another one."""
-        content = repr((self._scenarios, self._grid, self._ranges)).encode()
-        return sha256(content + self._points.tobytes()).hexdigest()
+        """Of all values that vary: other runs have another one."""
+        content = repr((self._grid, self._ranges)).encode() + self._points.tobytes()
+        return sha256(content).hexdigest()
 
-    def _of(self, scenario: str, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Those of some values that a scenario has."""
-        system = self._systems[scenario]
-        return {
-            name: value
-            for name, value in values.items()
-            if name != STEP and system.has(port_name(name))
-        }
 
-    def _owner(self, name: str) -> tuple[PortName, System]:
-        """A system that has a parameter.
+class _Known:
+    """What some systems know of the values that a study names: one of them must know each."""
 
-        Raises:
-            InputError: there is none.
+    def __init__(self, systems: Sequence[System]) -> None:
+        self._systems = systems
 
-        """
+    def kind(self, name: str) -> type[Value]:
+        """The type of a value."""
+        return float if name == STEP else _KINDS[type_of(self._variable(name))]
+
+    def typed(self, name: str, value: Any) -> Value:
+        """A value in its type."""
+        if name != STEP:
+            return typed(name, self._variable(name), value)
+        if not is_number(value):
+            raise InputError(f"{STEP} = {value!r}: not a number of seconds")
+        return float(value)
+
+    def _variable(self, name: str) -> ModelVariable:
         target = port_name(name)
-        for system in self._systems.values():
-            if system.has(target):
-                return target, system
-        # Says what it has instead.
-        system.component(target.component).variable(target.port)
-        raise AssertionError
+        system = next((one for one in self._systems if one.has(target)), self._systems[-1])
+        return system.component(target.component).variable(target.port)
 
-    def _kind(self, name: str) -> type[Value]:
-        if name == STEP:
-            return float
-        target, system = self._owner(name)
-        return _KINDS[type_of(system.component(target.component).variable(target.port))]
-
-    def _typed(self, name: str, value: Any) -> Value:
-        if name == STEP:
-            return float(value)
-        target, system = self._owner(name)
-        return typed(name, system.component(target.component).variable(target.port), value)
-
-    def _check_range(self, name: str) -> None:
-        if self.columns[name] not in (float, int):
-            raise InputError(f"{name}: only numbers can be sampled; put it under [vary]")
-        for end in self._ranges[name][:2]:
-            self._typed(name, end)
-
-    def _ends(self, name: str) -> tuple[float, float]:
-        values = tuple(map(float, self._grid.get(name) or self._ranges[name][:2]))
-        return min(values), max(values)
-
-    def _shortest(self, stop_time: StopTime | None) -> float | None:
-        """The end of the shortest run that there may be."""
-        if stop_time is None:
-            return None
-        return stop_time.base + sum(
-            min(rate * end for end in self._ends(name)) for name, rate in stop_time.per.items()
-        )
+    @staticmethod
+    def those_of(system: System, names: Iterable[str]) -> set[str]:
+        """The names of parameters that a system has."""
+        return {name for name in names if name != STEP and system.has(port_name(name))}
 
 
-def between(limits: Range, u: float, whole: bool) -> float | int:
+def between(limits: Range, share: float, whole: bool) -> float | int:
     """The value at a share of a range; of whole numbers each has the same chance."""
     low, high, spacing = limits
     if whole:
         low, high = min(low, high), max(low, high) + 1
-    value = low * (high / low) ** u if spacing == LOG else low + (high - low) * u
+    value = low * (high / low) ** share if spacing == LOG else low + (high - low) * share
     return min(floor(value), int(high) - 1) if whole else value
 
 
@@ -194,18 +190,18 @@ def drawn(sample: Sample) -> np.ndarray:
         InputError: the method cannot draw that many.
 
     """
-    n, width = sample.n, len(sample.ranges)
-    if sample.method == "random":
-        return np.random.default_rng(sample.seed).random((n, width))
     from scipy.stats import qmc  # noqa: PLC0415
 
+    n, width = sample.n, len(sample.ranges)
     generator = np.random.default_rng(sample.seed)
     try:
-        if sample.method == METHODS[0]:
+        if sample.method == SOBOL:
             # As many as it is made for, of which the first are taken.
             points: np.ndarray = qmc.Sobol(width, rng=generator).random_base2(ceil(log2(n)))[:n]
-        else:
+        elif sample.method == LATIN_HYPERCUBE:
             points = qmc.LatinHypercube(width, rng=generator).random(n)
+        else:
+            points = generator.random((n, width))
     except ValueError as error:
-        raise InputError(f"method {sample.method!r}: {reason(error)}") from error
+        raise InputError(f"sample: {reason(error)}") from error
     return points

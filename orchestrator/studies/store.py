@@ -68,7 +68,7 @@ class Store:
 
     def add(self, outcomes: Sequence[Outcome]) -> None:
         """Keep a block of outcomes: all of them, or none."""
-        with _written(self._folder), self._database:
+        with written(self._folder), self._database:
             self._database.executemany(
                 "INSERT OR IGNORE INTO outcomes VALUES (?, ?, ?)", map(_row, outcomes)
             )
@@ -79,17 +79,19 @@ class Store:
         return int(n)
 
     def publish(self, space: Space) -> None:
-        """Write the table of all runs, in their order."""
+        """Write the table of all runs, in their order; the database goes."""
         arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
         rows = self._database.execute("SELECT * FROM outcomes ORDER BY number")
         schema = _schema(arrow, space)
-        with (
-            _written(self._folder),
-            whole(self._folder / TABLE) as partial,
-            parquet.ParquetWriter(partial, schema) as writer,
-        ):
-            while block := list(islice(rows, _ROWS)):
-                writer.write_batch(_batch(arrow, schema, space, block))
+        with written(self._folder):
+            with (
+                whole(self._folder / TABLE) as partial,
+                parquet.ParquetWriter(partial, schema) as writer,
+            ):
+                while block := list(islice(rows, _ROWS)):
+                    writer.write_batch(_batch(arrow, schema, space, block))
+            self._database.close()
+            _remove_database(self._folder)
 
 
 @contextmanager
@@ -105,7 +107,7 @@ def store(folder: Path, record: Mapping[str, Any]) -> Iterator[Store | None]:
 
     """
     with ExitStack() as stack:
-        with _written(folder):
+        with written(folder):
             folder.mkdir(parents=True, exist_ok=True)
             stack.enter_context(locked(folder))
             _check_same(folder, record)
@@ -118,14 +120,10 @@ def store(folder: Path, record: Mapping[str, Any]) -> Iterator[Store | None]:
             database = stack.enter_context(closing(sqlite3.connect(folder / _DATABASE)))
             opened = Store(folder, database)
         yield opened
-        with _written(folder):
-            database.close()
-            if (folder / TABLE).exists():
-                _remove_database(folder)
 
 
 @contextmanager
-def _written(folder: Path) -> Iterator[None]:
+def written(folder: Path) -> Iterator[None]:
     """Say of what cannot be written where it should have gone."""
     try:
         yield
@@ -142,28 +140,25 @@ def write_record(folder: Path, record: Mapping[str, Any]) -> None:
 
 
 def read_record(folder: Path) -> dict[str, Any]:
-    """The record of a study; empty if there is none.
+    """The record of a study.
 
     Raises:
-        InputError: there is something else in its place.
+        InputError: there is none.
 
     """
     path = folder / RECORD
     try:
         return dict(json.loads(path.read_text(encoding="utf-8")))
-    except FileNotFoundError:
-        return {}
     except (OSError, ValueError, TypeError) as error:
         raise InputError(f"{path}: not the record of a study: {reason(error)}") from error
 
 
 def _check_same(folder: Path, record: Mapping[str, Any]) -> None:
-    there = read_record(folder)
-    if not there:
+    if not (folder / RECORD).exists():
         if (folder / TABLE).exists() or (folder / _DATABASE).exists():
             raise InputError(f"{folder}: has runs, but no {RECORD}; choose another folder")
         return
-    before, now = there.get("made_of"), record["made_of"]
+    before, now = read_record(folder).get("made_of"), record["made_of"]
     if not isinstance(before, dict):
         raise InputError(f"{folder / RECORD}: not the record of a study")
     # As it is read again: JSON knows no tuples.
@@ -218,11 +213,16 @@ def _batch(arrow: Any, schema: Any, space: Space, rows: Sequence[tuple[int, byte
     return arrow.record_batch(arrays, schema=schema)
 
 
-class Runs:
-    """The runs of a study that is done.
+class StudyResult(Mapping[str, np.ndarray]):
+    """The runs of a study that is done, by column.
 
-    `runs["plant.eta0.z"]` is a column as a numpy array; an unknown name is a KeyError with a
-    suggestion. What a run does not have is nan; `runs["failure"]` is None where it came to its end.
+    `result["plant.eta0.z"]` is a column as a numpy array; an unknown name is a KeyError with a
+    suggestion. What a run does not have is nan; `result["failure"]` is None where a run came to its
+    end.
+
+    Attributes:
+        folder: that holds them.
+
     """
 
     def __init__(self, folder: Path) -> None:
@@ -246,17 +246,26 @@ class Runs:
         return read_record(self.folder)
 
     @property
-    def columns(self) -> tuple[str, ...]:
+    def runs(self) -> int:
+        """How many there are."""
+        return int(self._table.num_rows)
+
+    @property
+    def failed(self) -> int:
+        """How many of them have failed."""
+        return int(self.runs - self._table[FAILURE].null_count)
+
+    def __iter__(self) -> Iterator[str]:
         """The names of the columns."""
-        return tuple(self._table.column_names)
+        return iter(self._table.column_names)
 
     def __len__(self) -> int:
-        """How many runs there are."""
-        return int(self._table.num_rows)
+        """How many columns there are."""
+        return int(self._table.num_columns)
 
     def __repr__(self) -> str:
         """One line."""
-        return f"<Runs {self.folder.name}: {len(self)} runs of {len(self.columns)} columns>"
+        return f"<StudyResult {self.folder.name}: {self.runs} runs, {self.failed} failed>"
 
     def __getitem__(self, column: str) -> np.ndarray:
         """The values of one column.
@@ -265,8 +274,9 @@ class Runs:
             KeyError: there is no such column; the text has a suggestion.
 
         """
-        if column not in self.columns:
-            raise KeyError(f"no column {column!r}{did_you_mean(str(column), self.columns)}")
+        names = self._table.column_names
+        if column not in names:
+            raise KeyError(f"no column {column!r}{did_you_mean(str(column), names)}")
         values: np.ndarray = self._table[column].to_numpy()
         return values
 

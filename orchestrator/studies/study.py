@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -34,7 +35,7 @@ ENGINES = FMU, BATCH = "fmu", "batch"
 SPACINGS = LINEAR, LOG = "linear", "log"
 
 #: How samples are drawn; the first is the default.
-METHODS = "sobol", "latin-hypercube", "random"
+METHODS = SOBOL, LATIN_HYPERCUBE, RANDOM = "sobol", "latin-hypercube", "random"
 
 #: What may vary beside parameters.
 STEP = "step"
@@ -121,8 +122,11 @@ def _is_number_or_table(value: Any) -> bool:
     return is_number(value) or is_table(value)
 
 
-def _is_count(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+def _whole_number(least: int) -> Entry:
+    def fits(value: Any) -> bool:
+        return isinstance(value, int) and not isinstance(value, bool) and value >= least
+
+    return Entry(f"whole number of at least {least}", fits, "", "")
 
 
 def _one_of(names: Sequence[str]) -> Entry:
@@ -177,13 +181,13 @@ _RANGE = {
 }
 
 #: What a range under `vary` holds, and one under `sample.range`.
-_GRID = {**_RANGE, "n": Entry("whole number", _is_count, "", "")}
+_GRID = {**_RANGE, "n": _whole_number(1)}
 
 #: What `sample` holds, and a stop time that grows.
 _SAMPLE = {
     "method": _one_of(METHODS),
-    "n": Entry("whole number", _is_count, "", ""),
-    "seed": Entry("whole number", _is_count, "", ""),
+    "n": _whole_number(1),
+    "seed": _whole_number(0),
     "range": Entry("table of ranges", is_table, "", ""),
 }
 _STOP_TIME = {
@@ -287,8 +291,8 @@ def _sample(where: str, content: Mapping[str, Any]) -> Sample:
         if _is_range(value):
             _check_whole(f"{where}: {key}", value, _RANGE, ("from", "to"))
         ranges[key] = _range(f"{where}: {key}", value)
-    if not (content["n"] and ranges):
-        raise InputError(f"{where}: draws nothing; give n and [sample.range]")
+    if not ranges:
+        raise InputError(f"{where}: draws nothing; name values under [sample.range]")
     return Sample(content["n"], ranges, content.get("method", METHODS[0]), content.get("seed", 0))
 
 
@@ -314,17 +318,23 @@ def _check_whole(
 
 def _check_names(where: str, study: Study) -> None:
     """Check that names are names, that none stands twice, and that what is summed varies."""
-    stated = [*study.parameters, *study.varied]
+    stated = [*study.parameters, *([STEP] * (study.step is not None)), *study.varied]
     for name in stated:
-        if name != STEP:
-            with explained(Path(where), _WHAT):
+        if name != STEP or name in study.parameters:
+            with _located(where):
                 port_name(name)
         if stated.count(name) > 1:
-            raise InputError(
-                f"{where}: {name} stands in more than one of parameters, vary and sample.range"
-            )
+            raise InputError(f"{where}: {name} is stated twice")
     for name in study.stop_time.per if study.stop_time else ():
         if name not in study.varied:
             raise InputError(
                 f"{where}: stop_time: {name} does not vary{did_you_mean(name, study.varied)}"
             )
+
+
+@contextmanager
+def _located(where: str) -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import platform
 import sys
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
+from shutil import rmtree
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from tqdm import tqdm
@@ -17,15 +19,29 @@ from tqdm import tqdm
 from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.preparation import loaded
+from orchestrator.experiments.scenario import Scenario
 from orchestrator.master.loop import LOOPS
-from orchestrator.studies.engine import Engine, Outcome
+from orchestrator.studies.batch_engine import BatchEngine
+from orchestrator.studies.engine import Engine
+from orchestrator.studies.figures import Plan, draw_figures, read_figures
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
-from orchestrator.studies.store import FAILURE, Runs, Store, read_record, store, write_record
+from orchestrator.studies.store import (
+    Store,
+    StudyResult,
+    read_record,
+    store,
+    write_record,
+    written,
+)
 from orchestrator.studies.study import BATCH, ENGINES, FMU, Study, read_study, study_of
+from orchestrator.system.structure import System
 
 #: Packages whose versions the runs depend on.
-PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy", "pyarrow", "scipy")
+_PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy", "pyarrow", "scipy")
+
+#: What a study says of its runs.
+_STATED = ("vary", "sample", "parameters", "stop_time", "step", "order")
 
 #: What a study needs besides.
 _NEEDED = ("distributed", "numba", "pyarrow", "scipy")
@@ -33,8 +49,31 @@ _NEEDED = ("distributed", "numba", "pyarrow", "scipy")
 #: Seconds before a bar appears.
 _PATIENCE = 2.0
 
+#: How the name of a folder begins that figures are drawn into.
+_DRAWN = ".figures-"
+
 #: The name of a study that has no file.
 _NAMELESS = "study"
+
+
+@dataclass(frozen=True)
+class Means:
+    """How the runs of a study are made.
+
+    Attributes:
+        engine: one of :data:`orchestrator.studies.study.ENGINES`; None: the study's own.
+        kind: of the bundle's FMUs.
+        loop: that makes their steps.
+        scheduler: address of a Dask scheduler; None: processes of this machine.
+        workers: how many of these; None: one for each core.
+
+    """
+
+    engine: str | None = None
+    kind: str = PYTHON
+    loop: str = LOOPS[0]
+    scheduler: str | None = None
+    workers: int | None = None
 
 
 def sweep(
@@ -47,19 +86,20 @@ def sweep(
     workers: int | None = None,
     out: str | Path | None = None,
     progress: bool = False,
-) -> Runs:
+) -> StudyResult:
     """Make the runs of a study, or those of them that are missing.
 
-        runs = sweep("attraction")
-        runs["plant.eta0.z"], runs["failure"], runs.to_dataframe()
+        result = sweep("attraction")
+        result["plant.eta0.z"], result["failure"], result.to_dataframe()
 
     Args:
         study: name of a ready study, path of a .toml file, or what such a file holds.
         engine: that makes the runs, `fmu` or `batch`; None: the study's own.
-        kind: of the bundle's FMUs, `python` or `native`; `fmu` only.
+        kind: of the bundle's FMUs, `python` or `native`.
         loop: that makes their steps: `python`, `compiled` or `auto`.
-        scheduler: address of a Dask scheduler whose workers make the runs; None: processes here.
-        workers: how many processes here; None: one for each core.
+        scheduler: address of a Dask scheduler whose workers make the runs; None: processes of this
+            machine.
+        workers: how many of these; None: one for each core.
         out: folder of the study; what was done there before is not done again. None:
             `results/NAME`.
         progress: show a bar on studies that take longer than some seconds.
@@ -70,9 +110,8 @@ def sweep(
 
     """
     plan = study_of(_NAMELESS, study) if isinstance(study, Mapping) else read_study(str(study))
-    return swept(
-        plan, engine, kind, loop, scheduler, workers, folder_of(plan, out), sys.argv, progress
-    )
+    means = Means(engine, kind, loop, scheduler, workers)
+    return swept(plan, means, folder_of(plan, out), sys.argv, progress=progress)
 
 
 def folder_of(study: Study, out: str | Path | None) -> Path:
@@ -82,57 +121,55 @@ def folder_of(study: Study, out: str | Path | None) -> Path:
 
 def swept(
     study: Study,
-    engine: str | None,
-    kind: str,
-    loop: str,
-    scheduler: str | None,
-    workers: int | None,
+    means: Means,
     folder: Path,
     command: Sequence[str],
-    progress: bool,
-) -> Runs:
-    """The same, for a study that has been read; the command is for the record."""
+    say: Callable[[str], None] = lambda _: None,
+    progress: bool = False,
+) -> StudyResult:
+    """Make what is missing of a study, and draw it.
+
+    Args:
+        study: which.
+        means: how.
+        folder: for its files.
+        command: for the record.
+        say: takes notes for the user.
+        progress: show a bar.
+
+    Raises:
+        InputError: something about the study is not usable, or its files cannot be written.
+        KeyboardInterrupt: somebody wants it to stop.
+
+    """
     _check_installed()
-    chosen = engine or study.engine
-    systems = {name: loaded(name, kind) for name in study.scenario}
+    systems = {name: loaded(name, means.kind) for name in study.scenario}
     space = Space(study, systems)
-    maker = _engine(chosen, {name: system for name, (_, system) in systems.items()}, kind, loop)
-    record = {
-        "study": study.name,
-        "title": study.title,
-        "command": list(command),
-        "started": datetime.now(UTC).isoformat(timespec="seconds"),
-        "runs": len(space),
-        "engine": chosen,
-        "kind": kind,
-        "made_of": {
-            "scenario": [scenario.name for scenario, _ in systems.values()],
-            **{
-                key: asdict(study)[key]
-                for key in ("vary", "sample", "parameters", "stop_time", "step", "order")
-            },
-            "points": space.digest,
-            "engine": chosen,
-            "version": maker.digest,
-        },
-        "versions": {"python": sys.version.split()[0]}
-        | {package: version(package) for package in PACKAGES},
-        "platform": platform.platform(),
-    }
+    plans = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
+    engine = _engine(means.engine or study.engine, systems, means)
+    record = _record(study, means, space, engine, [one for one, _ in systems.values()], command)
     with store(folder, record) as unfinished:
         if unfinished is not None:
-            # A second that a study which is done needs not wait for.
-            from orchestrator.studies.cluster import making  # noqa: PLC0415
-
-            runs = (space[number] for number in unfinished.missing(len(space)))
             name = study.name if progress else None
-            with making(maker, runs, scheduler=scheduler, workers=workers) as blocks:
-                _keep(unfinished, blocks, len(space), name)
-            unfinished.publish(space)
-        done = Runs(folder)
-        failed = sum(failure is not None for failure in done[FAILURE])
-        write_record(folder, {**read_record(folder), "failed": failed})
-    return done
+            _complete(unfinished, engine, space, means, name)
+        result = StudyResult(folder)
+        write_record(folder, {**read_record(folder), "failed": result.failed})
+        for note in _draw(plans, study.title, result):
+            say(note)
+    return result
+
+
+def _draw(plans: Sequence[Plan], title: str, result: StudyResult) -> list[str]:
+    """Draw all figures or, where one of them cannot be written, none; notes on what is left out."""
+    folder = result.folder
+    with written(folder):
+        for left in folder.glob(f"{_DRAWN}*"):
+            rmtree(left)
+        with TemporaryDirectory(dir=folder, prefix=_DRAWN) as temporary:
+            notes = list(draw_figures(plans, title, result, Path(temporary)))
+            for file in Path(temporary).iterdir():
+                file.replace(folder / file.name)
+    return notes
 
 
 def _check_installed() -> None:
@@ -141,24 +178,73 @@ def _check_installed() -> None:
         raise InputError(f"studies need {' and '.join(missing)}: pip install 'auv-fmu[studies]'")
 
 
-def _keep(unfinished: Store, blocks: Iterable[Sequence[Outcome]], n: int, name: str | None) -> None:
-    """Keep blocks of outcomes as they come, and show how far it is."""
-    with tqdm(
-        total=n,
-        initial=len(unfinished),
-        desc=name,
-        unit="run",
-        delay=_PATIENCE,
-        disable=None if name else True,
-    ) as bar:
+def _engine(name: str, systems: Mapping[str, tuple[Scenario, System]], means: Means) -> Engine:
+    if name == FMU:
+        return FmuEngine({name: system for name, (_, system) in systems.items()}, means.loop)
+    if name == BATCH:
+        return BatchEngine({name: system for name, (_, system) in systems.items()}, means.kind)
+    raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
+
+
+def _record(
+    study: Study,
+    means: Means,
+    space: Space,
+    engine: Engine,
+    scenarios: Sequence[Scenario],
+    command: Sequence[str],
+) -> dict[str, Any]:
+    """What study.json says when a study begins."""
+    stated = asdict(study)
+    return {
+        "study": study.name,
+        "title": study.title,
+        "command": list(command),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "runs": len(space),
+        "kind": means.kind,
+        "made_of": {
+            "scenario": [scenario.name for scenario in scenarios],
+            "engine": means.engine or study.engine,
+            **{name: stated[name] for name in _STATED},
+            "points": space.digest,
+            "version": engine.digest,
+        },
+        "versions": {"python": sys.version.split()[0]}
+        | {package: version(package) for package in _PACKAGES},
+        "platform": platform.platform(),
+    }
+
+
+def _complete(
+    unfinished: Store, engine: Engine, space: Space, means: Means, name: str | None
+) -> None:
+    """Make the runs that are missing, and the table of all.
+
+    Args:
+        unfinished: takes the runs.
+        engine: makes them.
+        space: all of them.
+        means: who makes them.
+        name: of the study, for a bar; None: without one.
+
+    """
+    # Whoever looks at a study that is done needs not wait for Dask.
+    from orchestrator.studies.cluster import making  # noqa: PLC0415
+
+    runs = (space[number] for number in unfinished.missing(len(space)))
+    with (
+        making(engine, runs, scheduler=means.scheduler, workers=means.workers) as blocks,
+        tqdm(
+            total=len(space),
+            initial=len(unfinished),
+            desc=name,
+            unit="run",
+            delay=_PATIENCE,
+            disable=None if name else True,
+        ) as bar,
+    ):
         for outcomes in blocks:
             unfinished.add(outcomes)
             bar.update(len(outcomes))
-
-
-def _engine(name: str, systems: Mapping[str, Any], kind: str, loop: str) -> Engine:
-    if name == FMU:
-        return FmuEngine(systems, loop)
-    if name == BATCH:
-        raise InputError("engine batch: not there yet")
-    raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
+    unfinished.publish(space)

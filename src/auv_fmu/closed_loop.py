@@ -169,6 +169,11 @@ def steps(
     return output_feedback.steps(gains, state, signals, measurement(seen), h, n)
 
 
+def estimates(state: ControllerState, signals: Signals, seen: Scene) -> tuple[Vector3, Vector4]:
+    """Velocity and parameters that the proposed controller goes by: dy_hat and theta_hat."""
+    return signals.dy_hat, state.theta_hat
+
+
 def measurement(seen: Scene) -> Measurement:
     """What the proposed controller is told."""
     y_d, dy_d, ddy_d = seen.reference
@@ -197,6 +202,11 @@ def pd_steps(
     return pd.steps(gains, theta_hat, signals, pd_measurement(seen), h, n)
 
 
+def pd_estimates(theta_hat: Vector4, signals: PdSignals, seen: Scene) -> tuple[Vector3, Vector4]:
+    """Velocity and parameters that the PD controller goes by; it is told the velocity."""
+    return seen.plant.dy, theta_hat
+
+
 def pd_measurement(seen: Scene) -> PdMeasurement:
     """What the PD controller is told."""
     y_d, dy_d, ddy_d = seen.reference
@@ -206,19 +216,21 @@ def pd_measurement(seen: Scene) -> PdMeasurement:
 class Law(NamedTuple):
     """A controller in the loop: how it starts, what it commands, how its state goes on.
 
-    All are given the gains of a step, which the first makes of those that are set.
+    All are given the gains of a step, which the first makes of those that are set. What it goes by
+    is what it has estimated, or been told.
     """
 
     sampled: Callable[[Any, float], Any]
     start: Callable[[Any, Scene], Any]
     command: Callable[[Any, Any, Scene], tuple[Any, Any]]
     steps: Callable[[Any, Any, Any, Scene, float, int], Any]
+    estimates: Callable[[Any, Any, Scene], tuple[Vector3, Vector4]]
 
 
 #: The controller that goes with a set of gains.
 LAWS: dict[type, Law] = {
-    Gains: Law(sampled, start, command, steps),
-    PdGains: Law(pd_sampled, pd_start, pd_command, pd_steps),
+    Gains: Law(sampled, start, command, steps, estimates),
+    PdGains: Law(pd_sampled, pd_start, pd_command, pd_steps, pd_estimates),
 }
 
 

@@ -16,6 +16,13 @@ STEP = 0.02
 #: A step may exceed the largest internal one by this share without being split: hosts round time.
 ROUNDING = 1e-9
 
+#: Largest norm of a state. No vehicle comes near it, and from a state below it a step with sane
+#: inputs is always finite: one wild sample must not be the end of a run.
+LARGEST_STATE = 1e100
+
+#: More internal steps than this in one step are taken for a mistake.
+MOST_INTERNAL_STEPS = 1_000_000
+
 
 def longest_step(h_max: float) -> float:
     """The longest step that is not split [s].

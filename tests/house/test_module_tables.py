@@ -23,6 +23,7 @@ PACKAGES = (
     "orchestrator.experiments",
     "orchestrator.exchange",
     "orchestrator.studies",
+    "orchestrator.studies.batch",
     "orchestrator.paper",
     "orchestrator.commands",
 )

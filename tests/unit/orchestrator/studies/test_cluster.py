@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import signal
+import subprocess
+import sys
+import time
+from contextlib import ExitStack, contextmanager
 from itertools import count
 
 import pytest
@@ -14,6 +20,7 @@ pytest.importorskip("distributed", reason="needs the extra `studies`")
 
 from dask import config
 
+from orchestrator.errors import InputError
 from orchestrator.studies.cluster import FATAL, making
 
 
@@ -58,3 +65,86 @@ def test_a_run_that_ends_every_process_is_the_only_one_that_fails():
     assert sorted(made) == [run.number for run in runs]
     assert [n for n, made in made.items() if made.failure] == [17]
     assert made[17].failure == FATAL and not made[17].indices
+
+
+@pytest.fixture
+def impatient():
+    """Who looks for a scheduler gives up soon."""
+    with config.set({"distributed.comm.timeouts.connect": "1s"}):
+        yield
+
+
+@contextmanager
+def started(*arguments):
+    """A process of Dask's, as on another machine: with nothing of this one's but the packages."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "dask", *arguments],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+@pytest.fixture
+def scheduler(tmp_path):
+    """A scheduler's address and process."""
+    file = tmp_path / "scheduler.json"
+    local = ("--host", "127.0.0.1", "--port", "0", "--dashboard-address", "127.0.0.1:0")
+    with started("scheduler", *local, "--scheduler-file", file) as process:
+        while not file.exists():
+            assert process.poll() is None
+            time.sleep(0.05)
+        yield json.loads(file.read_text())["address"], process
+
+
+def worker(address, folder):
+    one = ("--no-nanny", "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1")
+    return started("worker", address, *one, "--local-directory", folder)
+
+
+def test_a_scheduler_s_workers_come_and_go_while_a_study_is_under_way(scheduler, tmp_path):
+    address, _ = scheduler
+    runs = [run(number) for number in range(100)]
+    with worker(address, tmp_path) as lost, ExitStack() as stack:
+        blocks = stack.enter_context(making(Toy(0.05), iter(runs), scheduler=address))
+        first = next(blocks)
+        lost.kill()
+        stack.enter_context(worker(address, tmp_path))
+        rest = list(blocks)
+    assert numbers_and_squares([first, *rest]) == expected(runs)
+    made_by = {made.indices["process"] for block in rest for made in block}
+    assert made_by - {lost.pid}
+
+
+def test_a_scheduler_that_goes_is_said(scheduler, tmp_path, impatient):
+    address, process = scheduler
+    with (
+        worker(address, tmp_path),
+        making(Toy(0.05), map(run, count()), scheduler=address) as blocks,
+    ):
+        next(blocks)
+        process.kill()
+        with pytest.raises(InputError, match=r"gone.*start the study again"):
+            list(blocks)
+
+
+@pytest.mark.parametrize(
+    ("means", "text"),
+    [
+        ({"scheduler": "tcp://127.0.0.1:1"}, "no scheduler answers at tcp://127.0.0.1:1"),
+        ({"scheduler": "nowhere"}, "no scheduler answers at nowhere"),
+        ({"scheduler": "tcp://127.0.0.1:1", "workers": 2}, "--workers is for"),
+        ({"workers": 0}, "--workers 0: must be at least 1"),
+    ],
+)
+def test_who_cannot_make_runs_is_said_in_a_line(means, text, impatient):
+    with (
+        pytest.raises(InputError, match=f"^{re.escape(text)}"),
+        making(Toy(), [], **means),
+    ):
+        pass

@@ -1,0 +1,255 @@
+"""One run of the closed loop: the text that is compiled.
+
+It makes the rows that the FMUs make: a row holds, at time t_k, what both vehicles show then, and
+what the controller has computed at the beginning of the step that ends there.
+"""
+
+from __future__ import annotations
+
+from math import cos, log, pi, sin, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from auv_fmu import closed_loop, plant
+from auv_fmu.attitude import rotation_from_euler
+from auv_fmu.closed_loop import LAWS, Law, Scene, Setting, Splits, Vehicles
+from auv_fmu.control_point import control_point
+from auv_fmu.euler import LARGEST_STATE
+from auv_fmu.output_feedback import Gains
+from auv_fmu.types import Vector3, Vector6
+from auv_fmu.vectors import difference
+from orchestrator.studies.batch.flat import flat
+from orchestrator.studies.batch.tally import Row, Step, take_row, take_step
+
+#: The controller's part of the loop: whoever compiles this module for another one puts it here.
+law: Law = LAWS[Gains]
+
+
+class Plan(NamedTuple):
+    """The steps of a run."""
+
+    steps: int  #: how many
+    full: int  #: how many of the whole length; one more may be shorter
+    h: float  #: the whole length [s]
+    stop: float  #: end of the last one [s]
+    parts: Splits  #: of a step of the whole length
+    last_parts: Splits  #: of the shorter one
+    delayed: bool  #: command and disturbance act one step late: Jacobi order
+
+
+class Moment(NamedTuple):
+    """All that the rest of a run depends on."""
+
+    vehicles: Vehicles
+    scene: Scene
+    control: Any  #: state of the controller
+    before: tuple[Vector3, Vector6]  #: command and disturbance of the step before
+
+
+class Done(NamedTuple):
+    """What was computed in a step."""
+
+    velocity: Vector3  #: that the controller went by [m/s]
+    theta_hat: Any  #: and parameters
+    commanded: Vector3  #: by the controller (tau_u, tau_q, tau_r) [N, N.m]
+    told: Vector3  #: to the actuators
+    tau: Vector3  #: that acts
+    tau_w: Vector6  #: disturbance (u, v, w, p, q, r) [N, N.m]
+
+
+def run(
+    setting: Setting,
+    plan: Plan,
+    generator: np.random.Generator,
+    ends: np.ndarray,
+    tallies: np.ndarray,
+    rows: np.ndarray,
+    progress: np.ndarray,
+) -> tuple[int, Moment]:
+    """Make one run.
+
+    Args:
+        setting: of the loop.
+        plan: its steps.
+        generator: of uniform numbers.
+        ends: of the tallies, as :data:`.tally.END` says.
+        tallies: to be filled.
+        rows: to be filled, one more than steps; or none.
+        progress: of which the first element becomes the number of steps taken, or -1: also where
+            an equation raises.
+
+    Returns:
+        The number of steps taken, and what the next one begins with. It is refused if there are
+        fewer than planned; -1: already the start is.
+
+    """
+    noisy = setting.plant.noise.std > 0.0
+    progress[0] = -1
+    n, spare = normals(generator, noisy, (False, 0.0))
+    moment, done = begin(setting, n)
+    if not is_sound(moment):
+        return -1, moment
+    progress[0] = 0
+    row = row_of(setting, 0.0, moment, done)
+    for j in range(len(tallies)):
+        take_row(tallies[j], row, ends[j])
+    if len(rows):
+        fill(rows[0], 0.0, moment, done)
+    gains = law.sampled(setting.controller, plan.h / plan.parts.controller)
+    for k in range(plan.steps):
+        whole = k < plan.full
+        t, end = k * plan.h, (k + 1) * plan.h if whole else plan.stop
+        h, parts = (plan.h, plan.parts) if whole else (end - t, plan.last_parts)
+        if not whole:
+            gains = law.sampled(setting.controller, h / parts.controller)
+        n, spare = normals(generator, noisy, spare)
+        tau_before, dy = done.tau, moment.scene.plant.dy
+        after, done = step(setting, gains, moment, plan.delayed, end, h, parts, n)
+        if not is_sound(after):
+            return k, moment
+        progress[0] = k + 1
+        moment = after
+        row = row_of(setting, end, moment, done)
+        made = Step(t, done.told, done.tau, tau_before, difference(done.velocity, dy), k == 0)
+        for j in range(len(tallies)):
+            if k < ends[j].steps:
+                take_row(tallies[j], row, ends[j])
+                take_step(tallies[j], row.t, made, setting.plant.limits, ends[j])
+        if len(rows):
+            fill(rows[k + 1], end, moment, done)
+    return plan.steps, moment
+
+
+def begin(setting: Setting, n: Vector3) -> tuple[Moment, Done]:
+    """The start, and what is computed there already."""
+    gains = setting.controller
+    vehicles = closed_loop.begin(setting)
+    scene = closed_loop.scene(setting, vehicles, 0.0, n)
+    control = law.start(gains, scene)
+    state, signals = law.command(gains, control, scene)
+    velocity, theta_hat = law.estimates(state, signals, scene)
+    driven, _ = plant.begin(setting.plant, plant.applied(setting.plant, signals.tau))
+    return (
+        Moment(vehicles, scene, control, (signals.tau, scene.tau_w)),
+        Done(velocity, theta_hat, signals.tau, signals.tau, driven.tau, scene.tau_w),
+    )
+
+
+def step(
+    setting: Setting,
+    gains: Any,
+    moment: Moment,
+    delayed: bool,
+    end: float,
+    h: float,
+    parts: Splits,
+    n: Vector3,
+) -> tuple[Moment, Done]:
+    """One step.
+
+    Args:
+        setting: of the loop.
+        gains: of the controller, for steps of this length.
+        moment: that it begins with.
+        delayed: whether what acts is that of the step before.
+        end: when it ends [s].
+        h: how long it takes [s].
+        parts: that it is split into.
+        n: three independent standard normal numbers.
+
+    """
+    scene = moment.scene
+    control, signals = law.command(gains, moment.control, scene)
+    velocity, theta_hat = law.estimates(control, signals, scene)
+    now = signals.tau, scene.tau_w
+    told, tau_w = moment.before if delayed else now
+    tau = plant.applied(setting.plant, told)
+    control = law.steps(gains, control, signals, scene, h / parts.controller, parts.controller)
+    vehicles = closed_loop.move(setting, moment.vehicles, tau, tau_w, h, parts)
+    return (
+        Moment(vehicles, closed_loop.scene(setting, vehicles, end, n), control, now),
+        Done(velocity, theta_hat, signals.tau, told, vehicles.plant.tau, tau_w),
+    )
+
+
+def is_sound(moment: Moment) -> bool:
+    """Whether every component accepts a step: the states that it ends with, and all outputs.
+
+    Outputs that are finite if the states are need no look.
+    """
+    vehicles, scene = moment.vehicles, moment.scene
+    return (
+        is_bounded(vehicles.plant)
+        and is_bounded(vehicles.planner)
+        and is_bounded(moment.control)
+        and is_finite((scene.y, scene.plant.dy, scene.reference, moment.before))
+    )
+
+
+def is_bounded(state: Any) -> bool:
+    """Whether all of a state is finite, and its norm not too large."""
+    square = 0.0
+    for x in flat(state):
+        square += x * x
+    return square <= LARGEST_STATE * LARGEST_STATE
+
+
+def is_finite(values: Any) -> bool:
+    """Whether all of them are: times zero, what is not finite is not zero."""
+    total = 0.0
+    for x in flat(values):
+        total += 0.0 * x
+    return total == 0.0
+
+
+def normals(
+    generator: np.random.Generator, noisy: bool, spare: tuple[bool, float]
+) -> tuple[Vector3, tuple[bool, float]]:
+    """Three standard normal numbers, and what is left over.
+
+    Without noise there are none drawn: they would be multiplied with zero.
+    """
+    if not noisy:
+        return (0.0, 0.0, 0.0), spare
+    n_1, spare = gauss(generator, spare)
+    n_2, spare = gauss(generator, spare)
+    n_3, spare = gauss(generator, spare)
+    return (n_1, n_2, n_3), spare
+
+
+def gauss(
+    generator: np.random.Generator, spare: tuple[bool, float]
+) -> tuple[float, tuple[bool, float]]:
+    """What `random.gauss` makes of uniform numbers: pairs, of which one is spare."""
+    there, z = spare
+    if there:
+        return z, (False, 0.0)
+    angle = generator.random() * (2.0 * pi)
+    radius = sqrt(-2.0 * log(1.0 - generator.random()))
+    return cos(angle) * radius, (True, sin(angle) * radius)
+
+
+def row_of(setting: Setting, t: float, moment: Moment, done: Done) -> Row:
+    """What the indices need of a row, as it follows from the ports."""
+    seen = moment.scene.plant
+    phi, theta, psi = seen.euler
+    rotation = rotation_from_euler(phi, theta, psi)
+    y = control_point(moment.vehicles.plant.position, rotation, setting.plant.ell)
+    _, v, w, _, _, _ = seen.nu
+    return Row(
+        t,
+        difference(y, moment.scene.reference.y_d),
+        seen.dy,
+        sqrt(v * v + w * w),
+        done.theta_hat,
+    )
+
+
+def fill(row: np.ndarray, t: float, moment: Moment, done: Done) -> None:
+    """Fill a row with the time and the values of :data:`.columns.COLUMNS`."""
+    scene, seen = moment.scene, moment.scene.plant
+    shown = moment.vehicles.plant.position, seen.euler, seen.nu, scene.y, seen.dy
+    values = flat((t, shown, scene.reference, done))
+    for i in range(len(values)):
+        row[i] = values[i]

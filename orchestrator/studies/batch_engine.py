@@ -1,0 +1,277 @@
+"""Runs of the closed loop by its equations, compiled: the numbers of the FMUs, far sooner."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from hashlib import sha256
+from math import isnan, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from auv_fmu.closed_loop import Setting, splits
+from auv_fmu.output_feedback import Gains
+from orchestrator.analysis.metrics import LAST_SECONDS
+from orchestrator.analysis.signals import ACTUATORS, AXES, DY_HAT
+from orchestrator.errors import InputError
+from orchestrator.experiments.bundle import PYTHON, current_fmus
+from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.observer import Ending, Header
+from orchestrator.master.schedule import stages
+from orchestrator.master.table import Table
+from orchestrator.studies.batch import tally
+from orchestrator.studies.batch.columns import COLUMNS
+from orchestrator.studies.batch.kernel import Plan
+from orchestrator.studies.batch.library import compiled, digest
+from orchestrator.studies.batch.parameters import setting_of
+from orchestrator.studies.batch.standard import difference
+from orchestrator.studies.batch.verdict import (
+    misfit,
+    refused,
+    refused_at_once,
+    refused_at_start,
+)
+from orchestrator.studies.engine import Outcome, Run
+from orchestrator.system.names import PortName, port_name
+from orchestrator.system.structure import System
+
+#: What makes every system.
+_OTHER = "use --engine fmu"
+
+_THETA = range(1, 5)
+
+_NO_ROWS = np.empty((0, 0))
+
+
+class BatchEngine:
+    """Makes runs of the standard closed loop, with either controller, one after the other.
+
+    Where it makes them no FMUs are needed.
+    """
+
+    def __init__(self, systems: Mapping[str, System], kind: str = PYTHON) -> None:
+        """Take systems.
+
+        Args:
+            systems: by the names that runs have for their scenarios.
+            kind: of the FMUs that they are made of.
+
+        Raises:
+            InputError: one of them is not what the equations make.
+
+        """
+        for name, system in systems.items():
+            if why := difference(system, current_fmus(kind)):
+                raise InputError(f"{name}: {why}, which the batch engine cannot make; {_OTHER}")
+        self._systems = dict(systems)
+
+    @property
+    def digest(self) -> str:
+        """Of the equations, and of the parameters of the systems."""
+        parameters = [(name, system.parameters) for name, system in self._systems.items()]
+        return sha256(f"{digest()} {parameters}".encode()).hexdigest()
+
+    def outcomes(self, runs: Sequence[Run]) -> Iterator[Outcome]:
+        """Make some runs, in their order."""
+        for run in runs:
+            [outcome] = self.outcomes_at(run, [run.stop_time])
+            yield outcome
+
+    def outcomes_at(self, run: Run, stop_times: Sequence[float]) -> list[Outcome]:
+        """What would have come out of a run with other stop times, all from one run.
+
+        Args:
+            run: to be made.
+            stop_times: not later than its own; those before it after whole numbers of steps [s].
+
+        """
+        try:
+            job = _job(self._systems[run.scenario], run)
+            ends = np.array([_end(job, stop_time) for stop_time in stop_times], tally.END)
+            tallies = tally.new(len(ends))
+            made, failure = _made(job, ends, tallies, _NO_ROWS)
+        except InputError as error:
+            return [Outcome(run.number, {}, str(error)) for _ in stop_times]
+        return [
+            Outcome(run.number, {}, failure)
+            if end["steps"] > made
+            else Outcome(run.number, _indices(job, end, found))
+            for end, found in zip(ends, tallies, strict=True)
+        ]
+
+    def table(self, run: Run) -> Table:
+        """A run with its rows, those of the columns :data:`.columns.COLUMNS` that it has.
+
+        Raises:
+            InputError: it has no start.
+
+        """
+        job = _job(self._systems[run.scenario], run)
+        rows = np.empty((job.experiment.rows, 1 + len(COLUMNS)))
+        made, failure = _made(job, np.empty(0, tally.END), tally.new(0), rows)
+        kept = [
+            0,
+            *(i for i, name in enumerate(COLUMNS, 1) if job.has_estimate or name not in DY_HAT),
+        ]
+        columns = tuple(COLUMNS[i - 1] for i in kept[1:])
+        header = Header(columns, job.experiment, _parameters(job.system))
+        return Table.of(header, rows[: made + 1, kept], Ending(failure))
+
+
+class _Job(NamedTuple):
+    """A run, ready to be made."""
+
+    system: System
+    experiment: Experiment
+    setting: Setting
+    plan: Plan
+
+    @property
+    def has_estimate(self) -> bool:
+        """Whether its controller estimates the velocity."""
+        return isinstance(self.setting.controller, Gains)
+
+
+def _job(system: System, run: Run) -> _Job:
+    """A run, ready to be made.
+
+    Raises:
+        InputError: it has no start, or no first step.
+
+    """
+    changes = {port_name(name): value for name, value in run.parameters.items()}
+    system = system.with_parameters(changes)
+    system.check()
+    experiment = Experiment(run.stop_time, run.step, run.order)
+    fmus = {name: part.description.modelName for name, part in system.components.items()}
+    setting = setting_of(fmus, system.parameters, experiment.step)
+    if misfit(setting):
+        raise InputError(refused_at_start(setting))
+    full, stop = experiment.full_steps, experiment.stop_time
+    parts = splits(setting, experiment.step)
+    if failure := refused_at_once(setting, parts, _order(system, experiment)):
+        raise InputError(failure)
+    # Where there is none it has no length, and is no step.
+    last_parts = (
+        splits(setting, stop - full * experiment.step) if experiment.has_short_step else parts
+    )
+    plan = Plan(
+        experiment.rows - 1,
+        full,
+        experiment.step,
+        stop,
+        parts,
+        last_parts,
+        experiment.order != ORDERS[0],
+    )
+    return _Job(system, experiment, setting, plan)
+
+
+def _order(system: System, experiment: Experiment) -> list[str]:
+    """The components in the order in which they are stepped."""
+    return [name for names in stages(system, experiment.order) for name in names]
+
+
+def _parameters(system: System) -> dict[PortName, object]:
+    """All parameters of a system."""
+    return {
+        name: system.value(name)
+        for component in system.components.values()
+        for name in (PortName(component.name, v.name) for v in component.having("parameter"))
+    }
+
+
+def _end(job: _Job, stop_time: float) -> tuple[int, float, float]:
+    """Where the tally of a stop time ends, as :data:`.tally.END` has it.
+
+    Raises:
+        InputError: the run has no row there.
+
+    """
+    whole, steps = job.experiment, job.experiment.rows - 1
+    if stop_time != whole.stop_time:
+        shorter = Experiment(stop_time, whole.step, whole.order)
+        steps = shorter.full_steps
+        if shorter.has_short_step or stop_time > whole.stop_time:
+            raise InputError(
+                f"stop time {stop_time:g} s: not a whole number of steps of a run that takes "
+                f"{whole.stop_time:g} s"
+            )
+    return steps, 0.5 * stop_time, whole.time(steps) - LAST_SECONDS
+
+
+def _made(
+    job: _Job, ends: np.ndarray, tallies: np.ndarray, rows: np.ndarray
+) -> tuple[int, str | None]:
+    """Make a run: how many steps were taken, and why there were no more.
+
+    Raises:
+        InputError: it has no start.
+
+    """
+    setting, plan = job.setting, job.plan
+    run = compiled(type(setting.controller))  # type: ignore[arg-type]
+    progress = np.empty(1, int)
+    seed = setting.plant.noise.seed
+    try:
+        made, moment = run(setting, plan, _uniform(seed), ends, tallies, rows, progress)
+    except ArithmeticError:
+        # What the step would have begun with did not come back.
+        made = int(progress[0])
+        if made >= 0:
+            before = plan._replace(steps=made)
+            _, moment = run(
+                setting, before, _uniform(seed), ends[:0], tallies[:0], _NO_ROWS, progress
+            )
+    if made < 0:
+        raise InputError(refused_at_start(setting))
+    if made == plan.steps:
+        return made, None
+    return made, refused(setting, plan, made, moment, _order(job.system, job.experiment))
+
+
+@cache
+def _generator() -> tuple[np.random.RandomState, np.random.Generator]:
+    """A generator of uniform numbers, and what seeds it; to make one takes longer than a run."""
+    bits = np.random.MT19937()
+    return np.random.RandomState(bits), np.random.Generator(bits)
+
+
+def _uniform(seed: int) -> np.random.Generator:
+    """The uniform numbers of Python's generator with a seed."""
+    state, generator = _generator()
+    state.seed([seed % 2**32])
+    return generator
+
+
+def _indices(job: _Job, end: np.void, found: np.void) -> dict[str, float]:
+    """The indices of a tally by their names."""
+    steps, t = int(end["steps"]), job.experiment.time(int(end["steps"]))
+    x, y, z = found["miss"]
+    single = {
+        "time_to_reach": found["reached"],
+        "late_error": found["late"],
+        "estimate_error": sqrt((x + y + z) / found["instants"]),
+        "largest_speed": found["speed"],
+        "largest_drift": found["drift"],
+    }
+    if isnan(found["reached"]):
+        del single["time_to_reach"]
+    if not job.has_estimate:
+        del single["estimate_error"]
+    groups = (
+        ("l2_effort.{}", ACTUATORS, np.sqrt(found["square"])),
+        ("rms_effort.{}", ACTUATORS, np.sqrt(found["square"] / t)),
+        ("peak_command.{}", ACTUATORS, found["peak"]),
+        ("saturated_fraction.{}", ACTUATORS, found["outside"] / steps),
+        ("total_variation.{}", ACTUATORS, found["variation"]),
+        ("final_error.{}", AXES, found["final"]),
+        ("theta_hat_half[{}]", _THETA, found["half"]),
+        ("theta_hat_end[{}]", _THETA, found["end"]),
+    )
+    return {
+        name.format(member): float(value)
+        for name, members, values in groups
+        for member, value in zip(members, values, strict=True)
+    } | {name: float(value) for name, value in single.items()}

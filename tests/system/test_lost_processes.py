@@ -1,0 +1,105 @@
+"""A study whose processes are killed comes to the table of one that was left in peace."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from contextlib import closing
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pytest
+
+psutil = pytest.importorskip("psutil", reason="needs the extra `studies`")
+parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra `studies`")
+
+DATABASE = "unfinished.sqlite"
+
+RUNS = 1000
+
+STUDY = f"""
+scenario = "fig4"
+stop_time = 5.0
+[sample]
+method = "random"
+n = {RUNS}
+seed = 7
+[sample.range]
+"plant.eta0.z" = [-5.0, 5.0]
+"controller.lambda" = [0.5, 1.0]
+"""
+
+
+def sweep(out):
+    """A sweep of its own, which nothing of this process reaches."""
+    return subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "orchestrator",
+            "sweep",
+            "study.toml",
+            "--kind=native",
+            "--workers=2",
+            f"--out={out}",
+        ],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def rows(out):
+    """How many runs are kept; the process that keeps them lets nobody else read."""
+    with TemporaryDirectory() as copy:
+        for file in out.glob(f"{DATABASE}*"):
+            shutil.copy(file, copy)
+        with closing(sqlite3.connect(Path(copy, DATABASE))) as database:
+            try:
+                return database.execute("SELECT count(*) FROM outcomes").fetchone()[0]
+            except sqlite3.Error:
+                return 0
+
+
+def in_the_middle(process, out):
+    """When some more runs are kept than before, and some are under way; how many."""
+    before = rows(out)
+    while (kept := rows(out)) <= before + 2:
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.1)
+    return kept
+
+
+def worker(process):
+    """One of the processes that make runs: the one with the most to do."""
+    children = psutil.Process(process.pid).children()
+    return max(children, key=lambda child: sum(child.cpu_times()[:2]))
+
+
+def test_killed_twice_interrupted_once_and_short_of_a_worker(workplace):
+    (workplace / "study.toml").write_text(STUDY)
+    peace = sweep("peace")
+    _, said = peace.communicate(timeout=300)
+    assert peace.returncode == 0, said
+
+    out = workplace / "trouble"
+    for end in (signal.SIGKILL, signal.SIGINT, signal.SIGKILL):
+        process = sweep("trouble")
+        kept = in_the_middle(process, out)
+        process.send_signal(end)
+        _, said = process.communicate(timeout=60)
+        assert process.returncode == (130 if end == signal.SIGINT else -end), said
+        assert kept <= rows(out) < RUNS
+    process = sweep("trouble")
+    in_the_middle(process, out)
+    worker(process).kill()
+    _, said = process.communicate(timeout=300)
+    assert (process.returncode, said) == (0, "")
+    table = parquet.read_table(out / "runs.parquet")
+    assert table["run"].to_pylist() == list(range(RUNS))
+    assert table.equals(parquet.read_table(workplace / "peace" / "runs.parquet"))

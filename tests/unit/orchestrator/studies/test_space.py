@@ -1,0 +1,157 @@
+"""The runs of a study."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.experiments.preparation import loaded
+from orchestrator.studies.engine import Run
+from orchestrator.studies.space import MOST_RUNS, Space
+from orchestrator.studies.study import study_of
+
+qmc = pytest.importorskip("scipy.stats.qmc", reason="needs scipy: the extra `studies`")
+
+
+def space(**content: Any) -> Space:
+    study = study_of("mine", {"scenario": "fig5", **content})
+    return Space(study, {name: loaded(name) for name in study.scenario})
+
+
+def test_grid_is_every_combination_whose_last_value_changes_fastest():
+    ells, shapes, places = [0.3, 0.4], ["tanh", "algebraic"], [1, 2, 3]
+    runs = space(
+        vary={"plant.ell": ells, "controller.saturation": shapes, "plant.eta0.y": places},
+        parameters={"plant.noise.std": 0},
+    )
+    expected = [
+        {"plant.noise.std": 0.0, "plant.ell": a, "controller.saturation": b, "plant.eta0.y": c}
+        for a, b, c in product(ells, shapes, places)
+    ]
+    assert len(runs) == 12
+    assert [runs[i].parameters for i in range(12)] == expected
+    assert {type(runs[0].parameters[name]) for name in ("plant.eta0.y", "plant.ell")} == {float}
+    assert runs[5] == Run(5, "fig5", expected[5], 100.0, 0.02, "gauss-seidel")
+    assert runs.columns == {"plant.ell": float, "controller.saturation": str, "plant.eta0.y": float}
+
+
+def test_each_point_is_run_with_each_scenario_that_has_what_it_has():
+    runs = space(
+        scenario=["fig5", "fig5-pd"],
+        parameters={"controller.k_d": 40.0},
+        vary={"controller.eps_t": [1.0, 2.0], "controller.saturation": ["tanh"]},
+    )
+    found = [(run.scenario, dict(run.parameters)) for run in map(runs.__getitem__, range(4))]
+    observer = {"controller.k_d": 40.0, "controller.saturation": "tanh"}
+    assert found == [
+        ("fig5", {**observer, "controller.eps_t": 1.0}),
+        ("fig5-pd", {"controller.eps_t": 1.0}),
+        ("fig5", {**observer, "controller.eps_t": 2.0}),
+        ("fig5-pd", {"controller.eps_t": 2.0}),
+    ]
+    assert runs.has_scenarios
+    with pytest.raises(IndexError):
+        runs[4]
+
+
+@pytest.mark.parametrize("method", ["sobol", "latin-hypercube", "random"])
+def test_samples_are_those_of_the_seed_and_lie_in_their_ranges(method):
+    ranges = {
+        "plant.eta0.y": [-2.0, 6.0],
+        "controller.k_d": {"from": 1, "to": 100, "spacing": "log"},
+    }
+    runs = space(sample={"method": method, "n": 12, "seed": 7, "range": ranges})
+    shares = {
+        "sobol": lambda: qmc.Sobol(2, rng=np.random.default_rng(7)).random(16)[:12],
+        "latin-hypercube": lambda: qmc.LatinHypercube(2, rng=np.random.default_rng(7)).random(12),
+        "random": lambda: np.random.default_rng(7).random((12, 2)),
+    }[method]()
+    for i, (a, b) in enumerate(shares):
+        found = runs[i].parameters
+        assert found["plant.eta0.y"] == pytest.approx(-2.0 + 8.0 * a)
+        assert np.log10(found["controller.k_d"]) == pytest.approx(2.0 * b)
+    other = space(sample={"method": method, "n": 12, "seed": 8, "range": ranges})
+    assert other[3].parameters != runs[3].parameters
+    assert other.digest != runs.digest
+
+
+def test_samples_are_drawn_at_every_combination():
+    runs = space(
+        vary={"plant.ell": [0.3, 0.4]},
+        sample={"n": 3, "range": {"plant.eta0.y": [0.0, 1.0]}},
+    )
+    places = [runs[i].parameters["plant.eta0.y"] for i in range(6)]
+    assert places[:3] == places[3:]
+    assert len(set(places)) == 3
+    assert [runs[i].parameters["plant.ell"] for i in range(6)] == [0.3] * 3 + [0.4] * 3
+
+
+@pytest.mark.parametrize("ends", [[1, 4], {"from": 4, "to": 1}])
+def test_whole_numbers_have_the_same_chance(ends):
+    runs = space(
+        sample={"method": "latin-hypercube", "n": 4000, "range": {"plant.noise.seed": ends}}
+    )
+    found = Counter(runs[i].parameters["plant.noise.seed"] for i in range(len(runs)))
+    # A Latin hypercube has one sample in each of 4,000 equal parts.
+    assert found == {1: 1000, 2: 1000, 3: 1000, 4: 1000}
+    assert {type(number) for number in found} == {int}
+
+
+def test_stop_time_grows_with_what_varies_and_the_step_varies():
+    runs = space(
+        stop_time={"base": 10.0, "per": {"plant.eta0.y": 2.0, "plant.eta0.z": -1.0}},
+        vary={"plant.eta0.y": [0.0, 3.0], "plant.eta0.z": [-1.0, 5.0], "step": [0.01, 1]},
+    )
+    found = [(run.stop_time, run.step) for run in map(runs.__getitem__, range(8))]
+    # The step changes fastest, then z, then y.
+    ends = [11.0, 5.0, 17.0, 11.0]
+    assert found == list(product(ends, [0.01, 1.0]))
+    assert "step" not in runs[0].parameters
+
+
+def test_points_are_told_apart_by_the_digest():
+    one, same, other = (
+        space(vary={"plant.eta0.y": values}) for values in ([1.0, 2.0], [1, 2], [1.0, 3.0])
+    )
+    assert one.digest == same.digest != other.digest
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"vary": {"plnt.ell": [1.0]}}, "no component 'plnt'.*did you mean plant"),
+        ({"vary": {"plant.el": [1.0]}}, "no port or parameter 'el'.*did you mean .*ell"),
+        ({"parameters": {"plant.el": 1.0}}, "no port or parameter 'el'"),
+        ({"vary": {"plant.ell": ["long"]}}, "plant.ell = long: not a real number"),
+        ({"vary": {"plant.ell": [-1.0]}}, "plant.ell = -1.0: must be at least"),
+        ({"vary": {"plant.noise.seed": [1.5]}}, "plant.noise.seed = 1.5: not an integer"),
+        ({"vary": {"plant.eta.x": [1.0]}}, "plant.eta.x is of causality output and cannot be set"),
+        ({"vary": {"step": ["fast"]}}, "step = 'fast': not a number"),
+        ({"vary": {"step": [0.02, 0.0]}}, "step 0 s must be positive"),
+        ({"stop_time": -1.0}, "stop time -1 s"),
+        (
+            {
+                "stop_time": {"base": 1.0, "per": {"plant.eta0.y": 1.0}},
+                "vary": {"plant.eta0.y": [1.0, -2.0]},
+            },
+            "stop time -1 s",
+        ),
+        (
+            {"sample": {"n": 1, "range": {"controller.printed_jacobian": [0, 1]}}},
+            "only numbers can be sampled",
+        ),
+        ({"sample": {"n": 1, "range": {"plant.ell": [-1, 1]}}}, "plant.ell = -1: must be at least"),
+        (
+            {"vary": {name: {"from": 1, "to": 2, "n": 40_000} for name in ("plant.ell", "step")}},
+            f"1,600,000,000 runs are more than {MOST_RUNS:,}",
+        ),
+    ],
+)
+def test_what_no_run_could_have_is_refused_before_any_run(content, words):
+    with pytest.raises(InputError, match=words):
+        space(**content)

@@ -1,0 +1,189 @@
+"""Outcomes of a study, kept as they come."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.studies.engine import INDICES, Outcome
+from orchestrator.studies.store import StudyResult, read_record, store
+from support.machine import eventually
+
+parquet = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow: the extra `studies`")
+
+RECORD = {"study": "mine", "made_of": {"points": "1234", "scenario": ("fig4",)}}
+
+
+class Toys:
+    """A space of one value, the number of the run times a tenth."""
+
+    def __init__(self):
+        self.columns = {"toy.x": float, "toy.name": str}
+        self.has_scenarios = True
+
+    def point(self, number: int):
+        return f"scenario {number % 2}", {"toy.x": 0.1 * number, "toy.name": str(number)}
+
+
+def outcome(number: int) -> Outcome:
+    return Outcome(number, {name: 0.3 * number + i for i, name in enumerate(INDICES)})
+
+
+def test_what_is_kept_is_found_again_and_the_rest_is_missing(tmp_path):
+    with store(tmp_path / "new", RECORD) as first:
+        assert list(first.missing(6)) == [0, 1, 2, 3, 4, 5]
+        first.add([outcome(4), outcome(1)])
+    with store(tmp_path / "new", RECORD) as second:
+        assert len(second) == 2
+        assert list(second.missing(6)) == [0, 2, 3, 5]
+        missing = second.missing(6)
+        next(missing)
+        # What comes while they are asked for changes nothing.
+        second.add([outcome(2), outcome(4)])
+        assert list(missing) == [2, 3, 5]
+        assert len(second) == 3
+
+
+def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
+    odd = dict.fromkeys(INDICES, 0.1 + 0.2) | {"late_error": -0.0, "largest_speed": np.inf}
+    del odd["time_to_reach"]
+    outcomes = [outcome(3), Outcome(1, {}, "stopped at t = 1 s: it would"), outcome(2)]
+    with store(tmp_path, RECORD) as unfinished:
+        unfinished.add(outcomes)
+        unfinished.add([Outcome(0, odd)])
+        unfinished.publish(Toys())
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["runs.parquet", "study.json"]
+    table = parquet.read_table(tmp_path / "runs.parquet")
+    names = ["run", "scenario", "toy.x", "toy.name", *INDICES, "failure"]
+    assert table.column_names == names
+    rows = table.to_pylist()
+    assert [row["run"] for row in rows] == [0, 1, 2, 3]
+    assert [row["failure"] for row in rows] == [None, "stopped at t = 1 s: it would", None, None]
+    for number, row in enumerate(rows):
+        assert (row["scenario"], {k: row[k] for k in Toys().columns}) == Toys().point(number)
+    assert rows[2] | outcome(2).indices == rows[2]
+    assert all(rows[1][name] is None for name in INDICES)
+    assert rows[0]["time_to_reach"] is None
+    assert np.signbit(rows[0].pop("late_error"))
+    assert rows[0] | {k: v for k, v in odd.items() if k != "late_error"} == rows[0]
+
+
+def test_result_gives_columns_and_suggests_names(tmp_path):
+    with store(tmp_path, RECORD) as unfinished:
+        unfinished.add([outcome(1), Outcome(0, {}, "it would not")])
+        unfinished.publish(Toys())
+    result = StudyResult(tmp_path)
+    assert (result.runs, result.failed) == (2, 1)
+    assert np.isnan(result["late_error"][0])
+    assert result["late_error"][1] == outcome(1).indices["late_error"]
+    assert list(result["failure"]) == ["it would not", None]
+    assert dict(result).keys() == set(result)
+    assert result.record == read_record(tmp_path)
+    assert repr(result) == f"<StudyResult {tmp_path.name}: 2 runs, 1 failed>"
+    with pytest.raises(KeyError, match="no column 'late_eror'; did you mean late_error"):
+        result["late_eror"]
+    with pytest.raises(InputError, match="holds no study that is done"):
+        StudyResult(tmp_path / "elsewhere")
+
+
+def test_study_that_is_done_is_not_opened_again(tmp_path):
+    with store(tmp_path, RECORD) as unfinished:
+        unfinished.add([outcome(0)])
+        unfinished.publish(Toys())
+    # As if it had been killed before its database was gone.
+    (tmp_path / "unfinished.sqlite").touch()
+    with store(tmp_path, RECORD) as unfinished:
+        assert unfinished is None
+    assert not (tmp_path / "unfinished.sqlite").exists()
+
+
+def test_other_study_is_refused(tmp_path):
+    with store(tmp_path, RECORD):
+        pass
+    other = {"made_of": {"points": "5678", "scenario": ["fig4"], "step": 0.01}}
+    with (
+        pytest.raises(InputError, match="another study, which differs in points, step; choose"),
+        store(tmp_path, other),
+    ):
+        raise AssertionError
+    assert read_record(tmp_path) == json.loads(json.dumps(RECORD))
+
+
+def test_folder_is_for_one_process(tmp_path):
+    with (
+        store(tmp_path, RECORD),
+        pytest.raises(InputError, match="another run is writing into"),
+        store(tmp_path, RECORD),
+    ):
+        raise AssertionError
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "words"),
+    [
+        ("study.json", "[", "not the record of a study"),
+        ("study.json", "{}", "not the record of a study"),
+        ("study.json", "[1]", "not the record of a study"),
+        ("runs.parquet", "", "has runs, but no study.json"),
+        ("unfinished.sqlite", "no database" * 100, "has runs, but no study.json"),
+    ],
+)
+def test_what_is_not_ours_is_refused(tmp_path, file, content, words):
+    (tmp_path / file).write_text(content)
+    with pytest.raises(InputError, match=words), store(tmp_path, RECORD):
+        raise AssertionError
+    assert (tmp_path / file).read_text() == content
+
+
+def test_damaged_database_and_place_that_is_no_folder_are_one_line(tmp_path):
+    with store(tmp_path / "study", RECORD):
+        pass
+    (tmp_path / "study" / "unfinished.sqlite").write_bytes(b"no database" * 1000)
+    with (
+        pytest.raises(InputError, match=r"cannot write into .*: file is not a database"),
+        store(tmp_path / "study", RECORD),
+    ):
+        raise AssertionError
+    (tmp_path / "file").touch()
+    with (
+        pytest.raises(InputError, match=r"cannot write into .*choose another folder"),
+        store(tmp_path / "file", RECORD),
+    ):
+        raise AssertionError
+
+
+BLOCK = 50
+
+WRITER = f"""
+import sys
+from itertools import count
+from pathlib import Path
+from orchestrator.studies.engine import Outcome
+from orchestrator.studies.store import store
+
+with store(Path(sys.argv[1]), {RECORD!r}) as unfinished:
+    for block in count(len(unfinished) // {BLOCK}):
+        unfinished.add([Outcome({BLOCK} * block + i, {{}}, str(i)) for i in range({BLOCK})])
+"""
+
+
+def test_kill_loses_at_most_the_block_under_way(tmp_path):
+    done = 0
+    for _ in range(3):
+        process = subprocess.Popen([sys.executable, "-c", WRITER, str(tmp_path)])
+        log = tmp_path / "unfinished.sqlite-wal"
+        assert eventually(lambda log=log: log.exists() and log.stat().st_size > 100_000)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        with store(tmp_path, RECORD) as unfinished:
+            assert len(unfinished) > done
+            done = len(unfinished)
+            # All of a block, or none.
+            assert done % BLOCK == 0
+            assert list(unfinished.missing(done + 2)) == [done, done + 1]

@@ -1,0 +1,134 @@
+"""Study files."""
+
+from __future__ import annotations
+
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.studies.study import (
+    ENTRIES,
+    Range,
+    Sample,
+    StopTime,
+    read_study,
+    ready_studies,
+    study_of,
+)
+
+TEXT = """
+scenario = ["fig5", "other.ssp"]
+engine = "batch"
+stop_time = { base = 60.0, per = { plant.eta0.z = 1.2 } }
+step = 0.01
+order = "jacobi"
+title = "A study"
+
+[parameters]
+plant.noise.std = 0.0
+
+[vary]
+plant.eta0.z = { from = 1.0, to = 100.0, n = 3, spacing = "log" }
+"controller.K1[1]" = { from = 10, to = 20, n = 3 }
+controller.saturation = ["tanh", "algebraic"]
+
+[sample]
+n = 5
+
+[sample.range]
+controller.k_d = [1.0, 2]
+controller.gamma = { from = 0.1, to = 10, spacing = "log" }
+
+[figures.map]
+x = "plant.eta0.z"
+"""
+
+
+def test_file_says_what_varies(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(TEXT)
+    study = read_study(str(path))
+    assert (study.name, study.title, study.engine) == ("mine", "A study", "batch")
+    assert (study.step, study.order) == (0.01, "jacobi")
+    assert study.scenario == ("fig5", str(tmp_path / "other.ssp"))
+    assert study.stop_time == StopTime(60.0, {"plant.eta0.z": 1.2})
+    assert study.parameters == {"plant.noise.std": 0.0}
+    assert study.vary == {
+        "plant.eta0.z": (1.0, 10.0, 100.0),
+        "controller.K1[1]": (10.0, 15.0, 20.0),
+        "controller.saturation": ("tanh", "algebraic"),
+    }
+    ranges = {"controller.k_d": Range(1.0, 2.0), "controller.gamma": Range(0.1, 10.0, "log")}
+    assert study.sample == Sample(5, ranges, "sobol", 0)
+    assert study.figures == {"map": {"x": "plant.eta0.z"}}
+    assert study.varied == (*study.vary, *ranges)
+
+
+def test_quoted_and_dotted_keys_are_the_same():
+    quoted = study_of("a", {"scenario": "fig4", "vary": {"plant.eta0.z": [1.0]}})
+    dotted = study_of("a", {"scenario": "fig4", "vary": {"plant": {"eta0": {"z": [1.0]}}}})
+    assert quoted == dotted
+
+
+def test_every_entry_has_a_meaning():
+    assert all(entry.meaning for entry in ENTRIES.values())
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"vary": {}}, 'names no scenario; write scenario = "fig5"'),
+        ({"scenario": []}, "scenario = [] is of the wrong type, not a name, or list of names"),
+        ({"vari": {}}, "unknown entry 'vari'; did you mean vary"),
+        ({"engine": "gpu"}, "engine = 'gpu' is of the wrong type, not a name out of fmu, batch"),
+        ({"order": "random"}, "order = 'random' is of the wrong type"),
+        ({"vary": {"plant.ell": 1.0}}, "vary: plant.ell: write [values], or { from = 1.0"),
+        ({"vary": {"plant.ell": []}}, "vary: plant.ell: write [values]"),
+        ({"vary": {"plant.ell": {"from": 1, "to": 2}}}, "vary: plant.ell: lacks n"),
+        ({"vary": {"plant.ell": {"from": 1, "to": 2, "n": 2.0}}}, "n = 2.0 is of the wrong type"),
+        ({"vary": {"plant.ell": {"from": 1, "to": 2, "n": 0}}}, "plant.ell: n = 0"),
+        (
+            {"vary": {"plant.ell": {"from": 0, "to": 2, "n": 2, "spacing": "log"}}},
+            "plant.ell: spacing = 'log' needs two positive ends",
+        ),
+        ({"vary": {"ell": [1.0]}}, "'ell': write component.port"),
+        ({"parameters": {"step": 0.01}}, "'step': write component.port"),
+        (
+            {"parameters": {"plant.ell": 1.0}, "vary": {"plant.ell": [1.0]}},
+            "plant.ell is stated twice",
+        ),
+        ({"step": 0.01, "vary": {"step": [0.02]}}, "step is stated twice"),
+        ({"sample": {"range": {"plant.ell": [1, 2]}}}, "sample: lacks n"),
+        ({"sample": {"n": 3}}, "sample: lacks range"),
+        ({"sample": {"n": 0, "range": {"plant.ell": [1, 2]}}}, "sample: n = 0"),
+        ({"sample": {"n": 1, "range": {}}}, "sample: draws nothing"),
+        ({"sample": {"n": 1, "seed": -1, "range": {}}}, "seed = -1 is of the wrong type"),
+        (
+            {"sample": {"n": 1, "range": {"plant.ell": [1, 2, 3]}}},
+            "sample: plant.ell: write [low, high]",
+        ),
+        ({"sample": {"n": 1, "method": "halton", "range": {}}}, "sample: method = 'halton'"),
+        (
+            {"stop_time": {"base": 1.0, "per": {"plant.ell": 1.0}}},
+            "stop_time: plant.ell does not vary",
+        ),
+        ({"stop_time": {"base": 1.0, "per": {"plant.ell": "x"}}}, "plant.ell = 'x': not a number"),
+    ],
+)
+def test_mistakes_are_named_with_their_place(content, words):
+    scenario = {} if words.startswith("names no") else {"scenario": "fig4"}
+    with pytest.raises(InputError) as error:
+        study_of("mine", scenario | content)
+    assert str(error.value).startswith("mine: ")
+    assert words in str(error.value)
+
+
+def test_unknown_name_and_missing_file_are_one_line():
+    with pytest.raises(InputError, match=r"no study 'nothing'; there are .*give a \.toml file"):
+        read_study("nothing")
+    with pytest.raises(InputError, match=r"nothing\.toml: no such file"):
+        read_study("nothing.toml")
+
+
+@pytest.mark.parametrize("name", ready_studies())
+def test_ready_studies_can_be_read(name):
+    assert read_study(name).title
