@@ -12,6 +12,7 @@ from orchestrator.exchange.reference import write_reference
 from orchestrator.experiments.bundle import current_fmus, run_fmus
 from orchestrator.experiments.folder import replaced, whole
 from orchestrator.experiments.scenario_page import scenario_page
+from orchestrator.paper.errata import errata_page
 
 
 def add_to(commands: Any) -> None:
@@ -20,7 +21,7 @@ def add_to(commands: Any) -> None:
     add_out(reference, Path("reference"))
     reference.set_defaults(action=_reference)
 
-    docs = commands.add_parser("docs", help="write the pages of components and scenario files")
+    docs = commands.add_parser("docs", help="write the pages that say what the code says")
     add_out(docs, Path("docs"))
     docs.set_defaults(action=_docs)
 
@@ -35,9 +36,10 @@ def _reference(options: argparse.Namespace) -> int:
 
 def _docs(options: argparse.Namespace) -> int:
     written = run_fmus("packaging.documentation", options.out / "components")
-    page = options.out / "scenarios.md"
-    with whole(page) as partial:
-        partial.write_text(scenario_page(), encoding="utf-8")
-    for path in (*written, page):
+    for name, text in (("scenarios.md", scenario_page()), ("paper.md", errata_page())):
+        with whole(options.out / name) as partial:
+            partial.write_text(text, encoding="utf-8")
+        written.append(options.out / name)
+    for path in written:
         show(path)
     return OK

@@ -2,10 +2,61 @@
 
 from __future__ import annotations
 
+from math import sqrt
+from typing import NamedTuple
+
 import numpy as np
 
 from orchestrator.analysis.signals import APPLIED, THETA_HAT, tracking_error
 from orchestrator.master.table import Table
+from orchestrator.studies.engine import REACHED
+
+
+class Way(NamedTuple):
+    """The vehicle's way to the reference.
+
+    Attributes:
+        duration: until |e| is at most :data:`REACHED` [s].
+        impulse: of the surge force, as applied in that time [N.s].
+
+    """
+
+    duration: float
+    impulse: float
+
+    @property
+    def least_effort(self) -> float:
+        """The least L2 norm that a force with this impulse can have in this time [N.s^0.5].
+
+        (integral of tau)^2 <= T * integral of tau^2 by Cauchy and Schwarz, whatever its course.
+        """
+        return abs(self.impulse) / sqrt(self.duration)
+
+    def soonest(self, effort: float) -> float:
+        """The least time in which a force of an L2 norm [N.s^0.5] can have this impulse [s]."""
+        return (self.impulse / effort) ** 2
+
+
+def way(time: np.ndarray, error: np.ndarray, force: np.ndarray) -> Way | None:
+    """The way of a run to its reference; None if it does not come there, or is there already.
+
+    Args:
+        time: of each row [s].
+        error: e = y - y_d, a row each [m].
+        force: surge force that was applied in the step that ends with a row [N].
+
+    """
+    # The first of them; row 0 if there is none.
+    reached = int((np.linalg.norm(error, axis=1) <= REACHED).argmax())
+    if not reached:
+        return None
+    impulse = force[1 : reached + 1] @ np.diff(time[: reached + 1])
+    return Way(float(time[reached]), float(impulse))
+
+
+def way_of(table: Table) -> Way | None:
+    """The same of a table."""
+    return way(table.time, tracking_error(table), table[APPLIED[0]])
 
 
 def turning_radius(table: Table) -> float:

@@ -15,7 +15,7 @@ from orchestrator.experiments.bundle import PYTHON, current_fmus
 from orchestrator.experiments.folder import replaced
 from orchestrator.experiments.record import PACKAGES, Clock, write_files
 from orchestrator.experiments.wiring import closed_loop
-from orchestrator.paper import readings
+from orchestrator.paper import errata, readings
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS, show_effect
 from orchestrator.paper.formatting import table
@@ -43,7 +43,8 @@ _WHY_NUMBERS_DIFFER = """\
 Why the numbers differ: efforts and final errors depend on the end time and the noise, which are \
 not given. The proposed controller's e_f moves with the phase of the waves (period 63 s) at the \
 end of the run, and shrinks with eps_t, as Remark 6 says. The PD controller's e_f is some \
-millimetres, up to a centimetre, for the same reason."""
+millimetres, up to a centimetre, for the same reason. No choice of what is not given brings all of \
+them together: `auv-fmu table` tries them."""
 
 
 def write_report(
@@ -138,6 +139,8 @@ def _text(
         yield "\n".join(f"- `auv-fmu run {outcomes.label(run)}`" for run in effect.runs)
     yield "## Gain conditions"
     yield f"`auv-fmu gains`:\n\n```\n{gains.check(closed_loop(fmus))}\n```"
+    yield "## What is wrong in the paper"
+    yield errata.section()
     yield "## Readings"
     yield readings.section()
     yield "## Versions and commands"

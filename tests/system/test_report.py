@@ -9,10 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.analysis.gains import stated
 from orchestrator.commands import paper
 from orchestrator.commands.main import main
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
+from orchestrator.paper.errata import errata, of_the_paper
 from orchestrator.paper.report import write_report
 
 STRANGER = """\
@@ -75,6 +77,12 @@ def test_the_stranger_is_in_the_report(folder, text, page):
 def test_a_scenario_that_cannot_run_says_why_and_breaks_nothing(text):
     [reason] = re.findall(r"\*\*The run lost ended early:\*\* (.*)", text)
     assert "lost.fmu: no such file" in reason
+
+
+def test_what_is_wrong_in_the_paper_is_there_with_the_gain_check(text):
+    for erratum in errata():
+        assert f"\n#### {erratum.title}\n" in text
+    assert "\n".join(stated(of_the_paper())) in text
 
 
 def test_links_lead_somewhere(folder, page):
