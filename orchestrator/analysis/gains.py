@@ -9,6 +9,7 @@ from auv_fmu.output_feedback import Gains
 from auv_fmu.proof.attraction import Theorem, theorem
 from auv_fmu.proof.sampling import observer_rate
 from auv_fmu.saturation import MAXIMUM_SLOPE
+from orchestrator.analysis.cautions import gain_of_a_step
 from orchestrator.analysis.signals import ELL, vehicle
 from orchestrator.errors import InputError
 from orchestrator.system.names import port_name
@@ -99,11 +100,10 @@ def stated(found: Theorem) -> Iterator[str]:
 
 def _sampling(system: System) -> list[str]:
     """What the step asks of k_d."""
-    lambda_, k_d, h = (
-        float(system.value(port_name(f"controller.{name}")) or 0.0)
-        for name in ("lambda", "k_d", "h_max")
+    lambda_, h = (
+        float(system.value(port_name(f"controller.{name}")) or 0.0) for name in ("lambda", "h_max")
     )
-    rate = observer_rate(lambda_, k_d)
+    rate = observer_rate(lambda_, gain_of_a_step(system, h))
     return [
         f"Euler's scheme with internal steps of {h:g} s: the observer's fastest mode has the rate "
         f"{rate:.4g} 1/s,",

@@ -167,6 +167,9 @@ def test_gains_prints_both_sides_and_the_verdicts(workplace, capsys):
     shown = capsys.readouterr().out
     assert "30 > 25: met" in shown
     assert "paper's own gains" not in shown
+    # Theorem 2 weighs K_1 with s'_M = 2 / pi: 20 / pi + 5 is 11.3662.
+    assert main(["gains", "--set", "controller.saturation=arctan"]) == 0
+    assert "30 > 11.3662 + 0.5 (zeta_1 + zeta_2)" in capsys.readouterr().out
 
 
 def test_edited_copy_of_a_comparison_compares_like_with_like(workplace):
