@@ -100,6 +100,15 @@ class BatchEngine:
             for end, found in zip(ends, tallies, strict=True)
         ]
 
+    def setting(self, run: Run) -> Setting:
+        """The setting of the straight line that makes the same numbers as a run.
+
+        Raises:
+            InputError: the run has no start.
+
+        """
+        return _job(self._systems[run.scenario], run).setting
+
     def table(self, run: Run) -> Table:
         """A run with its rows, those of the columns :data:`.columns.COLUMNS` that it has.
 
