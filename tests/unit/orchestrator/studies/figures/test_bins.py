@@ -11,10 +11,11 @@ from orchestrator.studies.figures.bins import bins_of, grouped, is_logarithmic
 @pytest.mark.parametrize(
     ("values", "expected"),
     [
-        ([1.0, 20.0], True),
-        ([1.0, 19.0], False),
-        ([0.0, 20.0], False),
+        (np.geomspace(1.0, 20.0, 50), True),
+        (np.geomspace(1.0, 9.0, 50), False),
+        ([0.0, *np.geomspace(1.0, 20.0, 50)], False),
         ([-1.0, 20.0], False),
+        ([1e-9, *np.linspace(5.0, 20.0, 50)], False),
         ([1.0, np.nan, 100.0], True),
         ([np.nan], False),
     ],
@@ -31,11 +32,13 @@ def test_each_value_of_a_grid_has_a_bin(grid):
     assert all(np.diff(bins.edges) > 0.0)
 
 
-def test_bins_of_anything_else_hold_equally_many():
+def test_bins_of_anything_else_are_equally_wide_or_equally_full():
     values = np.random.default_rng(1).lognormal(0.0, 2.0, 1000)
-    bins = bins_of(values, 10)
-    assert bins.is_logarithmic
-    assert np.bincount(bins.places(values)).tolist() == [100] * 10
+    full = bins_of(values, 10, are_full=True)
+    assert full.is_logarithmic
+    assert np.bincount(full.places(values)).tolist() == [100] * 10
+    wide = bins_of(values, 10)
+    np.testing.assert_allclose(np.diff(np.log(wide.edges)), np.ptp(np.log(values)) / 10)
 
 
 def test_groups_are_the_finite_values_of_each_bin():
