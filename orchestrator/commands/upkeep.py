@@ -13,6 +13,7 @@ from orchestrator.experiments.bundle import current_fmus, run_fmus
 from orchestrator.experiments.folder import replaced, whole
 from orchestrator.experiments.scenario_page import scenario_page
 from orchestrator.paper.errata import errata_page
+from orchestrator.studies.study_page import study_page
 
 
 def add_to(commands: Any) -> None:
@@ -36,10 +37,14 @@ def _reference(options: argparse.Namespace) -> int:
 
 def _docs(options: argparse.Namespace) -> int:
     written = run_fmus("packaging.documentation", options.out / "components")
-    for name, text in (("scenarios.md", scenario_page()), ("paper.md", errata_page())):
+    pages = {
+        "scenarios.md": scenario_page(),
+        "studies.md": study_page(),
+        "paper.md": errata_page(),
+    }
+    for name, text in pages.items():
         with whole(options.out / name) as partial:
             partial.write_text(text, encoding="utf-8")
-        written.append(options.out / name)
-    for path in written:
+    for path in (*written, *(options.out / name for name in pages)):
         show(path)
     return OK

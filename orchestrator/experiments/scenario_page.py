@@ -117,14 +117,15 @@ def scenario_page() -> str:
         drawn[read_scenario(name).figure].append(f"`{name}`")
     figures = ((f"`{kind}`", ", ".join(used)) for kind, used in drawn.items())
     return _PAGE.substitute(
-        entries=_table(("entry", "value", "meaning", "without it"), entries),
-        components=_table(("component", "FMU"), components),
-        wires=_table(("inputs", "are fed by"), wires),
-        figures=_table(("`figure`", "as drawn for"), figures),
+        entries=table(("entry", "value", "meaning", "without it"), entries),
+        components=table(("component", "FMU"), components),
+        wires=table(("inputs", "are fed by"), wires),
+        figures=table(("`figure`", "as drawn for"), figures),
     )
 
 
-def _table(headings: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+def table(headings: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    """A table in Markdown."""
     return "\n".join((_rows([headings]), "|---" * len(headings) + "|", _rows(rows)))
 
 

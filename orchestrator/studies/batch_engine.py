@@ -100,6 +100,15 @@ class BatchEngine:
             for end, found in zip(ends, tallies, strict=True)
         ]
 
+    def setting(self, run: Run) -> Setting:
+        """The setting of the straight line that makes the same numbers as a run.
+
+        Raises:
+            InputError: the run has no start.
+
+        """
+        return _job(self._systems[run.scenario], run).setting
+
     def table(self, run: Run) -> Table:
         """A run with its rows, those of the columns :data:`.columns.COLUMNS` that it has.
 
@@ -151,7 +160,7 @@ def _job(system: System, run: Run) -> _Job:
     full, stop = experiment.full_steps, experiment.stop_time
     parts = splits(setting, experiment.step)
     if failure := refused_at_once(setting, parts, _order(system, experiment)):
-        raise InputError(failure)
+        raise InputError(refused_at_start(setting) or failure)
     # Where there is none it has no length, and is no step.
     last_parts = (
         splits(setting, stop - full * experiment.step) if experiment.has_short_step else parts

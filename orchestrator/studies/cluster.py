@@ -285,6 +285,14 @@ class _Making:
         except TimeoutError as error:
             # The worker was lost between its word that the block is done and the block.
             raise _gone("last worker") from error
+        except InputError:
+            raise
+        except Exception as error:
+            # Of the engine, or for want of a package on the other side.
+            raise InputError(
+                f"the cluster cannot make runs {block[0].number} to {block[-1].number}: "
+                f"{reason(error)}"
+            ) from error
         self._pace = seconds / sum(run.stop_time / run.step for run in block)
         made: list[Outcome] = outcomes
         return made

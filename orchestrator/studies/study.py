@@ -143,7 +143,7 @@ ENTRIES: dict[str, Entry] = {
         "to this one. Of several, each is run at every point, with the parameters that it has.",
         "",
     ),
-    "title": Entry("text", is_text, "Heading of the figures.", "the name of the file"),
+    "title": Entry("text", is_text, "Heading of the figures.", "none"),
     "engine": _one_of(ENGINES)._replace(
         meaning="What makes the runs: the FMUs, or the equations compiled, which know the standard "
         "closed loop alone and give the same numbers."
@@ -169,9 +169,14 @@ ENTRIES: dict[str, Entry] = {
         "nothing",
     ),
     "sample": Entry(
-        "table", is_table, "Points drawn at random, at every combination of `vary`.", "none"
+        "table",
+        is_table,
+        "Points drawn at random, at every combination of `vary`: `n` of them, by a `method` out "
+        f"of {', '.join(METHODS)}, with a `seed`, and under `[sample.range]` "
+        '`component.parameter = [low, high]` or `{ from = 1.0, to = 10.0, spacing = "log" }`.',
+        "none",
     ),
-    "figures": Entry("table", is_table, "What is drawn.", "nothing"),
+    "figures": Entry("table", is_table, "What is drawn: see below.", "what moves what"),
 }
 
 _RANGE = {

@@ -185,10 +185,11 @@ def check_installed() -> None:
 
 
 def _engine(name: str, systems: Mapping[str, tuple[Scenario, System]], means: Means) -> Engine:
+    alone = {scenario: system for scenario, (_, system) in systems.items()}
     if name == FMU:
-        return FmuEngine({name: system for name, (_, system) in systems.items()}, means.loop)
+        return FmuEngine(alone, means.loop)
     if name == BATCH:
-        return BatchEngine({name: system for name, (_, system) in systems.items()}, means.kind)
+        return BatchEngine(alone, means.kind)
     raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
 
 

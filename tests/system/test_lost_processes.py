@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
 import sqlite3
 import subprocess
 import sys
 import time
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -36,17 +37,9 @@ seed = 7
 
 def sweep(out):
     """A sweep of its own, which nothing of this process reaches."""
+    means = ("--kind", "native", "--workers", "2", "--out", out)
     return subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "orchestrator",
-            "sweep",
-            "study.toml",
-            "--kind=native",
-            "--workers=2",
-            f"--out={out}",
-        ],
+        [sys.executable, "-m", "orchestrator", "sweep", "study.toml", *means],
         stderr=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         text=True,
@@ -58,7 +51,9 @@ def rows(out):
     """How many runs are kept; the process that keeps them lets nobody else read."""
     with TemporaryDirectory() as copy:
         for file in out.glob(f"{DATABASE}*"):
-            shutil.copy(file, copy)
+            # It may be gone meanwhile.
+            with suppress(FileNotFoundError):
+                shutil.copy(file, copy)
         with closing(sqlite3.connect(Path(copy, DATABASE))) as database:
             try:
                 return database.execute("SELECT count(*) FROM outcomes").fetchone()[0]
@@ -91,7 +86,8 @@ def test_killed_twice_interrupted_once_and_short_of_a_worker(workplace):
     for end in (signal.SIGKILL, signal.SIGINT, signal.SIGKILL):
         process = sweep("trouble")
         kept = in_the_middle(process, out)
-        process.send_signal(end)
+        # Ctrl-C reaches every process of a terminal.
+        (os.killpg if end == signal.SIGINT else os.kill)(process.pid, end)
         _, said = process.communicate(timeout=60)
         assert process.returncode == (130 if end == signal.SIGINT else -end), said
         assert kept <= rows(out) < RUNS

@@ -1,0 +1,131 @@
+"""What a step of a vehicle costs in the batch engine: `python benchmarks/batch.py`.
+
+Every repetition makes the runs of Figs. 4 and 5 with either controller, one after the other in this
+process, and takes the processor's time:
+
+- by the straight line `auv_fmu.closed_loop`;
+- by the batch engine, with all indices.
+
+Printed are medians of the repetitions, ratios being taken within each repetition. Then runs of one
+second are made, more and more of them, and the time of each is printed with the memory of the
+process.
+
+`--check N` instead makes N random runs of every ready study in full length, and counts those that
+end in the same state as the straight line, to the last bit.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+from statistics import median
+from time import process_time
+
+from auv_fmu.closed_loop import Setting, closed_loop
+from orchestrator.analysis.signals import NU, POSITION, THETA_HAT
+from orchestrator.experiments.preparation import load, loaded
+from orchestrator.studies.batch_engine import BatchEngine
+from orchestrator.studies.engine import Run
+from orchestrator.studies.space import Space
+from orchestrator.studies.study import read_study, ready_studies
+
+#: Runs that are timed: noise is drawn in the first.
+_SCENARIOS = ("fig4", "fig5", "fig5-pd")
+_STEP = 0.02
+
+#: How many short runs are made.
+_MANY = (100, 1_000, 10_000, 100_000)
+
+
+def timed(function: Callable[[], object]) -> float:
+    """Processor's seconds of one call."""
+    start = process_time()
+    function()
+    return process_time() - start
+
+
+def resident() -> float:
+    """Resident memory of this process [MB]."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def straight(setting: Setting, steps: int) -> None:
+    """Make a run and forget it."""
+    deque(closed_loop(steps, setting), maxlen=0)
+
+
+def compare(engine: BatchEngine, steps: int, repetitions: int) -> None:
+    """Print what a step costs."""
+    print(f"medians of {repetitions} repetitions of {steps} steps, processor's time")
+    for name in _SCENARIOS:
+        run = Run(0, name, {}, steps * _STEP, _STEP)
+        setting = engine.setting(run)
+        list(engine.outcomes([run]))
+        rows = []
+        for _ in range(repetitions):
+            slow = timed(lambda: straight(setting, steps))
+            rows.append((slow, timed(lambda: list(engine.outcomes([run])))))
+        a, b = (1e6 * median(times) / steps for times in zip(*rows, strict=True))
+        ratio = median(slow / fast for slow, fast in rows)
+        print(
+            f"{name:8} straight line {a:6.2f} us a step, batch engine {b:5.3f} us: "
+            f"{ratio:.0f} times as fast"
+        )
+
+
+def grow(engine: BatchEngine) -> None:
+    """Print what runs cost where there are many."""
+    print(f"{'runs':>8} {'us a run':>9} {'resident [MB]':>14}")
+    for n in _MANY:
+        runs = (Run(i, "fig5", {"plant.eta0.y": float(i % 7)}, 1.0, _STEP) for i in range(n))
+        seconds = timed(lambda: deque(engine.outcomes(runs), maxlen=0))
+        print(f"{n:8} {1e6 * seconds / n:9.1f} {resident():14.1f}")
+
+
+def check(n: int) -> None:
+    """Print how many runs of the ready studies end as the straight line does."""
+    for name in ready_studies():
+        study = read_study(name)
+        systems = {one: loaded(one) for one in study.scenario}
+        engine = BatchEngine({one: system for one, (_, system) in systems.items()})
+        space = Space(study, systems)
+        runs = [space[number] for number in Random(name).sample(range(len(space)), n)]
+        same = sum(map(is_straight, [engine] * n, runs))
+        print(f"{name:12} {same} of {n} runs end in the same state", flush=True)
+
+
+def is_straight(engine: BatchEngine, run: Run) -> bool:
+    """Whether a run ends in the state in which the straight line ends."""
+    table = engine.table(run)
+    delayed = run.order == "jacobi"
+    *_, before, last = closed_loop(len(table) - 1, engine.setting(run), delayed)
+    state = before.controller_state
+    theta_hat = getattr(state, "theta_hat", state)
+    ends = (*last.vehicles.plant.position, *last.scene.plant.nu, *theta_hat)
+    return ends == tuple(table.group(*POSITION, *NU, *THETA_HAT)[-1])
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--steps", type=int, default=5000)
+    parser.add_argument("--repetitions", type=int, default=9)
+    parser.add_argument("--check", type=int, metavar="N", help="compare N runs of every study")
+    options = parser.parse_args()
+    print(f"CPython {platform.python_version()}, {platform.machine()}")
+    if options.check:
+        check(options.check)
+        return
+    engine = BatchEngine({name: load(name) for name in _SCENARIOS})
+    compare(engine, options.steps, options.repetitions)
+    grow(engine)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,178 @@
+"""What the runs of a study cost, and what very many would: `python benchmarks/studies.py`.
+
+Runs of Fig. 4 from random starts are made by one worker process and by two, alternately, with each
+engine. Then runs that cost nothing go the same way, in blocks as they are and in blocks of one run:
+what is left are the costs of the process that sends runs out and keeps what comes back, for a run
+and for a block. From these, the last lines say what a large study needs on a large cluster.
+
+Processor time is that of the worker processes, and stands a busy machine; the gain of two workers
+is in wall-clock time, and wants both cores.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter, process_time
+from typing import NamedTuple
+from unittest.mock import patch
+
+from orchestrator.experiments.preparation import loaded
+from orchestrator.studies import cluster
+from orchestrator.studies.batch_engine import BatchEngine
+from orchestrator.studies.cluster import making
+from orchestrator.studies.engine import INDICES, Engine, Outcome, Run
+from orchestrator.studies.fmu_engine import FmuEngine
+from orchestrator.studies.space import Space
+from orchestrator.studies.store import store
+from orchestrator.studies.study import study_of
+
+SCENARIO = "fig4"
+
+#: Runs that are made before anything is timed: FMUs are unpacked by then, equations compiled.
+_WARM = 20
+
+
+class Timed(NamedTuple):
+    """An engine that says how much processor time each run takes, and nothing else of it."""
+
+    engine: Engine
+    digest: str = "timed"
+
+    def outcomes(self, runs: Sequence[Run]) -> Iterator[Outcome]:
+        """Make runs, one after the other."""
+        outcomes = self.engine.outcomes(runs)
+        for run in runs:
+            start = process_time()
+            next(outcomes)
+            yield Outcome(run.number, {"seconds": process_time() - start})
+
+
+class Idle(NamedTuple):
+    """An engine whose runs take no time."""
+
+    digest: str = "idle"
+
+    def outcomes(self, runs: Sequence[Run]) -> Iterator[Outcome]:
+        """Make nothing."""
+        for run in runs:
+            yield Outcome(run.number, dict.fromkeys(INDICES, 0.1 * run.number))
+
+
+class Cost(NamedTuple):
+    """What runs take, each [s]."""
+
+    processor: float
+    wall: float
+
+
+def cost(engine: Engine, runs: Iterable[Run], workers: int) -> Cost:
+    """What runs take when some processes make them."""
+    with making(Timed(engine), iter(runs), workers=workers) as blocks:
+        warm, seconds, start = 0, [], 0.0
+        for block in blocks:
+            if warm < _WARM:
+                warm, start = warm + len(block), perf_counter()
+                continue
+            seconds += [outcome.indices["seconds"] for outcome in block]
+        return Cost(median(seconds), (perf_counter() - start) / len(seconds))
+
+
+def starts(n: int, stop_time: float) -> Space:
+    """Runs from random starts."""
+    ranges = {"plant.eta0.y": [-10.0, 10.0], "plant.eta0.z": [-10.0, 10.0]}
+    sample = {"method": "random", "n": n, "seed": 1, "range": ranges}
+    study = study_of("starts", {"scenario": SCENARIO, "stop_time": stop_time, "sample": sample})
+    return Space(study, {SCENARIO: loaded(SCENARIO)})
+
+
+def keeping(n: int) -> tuple[float, float, float]:
+    """Seconds of this process and bytes of the unfinished and the finished table, for each run."""
+    space = starts(n, 1.0)
+    start = process_time()
+    with (
+        TemporaryDirectory(prefix="auvfmu") as folder,
+        store(Path(folder), {"made_of": {}}) as unfinished,
+    ):
+        assert unfinished is not None
+        with making(Idle(), (space[i] for i in range(n)), workers=1) as blocks:
+            for outcomes in blocks:
+                unfinished.add(outcomes)
+        database = sum(file.stat().st_size for file in Path(folder).glob("unfinished*"))
+        unfinished.publish(space)
+        table = Path(folder, "runs.parquet").stat().st_size
+    return (process_time() - start) / n, database / n, table / n
+
+
+def block(n: int) -> float:
+    """Seconds that a block takes to get there and back when there is nothing to do."""
+    space = starts(n, 1.0)
+    with (
+        patch.object(cluster, "_MOST_RUNS", 1),
+        making(Idle(), (space[i] for i in range(n)), workers=1) as blocks,
+    ):
+        start = perf_counter()
+        made = sum(1 for _ in blocks)
+        return (perf_counter() - start) / made
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--stop-time", type=float, default=60.0, help="of a run [s]")
+    parser.add_argument("--seconds", type=float, default=10.0, help="a measurement takes")
+    parser.add_argument("--repetitions", type=int, default=3)
+    parser.add_argument("--runs", type=float, default=1e8, help="of the large study")
+    parser.add_argument("--nodes", type=int, default=100, help="of the large cluster")
+    parser.add_argument("--cores", type=int, default=16, help="of each of its nodes")
+    options = parser.parse_args()
+    print(
+        f"{platform.python_implementation()} {platform.python_version()}, {platform.machine()}, "
+        f"{os.cpu_count()} cores, runs of {options.stop_time:g} s"
+    )
+    engines: dict[str, Callable[[], Engine]] = {
+        "FMUs in Python": lambda: FmuEngine({SCENARIO: loaded(SCENARIO, "python")[1]}),
+        "FMUs in C": lambda: FmuEngine({SCENARIO: loaded(SCENARIO, "native")[1]}),
+        "equations": lambda: BatchEngine({SCENARIO: loaded(SCENARIO)[1]}),
+    }
+    costs = {}
+    for name, make in engines.items():
+        engine = make()
+        space = starts(1_000_000, options.stop_time)
+        once = cost(engine, islice(space, 5 * _WARM), 1)
+        n = 2 * _WARM + round(options.seconds / once.processor)
+        pairs = [
+            [cost(engine, islice(space, n), workers) for workers in (1, 2)]
+            for _ in range(options.repetitions)
+        ]
+        one, two = (min(pair[i].processor for pair in pairs) for i in (0, 1))
+        gain = max(pair[0].wall / pair[1].wall for pair in pairs)
+        costs[name] = one
+        print(
+            f"{name:15}{1e3 * one:9.3f} ms of processor time a run by one worker,"
+            f"{1e3 * two:9.3f} ms by each of two, which make {gain:.2f} times as many runs"
+        )
+    run, database, table = keeping(100_000)
+    print(f"who sends and keeps them: {1e6 * run:.0f} us of processor time a run")
+    print(f"{database:.0f} bytes a run until all are done, and {table:.0f} bytes of Parquet")
+    print(f"a block of runs: {1e3 * block(1000):.1f} ms to get there and back")
+
+    cores = options.nodes * options.cores
+    print(f"{options.runs:g} runs on {options.nodes} nodes of {options.cores} cores:")
+    for name, one in costs.items():
+        total = options.runs * one / 3600
+        print(f"{name:15}{total:12,.0f} core hours,{total / cores:9.2f} h by all cores")
+    keep = options.runs * run / 3600
+    print(
+        f"who sends and keeps them: {keep:.1f} h, {options.runs * (database + table) / 1e9:.0f} GB"
+    )
+
+
+if __name__ == "__main__":
+    main()

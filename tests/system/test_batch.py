@@ -1,0 +1,243 @@
+"""The batch engine: the numbers of the straight line and of the FMUs, bit for bit."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+from functools import cache
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.experiments.preparation import load, loaded
+from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.simulation import simulate
+from orchestrator.master.table import Table
+from orchestrator.studies.batch_engine import BatchEngine
+from orchestrator.studies.engine import Run
+from orchestrator.studies.fmu_engine import FmuEngine
+from orchestrator.studies.space import Space
+from orchestrator.studies.study import read_study, ready_studies
+from orchestrator.system.names import port_name
+from orchestrator.system.structure import System
+from support.straight import straight_rows
+
+pytest.importorskip("numba", reason="needs numba: the extra `studies`")
+
+KIND = "native"
+
+#: How many runs of each study are tried, how many of them with FMUs, and how many steps of each.
+SAMPLES, WITH_FMUS, STEPS = 200, 40, 40
+
+
+@cache
+def systems(*names: str) -> dict[str, System]:
+    return {name: load(name, KIND) for name in names}
+
+
+def engines(*names: str) -> tuple[BatchEngine, FmuEngine]:
+    return BatchEngine(systems(*names), KIND), FmuEngine(systems(*names), "compiled")
+
+
+@cache
+def sampled(name: str) -> list[Run]:
+    """Some runs of a ready study, cut short, every second one in the other order."""
+    study = read_study(name)
+    space = Space(study, {scenario: loaded(scenario, KIND) for scenario in study.scenario})
+    numbers = Random(name).sample(range(len(space)), SAMPLES)
+    return [
+        space[number]._replace(stop_time=STEPS * space[number].step, order=ORDERS[i % 2])
+        for i, number in enumerate(numbers)
+    ]
+
+
+def bits(rows: np.ndarray) -> np.ndarray:
+    """As integers: -0.0 is not 0.0."""
+    return np.ascontiguousarray(rows).view(np.int64)
+
+
+def compare_with_straight_line(engine: BatchEngine, run: Run) -> None:
+    table = engine.table(run)
+    straight = straight_rows(engine.setting(run), len(table) - 1, run.order == "jacobi")
+    different = np.argwhere(bits(table.rows) != bits(straight))
+    # Where nothing is drawn, what is zero is not of a sign.
+    different = [at for at in different if table.rows[*at] != straight[*at]]
+    assert not different, ("time", *table.columns)[different[0][1]]
+
+
+@pytest.mark.parametrize("name", ready_studies())
+def test_runs_of_studies_are_those_of_the_straight_line(name):
+    """Every signal after every step."""
+    runs = sampled(name)
+    engine, _ = engines(*read_study(name).scenario)
+    for run in runs:
+        compare_with_straight_line(engine, run)
+
+
+@pytest.mark.parametrize("name", ready_studies())
+def test_runs_of_studies_are_those_of_the_fmus(name):
+    """All indices, and why runs fail."""
+    runs = sampled(name)[:WITH_FMUS]
+    batch, fmus = engines(*read_study(name).scenario)
+    for one, other in zip(batch.outcomes(runs), fmus.outcomes(runs), strict=True):
+        assert one == other
+
+
+#: Values that make a difference to how the loop is computed.
+ADDITIONS: list[dict[str, Any]] = [
+    {"controller.saturation": "algebraic"},
+    {"controller.saturation": "arctan", "controller.observer": "exact"},
+    {"controller.observer": "integral", "controller.printed_jacobian": True},
+    {"controller.innovation_gate": 0.001, "plant.noise.std": 0.01, "plant.noise.seed": -7},
+    {"plant.roll": False, "plant.noise.std": 0.001},
+    {"plant.current.x": 0.4, "plant.current.z": -0.2},
+    {"plant.actuator.T.u": 0.3, "plant.actuator.T.r": 0.05, "plant.tau_max.u": 20.0},
+    {"planner.nu0.u": 0.2, "planner.h_max": 0.003, "controller.h_max": 0.007},
+    {"plant.ell": 0.5, "plant.h_max": 0.004, "planner.m11": 20.0},
+]
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("values", ADDITIONS, ids=", ".join)
+def test_additions_are_those_of_the_straight_line(values, order):
+    engine, _ = engines("fig4")
+    compare_with_straight_line(engine, Run(0, "fig4", values, 2.0, 0.02, order))
+
+
+#: What components refuse: values, values that do not fit, starts, steps.
+REFUSED: list[dict[str, Any]] = [
+    {"controller.gamma": -1.0},
+    {"controller.saturation": "sigmoid"},
+    {"plant.tau.u": 1.0},
+    {"plant.tau_min.u": 0.0, "plant.tau_max.u": 0.0, "planner.eta0.theta": 1.6},
+    {"plant.roll": False, "plant.nu0.p": 0.1},
+    {"plant.eta0.x": 1e101},
+    {"plant.ell": 1e308},
+    {"plant.h_max": 1e-9, "controller.h_max": 1e-9},
+    {"planner.tau_d.q": 40.0},
+    {"plant.m11": 1e-9},
+    {"plant.m66": 1e-3, "planner.tau_d.q": 50.0},
+    {"disturbance.omega_d": 1e308},
+    {"disturbance.A_d": 1.7e308, "disturbance.A_f": 1.7e308},
+    {"controller.gamma": 1e200},
+]
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("values", REFUSED, ids=", ".join)
+def test_what_fmus_refuse_is_refused_in_their_words(values, order):
+    run = Run(5, "fig4", values, 3.0, 0.02, order)
+    for batch, fmus in zip(*(engine.outcomes([run]) for engine in engines("fig4")), strict=True):
+        assert batch == fmus
+        assert batch.failure and not batch.indices
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("scenario", ["fig4", "fig5-pd"])
+def test_indices_are_those_of_the_rows_of_fmus(scenario, order):
+    """With noise, and a shorter step at the end."""
+    run = Run(0, scenario, {"plant.noise.std": 0.001}, 30.01, 0.02, order)
+    for batch, fmus in zip(*(engine.outcomes([run]) for engine in engines(scenario)), strict=True):
+        assert batch == fmus
+        assert batch.failure is None
+        assert ("estimate_error" in batch.indices) == (scenario == "fig4")
+
+
+def test_rows_are_those_of_the_fmus():
+    run = Run(0, "fig5-pd", {"plant.noise.std": 0.001}, 1.01, 0.02)
+    batch, _ = engines("fig5-pd")
+    [system], table = systems("fig5-pd").values(), Table()
+    changes = {port_name(name): value for name, value in run.parameters.items()}
+    simulate(system.with_parameters(changes), Experiment(1.01, 0.02), [table])
+    found = batch.table(run)
+    assert np.array_equal(bits(found.group(*found.columns)), bits(table.group(*found.columns)))
+    assert np.array_equal(found.time, table.time)
+    assert found.parameters == table.parameters
+
+
+def test_one_run_gives_what_came_of_shorter_ones():
+    batch, _ = engines("fig5-pd")
+    run = Run(3, "fig5-pd", {"plant.m66": 0.4}, 20.0, 0.02)
+    ends = [2.0, 7.5, 20.0]
+    alone = [next(batch.outcomes([run._replace(stop_time=end)])) for end in ends]
+    assert batch.outcomes_at(run, ends) == alone
+
+
+def test_ends_between_steps_are_refused():
+    batch, _ = engines("fig4")
+    run = Run(0, "fig4", {}, 1.0, 0.02)
+    for end in (0.515, 1.5):
+        [outcome] = batch.outcomes_at(run, [end])
+        assert outcome.failure == (
+            f"stop time {end:g} s: not a whole number of steps of a run that takes 1 s"
+        )
+
+
+def test_runs_that_failed_later_have_come_to_their_earlier_ends():
+    batch, _ = engines("fig4")
+    early, late = batch.outcomes_at(
+        Run(0, "fig4", {"planner.tau_d.q": 40.0}, 3.0, 0.02), [1.0, 3.0]
+    )
+    assert early.failure is None and early.indices
+    assert "SteepReference" in str(late.failure)
+
+
+def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus():
+    batch, _ = engines("fig4")
+    run = Run(0, "fig4", {}, 0.5, 0.02)
+    copy = pickle.loads(pickle.dumps(batch))
+    assert copy.digest == batch.digest
+    assert list(copy.outcomes([run])) == list(batch.outcomes([run]))
+    assert len(pickle.dumps(batch)) < 1_000_000
+
+
+def test_digest_is_that_of_the_systems_too():
+    assert BatchEngine(systems("fig4"), KIND).digest != BatchEngine(systems("fig5"), KIND).digest
+
+
+def test_other_systems_are_refused_by_what_differs(tmp_path):
+    other = tmp_path / "Other.fmu"
+    own = tmp_path / "own.toml"
+    plant = systems("fig4")["fig4"].components["plant"].fmu
+    other.write_bytes(plant.read_bytes())
+    for text, why in (
+        ('only = ["plant"]', "it has no controller"),
+        (f'[components]\nplant = "{other}"', f"its plant is {other}"),
+        ('[components]\nmore = "MotionPlanner"', "it has more besides"),
+        ('[wires]\n"controller.y" = false', "it has no wire plant.y.x -> controller.y.x"),
+        (
+            '[wires]\n"controller.y_d" = "plant.y"',
+            "it has the wire plant.y.x -> controller.y_d.x",
+        ),
+    ):
+        own.write_text(text)
+        with pytest.raises(InputError) as refused:
+            BatchEngine({"own": load(str(own), KIND)}, KIND)
+        assert str(refused.value) == (
+            f"own: {why}, which the batch engine cannot make; use --engine fmu"
+        )
+
+
+def test_another_process_finds_the_kernel_compiled():
+    """It loads in a fraction of a second what has taken several to compile."""
+    text = (
+        "from auv_fmu.output_feedback import Gains\n"
+        "from orchestrator.studies.batch.library import compiled\n"
+        "from orchestrator.studies.batch_engine import BatchEngine\n"
+        "from orchestrator.studies.engine import Run\n"
+        "import pickle, sys\n"
+        "engine = pickle.load(sys.stdin.buffer)\n"
+        "list(engine.outcomes([Run(0, 'fig4', {}, 0.1, 0.02)]))\n"
+        "stats = compiled(Gains).stats\n"
+        "print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))\n"
+    )
+    batch, _ = engines("fig4")
+    list(batch.outcomes([Run(0, "fig4", {}, 0.1, 0.02)]))
+    said = subprocess.run(
+        [sys.executable, "-c", text], input=pickle.dumps(batch), capture_output=True, check=True
+    )
+    assert said.stdout.split() == [b"1", b"0"]

@@ -1,0 +1,26 @@
+"""A study as a whole, where something is missing."""
+
+from __future__ import annotations
+
+import pytest
+
+from orchestrator import sweep
+from orchestrator.errors import InputError
+from orchestrator.studies import sweep as module
+
+STUDY = {"scenario": "fig4", "vary": {"plant.ell": [0.3, 0.4]}}
+
+
+def test_packages_that_are_missing_are_named_with_what_installs_them(monkeypatch, tmp_path):
+    monkeypatch.setattr(module, "find_spec", lambda name: None if name in ("scipy", "numba") else 1)
+    words = r"studies need numba and scipy: pip install 'auv-fmu\[studies\]'"
+    with pytest.raises(InputError, match=words):
+        sweep(STUDY, out=tmp_path / "study")
+    assert not (tmp_path / "study").exists()
+
+
+def test_engine_that_there_is_not_is_refused(monkeypatch, tmp_path):
+    monkeypatch.setattr(module, "find_spec", lambda name: 1)
+    with pytest.raises(InputError, match="engine 'gpu': use one of fmu, batch"):
+        sweep(STUDY, engine="gpu", out=tmp_path / "study")
+    assert not (tmp_path / "study").exists()
