@@ -140,7 +140,8 @@ class _Step:
 
 
 def _plant(setting: Setting, state: Any, rotation: Any) -> _Result:
-    seen = plant.outputs(setting.plant, state, rotation)
+    known = setting.plant
+    seen = plant.outputs(state, rotation, known.ell, known.roll.rolls, known.current)
     return state, {**_named("y", AXES, seen.y), **_named("dy", AXES, seen.dy)}
 
 
