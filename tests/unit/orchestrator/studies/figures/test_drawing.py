@@ -99,9 +99,12 @@ def test_every_figure_is_written_twice_and_those_without_values_are_left_out(tmp
         "drift": {"kind": "front", "x": "largest_drift", "y": "late_error"},
         "effort": {"kind": "front", "x": "peak_command.u", "y": "late_error"},
     }
+    figures["many"] = figures["error"] | {"by": ["disturbance.A_f", "disturbance.A_d"]}
     plans = read_figures("mine.toml", figures, VARIED, True)
-    [note] = draw_figures(plans, "A_f and A_d", columns(), tmp_path)
-    assert note == "figure drift left out: no run has largest_drift"
+    assert list(draw_figures(plans, "A_f and A_d", columns(), tmp_path)) == [
+        "figure drift left out: no run has largest_drift",
+        "figure many left out: by tells 25 parts of the runs apart",
+    ]
     assert {path.name for path in tmp_path.iterdir()} == {
         "error.png", "error.svg", "effort.png", "effort.svg",
     }  # fmt: skip

@@ -48,19 +48,20 @@ BANDS = {"kind": "bands", "x": "plant.eta0.z", "show": "late_error"}
         ({**BANDS, "kind": "band"}, "kind = 'band' is of the wrong type"),
         ({"kind": "maps", "x": "plant.eta0.z"}, "lacks y and show"),
         ({**BANDS, "show": []}, "lacks show"),
-        ({**BANDS, "y": "late_error"}, "bands have no y"),
+        ({**BANDS, "y": "late_error"}, "a figure of kind 'bands' has no y"),
         ({**BANDS, "colour": "red"}, "unknown entry 'colour'"),
         (
             {**BANDS, "show": "late_errors"},
-            "show: runs have no 'late_errors'; did you mean late_error",
+            "show: runs have no number 'late_errors'; did you mean",
         ),
-        ({**BANDS, "x": "plant.eta0.x"}, "x: runs have no 'plant.eta0.x'"),
+        ({**BANDS, "x": "plant.eta0.x"}, "x: runs have no number 'plant.eta0.x'"),
+        ({**BANDS, "x": "controller.observer"}, "x: runs have no number 'controller.observer'"),
         ({**BANDS, "by": "controller.observe"}, "by: runs have no column 'controller.observe'"),
         ({**BANDS, "where": {"step": 0.1}}, "where: runs have no column 'step'"),
         ({**BANDS, "limits": {"late_error": "one"}}, "limits = .* is of the wrong type"),
         (
             {"kind": "front", "x": ["peak_command", "lost"], "y": "late_error"},
-            "x is a list; front have one x",
+            "x is a list; a figure of kind 'front' has one x",
         ),
     ],
 )
@@ -68,3 +69,16 @@ def test_mistakes_are_told_in_a_line(figure, complaint):
     with pytest.raises(InputError, match=f"^mine.toml: figures: f: .*{complaint}") as error:
         plans(f=figure)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("figures", "complaint"),
+    [
+        ({"../mine": BANDS}, "'../mine' is no name of a file"),
+        ({"labels": "late"}, "labels is not a table of texts"),
+        ({"labels": {"late_error": 1}}, "labels is not a table of texts"),
+    ],
+)
+def test_names_and_labels_are_checked(figures, complaint):
+    with pytest.raises(InputError, match=complaint):
+        plans(**figures)
