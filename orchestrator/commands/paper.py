@@ -9,8 +9,9 @@ from typing import Any
 from orchestrator.commands.options import OK, add_kind, add_out
 from orchestrator.commands.streams import show
 from orchestrator.experiments.scenario import names
-from orchestrator.paper.printed_table import write_table
 from orchestrator.paper.report import write_report
+from orchestrator.paper.table import write_table
+from orchestrator.studies.study import ready_studies
 
 
 def add_to(commands: Any) -> None:
@@ -21,6 +22,12 @@ def add_to(commands: Any) -> None:
         nargs="*",
         metavar="FILE.toml",
         help="a scenario file to be in the report beside those of `auv-fmu list`",
+    )
+    report.add_argument(
+        "--studies",
+        action="store_true",
+        help="hold the printed table against every reading as well, and make the ready studies, "
+        "or what is missing of them",
     )
     add_kind(report)
     add_out(report, Path("results", "report"))
@@ -35,7 +42,15 @@ def add_to(commands: Any) -> None:
 
 def _report(options: argparse.Namespace) -> int:
     scenarios = [*names(), *options.scenarios]
-    for path in write_report(options.out, scenarios, options.command, kind=options.kind):
+    ready = ready_studies() if options.studies else ()
+    for path in write_report(
+        options.out,
+        scenarios,
+        options.command,
+        kind=options.kind,
+        ready=ready,
+        variants=options.studies,
+    ):
         show(path)
     return OK
 

@@ -13,6 +13,7 @@ from orchestrator.experiments.bundle import current_fmus, run_fmus
 from orchestrator.experiments.folder import replaced, whole
 from orchestrator.experiments.scenario_page import scenario_page
 from orchestrator.paper.errata import errata_page
+from orchestrator.studies.ready_page import ready_page
 from orchestrator.studies.study_page import study_page
 
 
@@ -40,6 +41,7 @@ def _docs(options: argparse.Namespace) -> int:
     pages = {
         "scenarios.md": scenario_page(),
         "studies.md": study_page(),
+        "ready-studies.md": ready_page(),
         "paper.md": errata_page(),
     }
     for name, text in pages.items():

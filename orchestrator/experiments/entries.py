@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -56,6 +57,11 @@ def is_text(value: Any) -> bool:
 def is_number(value: Any) -> bool:
     """Whether it is a number, which a truth value is not."""
     return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def is_finite(value: Any) -> bool:
+    """Whether it is a number that can be computed with: TOML has nan, inf, and endless integers."""
+    return is_number(value) and abs(value) <= sys.float_info.max
 
 
 def is_table(value: Any) -> bool:

@@ -15,9 +15,11 @@ module                  what it holds
 :mod:`.effects`         what runs show when they are compared
 :mod:`.choices`         what the paper leaves open of the runs behind its table
 :mod:`.sensitivity`     how the printed numbers move with it
-:mod:`.courses`         the runs of all combinations, and what is read off them
+:mod:`.variants`        the runs of all combinations, and what is read off them
 :mod:`.printed_table`   the printed table beside them
+:mod:`.table`           the files of `auv-fmu table`
 :mod:`.sections`        a section for each scenario
+:mod:`.studies`         the ready studies, their figures and what these show
 :mod:`.page`            Markdown as one HTML page
 :mod:`.report`          all of it put together
 ======================  ==============================================================

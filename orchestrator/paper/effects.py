@@ -36,7 +36,7 @@ from orchestrator.paper.runs import Run
 NOISE_LEVELS = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
 
 #: Steps to show the effect of [s]; section 4.1 has the first.
-STEPS = (0.02, 0.01, 0.005, 0.002)
+STEPS = (STEP, 0.01, 0.005, 0.002)
 
 #: Values of lambda to show the effect of [m/s]; section 4.1 has the second.
 LAMBDAS = (0.5, 1.0, 1.5, 2.1, 3.0, 4.0)

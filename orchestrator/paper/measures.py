@@ -37,26 +37,26 @@ class Way(NamedTuple):
         return (self.impulse / effort) ** 2
 
 
-def way(time: np.ndarray, error: np.ndarray, force: np.ndarray) -> Way | None:
+def way(table: Table, reached: float | None) -> Way | None:
     """The way of a run to its reference; None if it does not come there, or is there already.
 
     Args:
-        time: of each row [s].
-        error: e = y - y_d, a row each [m].
-        force: surge force that was applied in the step that ends with a row [N].
+        table: of the run.
+        reached: when |e| first is at most :data:`REACHED` [s]; None: never.
 
     """
-    # The first of them; row 0 if there is none.
-    reached = int((np.linalg.norm(error, axis=1) <= REACHED).argmax())
     if not reached:
         return None
-    impulse = force[1 : reached + 1] @ np.diff(time[: reached + 1])
-    return Way(float(time[reached]), float(impulse))
+    until = table.time <= reached
+    # A row holds what was applied in the step that ends there: the first one holds none.
+    force = table[APPLIED[0]][until][1:]
+    return Way(reached, float(force @ np.diff(table.time[until])))
 
 
 def way_of(table: Table) -> Way | None:
-    """The same of a table."""
-    return way(table.time, tracking_error(table), table[APPLIED[0]])
+    """The same, with the error of the table."""
+    near = np.linalg.norm(tracking_error(table), axis=1) <= REACHED
+    return way(table, float(table.time[near.argmax()]) if near.any() else None)
 
 
 def turning_radius(table: Table) -> float:

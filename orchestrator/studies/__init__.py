@@ -15,6 +15,7 @@ module                what it holds
 :mod:`.cluster`       who makes which runs, and where: Dask
 :mod:`.figures`       what is drawn of it
 :mod:`.sweep`         a study as a whole
+:mod:`.ready_page`    the page of the studies that come with the program
 ====================  ==================================================================
 
 A study needs the packages of the extra `studies`, which are imported when they are needed.

@@ -11,19 +11,25 @@ from typing import Any
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from orchestrator.errors import InputError, reason
-from orchestrator.experiments.entries import is_number
+from orchestrator.errors import InputError, reason, shortened
+from orchestrator.experiments.entries import is_finite
 from orchestrator.experiments.preparation import Request, prepare
 from orchestrator.experiments.scenario import Scenario
 from orchestrator.master.experiment import Experiment
 from orchestrator.studies.engine import Run
-from orchestrator.studies.study import LATIN_HYPERCUBE, LOG, SOBOL, STEP, Range, Sample, Study
+from orchestrator.studies.study import (
+    LATIN_HYPERCUBE,
+    LOG,
+    MOST_RUNS,
+    SOBOL,
+    STEP,
+    Range,
+    Sample,
+    Study,
+)
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value, type_of, typed
-
-#: More runs than this are taken for a mistake.
-MOST_RUNS = 1_000_000_000
 
 #: Types of values by those of FMI's variables.
 _KINDS = {"Real": float, "Integer": int, "Enumeration": int, "Boolean": bool, "String": str}
@@ -159,8 +165,8 @@ class _Known:
         """A value in its type."""
         if name != STEP:
             return typed(name, self._variable(name), value)
-        if not is_number(value):
-            raise InputError(f"{STEP} = {value!r}: not a number of seconds")
+        if not is_finite(value):
+            raise InputError(f"{STEP} = {shortened(repr(value))}: not a number of seconds")
         return float(value)
 
     def _variable(self, name: str) -> ModelVariable:

@@ -135,8 +135,13 @@ def written(folder: Path) -> Iterator[None]:
 
 def write_record(folder: Path, record: Mapping[str, Any]) -> None:
     """Write the record of a study into its folder."""
-    with whole(folder / RECORD) as partial:
-        partial.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+    with written(folder), whole(folder / RECORD) as partial:
+        partial.write_text(_json(record) + "\n", encoding="utf-8")
+
+
+def _json(content: Mapping[str, Any]) -> str:
+    # A date is a text, as it is where a parameter is one.
+    return json.dumps(content, indent=2, default=str)
 
 
 def read_record(folder: Path) -> dict[str, Any]:
@@ -162,7 +167,7 @@ def _check_same(folder: Path, record: Mapping[str, Any]) -> None:
     if not isinstance(before, dict):
         raise InputError(f"{folder / RECORD}: not the record of a study")
     # As it is read again: JSON knows no tuples.
-    now = json.loads(json.dumps(now))
+    now = json.loads(_json(now))
     different = [key for key in {**now, **before} if now.get(key) != before.get(key)]
     if different:
         raise InputError(

@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from orchestrator.errors import InputError, did_you_mean
+from orchestrator.errors import InputError, did_you_mean, shortened
 from orchestrator.experiments.entries import (
     Entry,
     are_names,
     check_entries,
     flattened,
-    is_number,
+    is_finite,
     is_table,
     is_text,
 )
@@ -36,6 +36,12 @@ SPACINGS = LINEAR, LOG = "linear", "log"
 
 #: How samples are drawn; the first is the default.
 METHODS = SOBOL, LATIN_HYPERCUBE, RANDOM = "sobol", "latin-hypercube", "random"
+
+#: More runs than this are taken for a mistake, and so are more values of one parameter.
+MOST_RUNS, _MOST_VALUES = 1_000_000_000, 1_000_000
+
+#: What the generators of random numbers take.
+_LARGEST_SEED = 2**63 - 1
 
 #: What may vary beside parameters.
 STEP = "step"
@@ -99,6 +105,7 @@ class Study:
     name: str
     scenario: Sequence[str]
     title: str = ""
+    remark: str = ""
     engine: str = FMU
     stop_time: StopTime | None = None
     step: float | None = None
@@ -119,14 +126,14 @@ def _is_text_or_names(value: Any) -> bool:
 
 
 def _is_number_or_table(value: Any) -> bool:
-    return is_number(value) or is_table(value)
+    return is_finite(value) or is_table(value)
 
 
-def _whole_number(least: int) -> Entry:
+def _whole_number(least: int, most: int) -> Entry:
     def fits(value: Any) -> bool:
-        return isinstance(value, int) and not isinstance(value, bool) and value >= least
+        return isinstance(value, int) and not isinstance(value, bool) and least <= value <= most
 
-    return Entry(f"whole number of at least {least}", fits, "", "")
+    return Entry(f"whole number from {least} to {most:,}", fits, "", "")
 
 
 def _one_of(names: Sequence[str]) -> Entry:
@@ -144,6 +151,9 @@ ENTRIES: dict[str, Entry] = {
         "",
     ),
     "title": Entry("text", is_text, "Heading of the figures.", "none"),
+    "remark": Entry(
+        "text", is_text, "What the report says below the figures, in Markdown.", "none"
+    ),
     "engine": _one_of(ENGINES)._replace(
         meaning="What makes the runs: the FMUs, or the equations compiled, which know the standard "
         "closed loop alone and give the same numbers."
@@ -155,7 +165,7 @@ ENTRIES: dict[str, Entry] = {
         "over values that vary.",
         "the scenario's",
     ),
-    "step": Entry("number", is_number, "Communication step [s].", "the scenario's"),
+    "step": Entry("number", is_finite, "Communication step [s].", "the scenario's"),
     "order": _one_of(ORDERS)._replace(meaning="In which components are stepped."),
     "parameters": Entry(
         "table of values", is_table, "Parameters of all runs, as in a scenario.", "the scenario's"
@@ -180,23 +190,23 @@ ENTRIES: dict[str, Entry] = {
 }
 
 _RANGE = {
-    "from": Entry("number", is_number, "", ""),
-    "to": Entry("number", is_number, "", ""),
+    "from": Entry("number", is_finite, "", ""),
+    "to": Entry("number", is_finite, "", ""),
     "spacing": _one_of(SPACINGS),
 }
 
 #: What a range under `vary` holds, and one under `sample.range`.
-_GRID = {**_RANGE, "n": _whole_number(1)}
+_GRID = {**_RANGE, "n": _whole_number(1, _MOST_VALUES)}
 
 #: What `sample` holds, and a stop time that grows.
 _SAMPLE = {
     "method": _one_of(METHODS),
-    "n": _whole_number(1),
-    "seed": _whole_number(0),
+    "n": _whole_number(1, MOST_RUNS),
+    "seed": _whole_number(0, _LARGEST_SEED),
     "range": Entry("table of ranges", is_table, "", ""),
 }
 _STOP_TIME = {
-    "base": Entry("number", is_number, "", ""),
+    "base": Entry("number", is_finite, "", ""),
     "per": Entry("table of numbers", is_table, "", ""),
 }
 
@@ -278,7 +288,7 @@ def _values(where: str, value: Any) -> tuple[Any, ...]:
 
 
 def _range(where: str, value: Any) -> Range:
-    if isinstance(value, list) and len(value) == 2 and all(map(is_number, value)):
+    if isinstance(value, list) and len(value) == 2 and all(map(is_finite, value)):
         found = Range(*value)
     elif _is_range(value):
         found = Range(value["from"], value["to"], value.get("spacing", LINEAR))
@@ -302,13 +312,15 @@ def _sample(where: str, content: Mapping[str, Any]) -> Sample:
 
 
 def _stop_time(where: str, value: Any) -> StopTime:
-    if is_number(value):
+    if is_finite(value):
         return StopTime(value, {})
     _check_whole(where, value, _STOP_TIME, ("base", "per"))
     rates = dict(flattened(value["per"]))
     for name, rate in rates.items():
-        if not is_number(rate):
-            raise InputError(f"{where}: {name} = {rate!r}: not a number of seconds for each of it")
+        if not is_finite(rate):
+            raise InputError(
+                f"{where}: {name} = {shortened(repr(rate))}: not a number of seconds for each of it"
+            )
     return StopTime(value["base"], rates)
 
 

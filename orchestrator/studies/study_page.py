@@ -73,7 +73,7 @@ random samples, over any parameter of any component. It needs some packages more
                 [--loop auto|python|compiled] [--scheduler ADDRESS] [--workers N] [--out DIR]
 
 The runs are made side by side in processes of this machine, as many as it has cores, or by the
-workers of a Dask cluster. What comes out goes into `results/NAME/`, or DIR:
+workers of [a Dask cluster](cluster.md). What comes out goes into `results/NAME/`, or DIR:
 
 $files
 
@@ -90,6 +90,9 @@ Until all runs are done, they are kept in `unfinished.sqlite` beside `study.json
 ## Ready studies
 
 $ready
+
+Each holds the proposed controller against PD, at more than 10,000 points:
+[what they show](ready-studies.md).
 
 ## A study file
 

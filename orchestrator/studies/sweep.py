@@ -181,7 +181,7 @@ def check_installed() -> None:
     """
     missing = [package for package in _NEEDED if find_spec(package) is None]
     if missing:
-        raise InputError(f"studies need {' and '.join(missing)}: pip install 'auv-fmu[studies]'")
+        raise InputError(f"studies need {', '.join(missing)}: pip install 'auv-fmu[studies]'")
 
 
 def _engine(name: str, systems: Mapping[str, tuple[Scenario, System]], means: Means) -> Engine:

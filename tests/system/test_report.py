@@ -16,6 +16,9 @@ from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
 from orchestrator.paper.errata import errata, of_the_paper
 from orchestrator.paper.report import write_report
+from orchestrator.paper.studies import make_studies, sections
+from orchestrator.studies.study import ready_studies
+from support.variants import planted
 
 STRANGER = """\
 title = "Mine | <b>own</b>"
@@ -34,6 +37,26 @@ controller.k_d = "all of it"
 
 SCENARIOS = ("fig3a", "fig4")
 
+STUDY = """\
+title = "Many | of mine"
+scenario = "fig4"
+stop_time = 0.1
+remark = "What they **show**."
+
+[vary]
+controller.k_d = [10.0, 20.0]
+
+[figures.gain]
+kind = "bands"
+x = "controller.k_d"
+show = "peak_command.u"
+
+[figures.nothing]
+kind = "bands"
+x = "controller.k_d"
+show = "time_to_reach"
+"""
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory, dist: Path) -> Path:
@@ -44,7 +67,11 @@ def folder(tmp_path_factory, dist: Path) -> Path:
     (theirs / "lost.toml").write_text(STRANGER.replace("mine.fmu", "lost.fmu"))
     report = tmp_path_factory.mktemp("report")
     files = [str(theirs / f"{name}.toml") for name in ("stranger", "lost")]
-    write_report(report, [*SCENARIOS, *files], ["auv-fmu", "report"], stop_time=1.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("orchestrator.paper.report.all_variants", lambda crew: planted())
+        write_report(
+            report, [*SCENARIOS, *files], ["auv-fmu", "report"], stop_time=1.0, variants=True
+        )
     return report
 
 
@@ -64,6 +91,12 @@ def test_every_claim_has_a_row_and_every_effect_a_section(text):
     for effect in EFFECTS:
         assert f"\n### {effect.title}\n" in text
         assert f"](figures/{effect.name}.png)" in text
+
+
+def test_the_printed_table_stands_beside_every_reading(text):
+    """Ours is twice what is printed."""
+    assert "\n## The printed table against every reading\n" in text
+    assert "\n| proposed L2 effort u [N·√s] | 130 | 260 |" in text
 
 
 def test_the_stranger_is_in_the_report(folder, text, page):
@@ -116,11 +149,30 @@ def test_runs_are_kept_for_the_next_report(folder):
     assert not list(folder.glob(".unfinished*"))
 
 
+def test_studies_are_in_the_report_and_kept_for_the_next(folder, tmp_path):
+    pytest.importorskip("distributed", reason="needs the extra studies")
+    (tmp_path / "many.toml").write_text(STUDY)
+    [study] = make_studies([str(tmp_path / "many.toml")], tmp_path / "kept", "python", ["me"])
+    text = "\n\n".join(sections([study], tmp_path / "kept", tmp_path))
+    assert "### Many \\| of mine\n" in text
+    assert "What they **show**." in text
+    [picture] = re.findall(r"\]\((figures/[^)]+)\)\]", text)
+    assert (tmp_path / picture).is_file()
+    before = (tmp_path / "kept/many/runs.parquet").stat().st_mtime_ns
+    make_studies([str(tmp_path / "many.toml")], tmp_path / "kept", "python", ["me"])
+    assert (tmp_path / "kept/many/runs.parquet").stat().st_mtime_ns == before
+
+
+def test_a_report_without_studies_says_how_they_are_made(text):
+    [line] = [line for line in text.splitlines() if "report --studies" in line]
+    assert all(name in line for name in ready_studies())
+
+
 def test_files_on_the_command_line_come_after_the_scenarios(tmp_path, monkeypatch, capsys):
     asked = []
 
-    def write_report(*arguments: object, kind: str) -> tuple[Path, Path]:
-        assert kind == "python"
+    def write_report(*arguments: object, **options: object) -> tuple[Path, Path]:
+        assert options == {"kind": "python", "ready": (), "variants": False}
         asked.append(arguments)
         return Path("a"), Path("b")
 

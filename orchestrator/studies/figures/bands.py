@@ -34,7 +34,7 @@ def bands(plan: Plan, title: str, runs: Values) -> Figure:
     figure, panels = paneled(title, -(-len(shown) // abreast), abreast, _HEIGHT, sharey=share)
     parts = list(runs.parts(plan.by))
     for axes, (value, x) in zip(panels.flat, shown, strict=False):
-        bins = bins_of(runs[x], _BINS)
+        bins = bins_of(runs[x], _BINS, are_full=True)
         for (name, part), colour, style in zip(parts, cycle(COLOURS), cycle(STYLES), strict=False):
             _draw(axes, bins, part[x], part[value], value in VERDICTS, (name, colour, style))
         if value in plan.limits:

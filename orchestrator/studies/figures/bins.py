@@ -9,8 +9,9 @@ import numpy as np
 #: Up to so many different values have a bin each.
 _GRID = 40
 
-#: An axis is logarithmic if its values are positive, and the largest is so many times the smallest.
-_WIDE = 20.0
+#: An axis is logarithmic if its values are positive, and a large one, larger than this share of
+#: them, is so many times a small one.
+_LARGE, _WIDE = 0.95, 10.0
 
 
 @dataclass(frozen=True)
@@ -37,27 +38,33 @@ class Bins:
 def is_logarithmic(values: np.ndarray) -> bool:
     """Whether values are spread so far that only a logarithmic axis shows them all."""
     values = values[np.isfinite(values)]
-    return bool(values.size and values.min() > 0.0 and values.max() >= _WIDE * values.min())
+    if not values.size or values.min() <= 0.0:
+        return False
+    small, large = np.quantile(values, (1.0 - _LARGE, _LARGE))
+    return bool(large >= _WIDE * small)
 
 
-def bins_of(values: np.ndarray, most: int) -> Bins:
+def bins_of(values: np.ndarray, most: int, *, are_full: bool = False) -> Bins:
     """Bins for some values, at least one of which is finite.
 
     Args:
         values: of a grid, or anywhere.
-        most: how many bins there are for values that are no grid; each then has as many of them.
+        most: how many bins there are for values that are no grid.
+        are_full: whether these have as many values each, and not the same width.
 
     """
     values = values[np.isfinite(values)]
     wide = is_logarithmic(values)
     places = np.unique(np.log(values) if wide else values)
     if len(places) > _GRID:
-        edges = np.quantile(places, np.linspace(0.0, 1.0, most + 1))
+        even = np.linspace(0.0, 1.0, most + 1)
+        edges = np.quantile(places, even) if are_full else np.interp(even, (0, 1), places[[0, -1]])
         centres = 0.5 * (edges[1:] + edges[:-1])
     else:
         between = 0.5 * (places[1:] + places[:-1])
-        low, high = (between[0], between[-1]) if between.size else (places[0] - 1, places[0] + 1)
-        edges = np.array([2 * places[0] - low, *between, 2 * places[-1] - high])
+        # The outer bins are as wide as they would be with one more neighbour.
+        first, last = (between[0], between[-1]) if between.size else (places + 0.5, places - 0.5)
+        edges = np.hstack((2.0 * places[0] - first, between, 2.0 * places[-1] - last))
         centres = places
     if wide:
         edges, centres = np.exp(edges), np.exp(centres)

@@ -25,6 +25,9 @@ _DRAW: Mapping[str, Callable[[Plan, str, Values], Figure]] = {
 
 _FORMATS = ("png", "svg")
 
+#: More lines or panels than this show nothing.
+_MOST_PARTS = 12
+
 
 def draw_figures(
     plans: Sequence[Plan], title: str, columns: Columns, folder: Path
@@ -47,6 +50,9 @@ def draw_figures(
         lacking = [value for value in values if not np.isfinite(runs[value]).any()]
         if lacking:
             yield f"figure {plan.name} left out: no run has {lacking[0]}"
+            continue
+        if (parts := len(list(runs.parts(plan.by)))) > _MOST_PARTS:
+            yield f"figure {plan.name} left out: by tells {parts} parts of the runs apart"
             continue
         with styled():
             figure = _DRAW[plan.kind](plan, title, runs)

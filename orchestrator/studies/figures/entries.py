@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -22,8 +23,11 @@ from orchestrator.studies.figures.values import SCENARIO, is_known
 #: What a figure can be.
 BANDS, MAPS, FRONT, INFLUENCE = "bands", "maps", "front", "influence"
 
+#: What a figure may be called: its files are.
+_NAME = re.compile(r"[\w-]+")
+
 #: The table that is no figure.
-_LABELS = "labels"
+LABELS = "labels"
 
 #: What is shown of a study whose file does not say it.
 _USUAL = ("late_error", "peak_command", "lost")
@@ -75,7 +79,9 @@ def _are_numbers(value: Any) -> bool:
 
 #: What the table of a figure may hold, in the order of the reference page.
 ENTRIES: Mapping[str, Entry] = {
-    "kind": Entry(f"name out of {', '.join(KINDS)}", KINDS.__contains__, "What it is.", ""),
+    "kind": Entry(
+        f"name out of {', '.join(KINDS)}", lambda value: value in tuple(KINDS), "What it is.", ""
+    ),
     "x": Entry(
         "name, or list of names",
         _are_names,
@@ -114,15 +120,16 @@ def read_figures(
 
     """
     tables = dict(figures)
-    labels = dict(flattened(tables.pop(_LABELS, {})))
+    labels = _labels(where, tables.pop(LABELS, {}))
     numbers = [name for name, kind in varied.items() if kind is not str]
     if not tables and numbers:
         tables["influence"] = {"kind": INFLUENCE, "x": numbers, "show": list(_USUAL)}
     by = (SCENARIO,) if is_compared else ()
-    columns = (*varied, *INDICES, *by)
     plans = []
     for name, table in tables.items():
-        _check(f"{where}: figures: {name}", table, columns)
+        if not _NAME.fullmatch(name):
+            raise InputError(f"{where}: figures: {name!r} is no name of a file: letters, digits, -")
+        _check(f"{where}: figures: {name}", table, (*numbers, *INDICES), (*varied, *by))
         plans.append(
             Plan(
                 name,
@@ -139,8 +146,22 @@ def read_figures(
     return tuple(plans)
 
 
-def _check(where: str, table: Any, columns: Sequence[str]) -> None:
-    """Check that a figure holds what its kind needs, and names what runs have."""
+def _labels(where: str, table: Any) -> dict[str, str]:
+    if not (is_table(table) and all(is_text(label) for _, label in flattened(table))):
+        raise InputError(f"{where}: figures: {LABELS} is not a table of texts")
+    return dict(flattened(table))
+
+
+def _check(where: str, table: Any, numbers: Sequence[str], columns: Sequence[str]) -> None:
+    """Check that a figure holds what its kind needs, and names what runs have.
+
+    Args:
+        where: it stands, for messages.
+        table: that describes it.
+        numbers: the columns that can be drawn.
+        columns: those that tell runs apart.
+
+    """
     if not is_table(table):
         raise InputError(f"{where}: is no table; write [figures.NAME]")
     check_entries(where, table, ENTRIES)
@@ -151,14 +172,14 @@ def _check(where: str, table: Any, columns: Sequence[str]) -> None:
     if missing := [key for key in needs if not table.get(key)]:
         raise InputError(f"{where}: lacks {' and '.join(missing)}")
     if more := [key for key in table if key not in ("kind", *needs, *may)]:
-        raise InputError(f"{where}: {kind} have no {more[0]}")
+        raise InputError(f"{where}: a figure of kind {kind!r} has no {more[0]}")
     if kind in (MAPS, FRONT) and not is_text(table["x"]):
-        raise InputError(f"{where}: x is a list; {kind} have one x")
+        raise InputError(f"{where}: x is a list; a figure of kind {kind!r} has one x")
     for key in ("x", "y", "show", "limits"):
         for value in _listed(table.get(key, ())):
-            if not is_known(value, columns):
+            if not is_known(value, numbers):
                 raise InputError(
-                    f"{where}: {key}: runs have no {value!r}{did_you_mean(value, columns)}"
+                    f"{where}: {key}: runs have no number {value!r}{did_you_mean(value, numbers)}"
                 )
     for key in ("by", "where"):
         for column in _listed(table.get(key, ())):

@@ -13,8 +13,8 @@ from orchestrator.analysis.figures.style import WIDTH, heading
 #: Room for a heading, and for a legend or the names of axes [in].
 _HEADING, _NAMES = 0.3, 0.45
 
-#: Numbers along a logarithmic axis; with less powers of ten than that, 2 and 5 have one as well.
-_TICKS, _FEW = 6, 1.5
+#: Numbers along a logarithmic axis; with less powers of ten than that, 3 has one as well.
+_TICKS, _FEW = 6, 2.5
 
 
 def paneled(title: str, rows: int, columns: int, height: float, **how: Any) -> tuple[Figure, Any]:
@@ -44,9 +44,7 @@ def spread(axis: Any) -> None:
     axis.axes.autoscale_view()
     low, high = axis.get_view_interval()
     is_short = high < low * 10.0**_FEW
-    axis.set_major_locator(
-        LogLocator(subs=(1.0, 2.0, 5.0) if is_short else (1.0,), numticks=_TICKS)
-    )
+    axis.set_major_locator(LogLocator(subs=(1.0, 3.0) if is_short else (1.0,), numticks=_TICKS))
     axis.set_minor_locator(NullLocator())
     if is_short:
         axis.set_major_formatter("{x:g}")

@@ -204,7 +204,7 @@ def test_no_force_has_less_effort_than_its_impulse_takes(force):
     found = way_of(arriving(force))
     assert found.duration == 200.0
     effort = np.sqrt(20.0 * np.sum(force[1:] ** 2))
-    assert found.least_effort <= effort * (1.0 + 1e-12)
+    assert found.least_effort <= effort * (1.0 + 1e-12) + 1e-12
 
 
 def test_a_constant_force_has_the_least_effort():
@@ -228,7 +228,7 @@ def test_a_way_against_damping_takes_an_impulse_of_its_own(forces):
     impulse, duration = h * sum(forces), h * len(forces)
     assert impulse == pytest.approx(vehicle.d11 * x + vehicle.m11 * u)
     effort = np.sqrt(h * np.sum(np.square(forces)))
-    assert Way(duration, vehicle.d11 * x).least_effort <= effort * (1.0 + 1e-12)
+    assert Way(duration, vehicle.d11 * x).least_effort <= effort * (1.0 + 1e-12) + 1e-12
     assert Way(0.0, vehicle.d11 * 31.0).soonest(130.0) == pytest.approx(51.0, abs=0.5)
 
 

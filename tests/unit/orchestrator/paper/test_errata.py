@@ -71,10 +71,32 @@ def test_30_costs_what_is_said():
     assert f"{peak(1.0):.0f} N at the paper's 1" in text
 
 
+def figure_5(controller):
+    """Fig. 5 with a controller."""
+    planner = motion_planner.Parameters(eta0=(0.0, 0.0, -30.0, 0.0, 0.0))
+    return QUIET._replace(controller=controller, planner=planner)
+
+
+def test_surge_efforts_cannot_be_smaller():
+    text = text_of("4.2: surge efforts below what the way takes")
+    least = []
+    for controller in (Gains(eps_t=10.0), PdGains(eps_t=10.0)):
+        impulse, square = 0.0, 0.0
+        for instant in closed_loop(2500, figure_5(controller)):
+            if np.linalg.norm(np.subtract(instant.scene.plant.y, instant.scene.reference.y_d)) <= 1:
+                break
+            impulse += PAPER.h * instant.tau[0]
+            square += PAPER.h * instant.tau[0] ** 2
+        assert f"{impulse:.0f} N·s in {instant.t:.1f} s" in text
+        least.append(impulse / np.sqrt(instant.t))
+        assert least[-1] <= np.sqrt(square)
+    assert f"at least {least[0]:.0f} and {least[1]:.0f} N·√s" in text
+    assert least[0] > EFFORT_PROPOSED[0] and least[1] > EFFORT_PD[0]
+
+
 def effort(controller, h):
     """L2 efforts of Fig. 5 after 60 s (reading 6)."""
-    planner = motion_planner.Parameters(eta0=(0.0, 0.0, -30.0, 0.0, 0.0))
-    setting = QUIET._replace(controller=controller, planner=planner, h=h, h_max=LongestSteps())
+    setting = figure_5(controller)._replace(h=h, h_max=LongestSteps())
     taus = np.array([instant.tau for instant in closed_loop(round(60.0 / h), setting)])[:-1]
     return np.sqrt(h * (taus**2).sum(axis=0))
 

@@ -7,56 +7,44 @@ import csv
 import numpy as np
 import pytest
 
+from orchestrator.analysis.signals import COMMANDED as COMMANDED_PORTS
 from orchestrator.experiments.preparation import Request, loaded, prepare
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.observer import Header
+from orchestrator.master.table import Table
 from orchestrator.paper import choices
-from orchestrator.paper.choices import END_TIMES, OF_RUNS, PD, PROPOSED, Choice, Option, runs
-from orchestrator.paper.courses import Course
+from orchestrator.paper.choices import END_TIMES, OF_RUNS, PD, PROPOSED, SIGNALS, runs
 from orchestrator.paper.measures import Way
-from orchestrator.paper.printed_table import section, write_variants
-from orchestrator.paper.sensitivity import PUBLISHED, Sensitivity
+from orchestrator.paper.printed_table import section
+from orchestrator.paper.sensitivity import PUBLISHED
+from orchestrator.paper.table import write_variants
+from orchestrator.paper.variants import numbers_of
+from orchestrator.studies.engine import Outcome
 from orchestrator.system.names import port_name
-
-#: A choice of both controllers, and one of the proposed alone.
-SEA = Choice("sea", (Option("calm"), Option("rough", against="4.1: calm")))
-OBSERVER = Choice("observer", (Option("slow"), Option("fast")), of_proposed=True)
-
-APPLIED, COMMANDED, EXCHANGED = range(len(choices.SIGNALS))
-T_F = {time: i for i, time in enumerate(END_TIMES)}
+from support.variants import APPLIED, COMMANDED, EXCHANGED, T_F, planted
 
 
-def planted(**cells):
-    """Ours is twice what is printed everywhere, but where something else is planted."""
-    numbers = {
-        PROPOSED: np.full((2, 2, len(choices.SIGNALS), len(END_TIMES), 6), 2.0),
-        PD: np.full((2, 1, len(choices.SIGNALS), len(END_TIMES), 6), 2.0),
+def test_numbers_are_those_of_the_indices_and_of_the_commands():
+    """A constant command has the effort |F| sqrt(T); the first row ends no step."""
+    indices = {
+        time: {f"l2_effort.{k}": i * time for i, k in enumerate("uqr", 1)}
+        | {f"final_error.{k}": i / time for i, k in enumerate("xyz", 1)}
+        for time in END_TIMES
     }
-    for scenario, values in {"proposed": PROPOSED, "pd": PD}.items():
-        for where, value in cells.get(scenario, {}).items():
-            numbers[values][where] = value
-    ways = {PROPOSED: np.full((2, 2, 2), np.nan), PD: np.full((2, 1, 2), np.nan)}
-    ways[PROPOSED][0] = 40.0, 1000.0
-    ways[PROPOSED][1] = 20.0, 2000.0
-    ways[PD][0] = 16.0, 1200.0
-    return Sensitivity(
-        {scenario: values * PUBLISHED[scenario] for scenario, values in numbers.items()},
-        ways,
-        (SEA, OBSERVER),
-    )
-
-
-def test_numbers_of_forces_and_errors_known_by_hand():
-    """Constant forces have the effort F sqrt(T); of an error that falls, e_f is that of T - 5 s."""
-    time = np.linspace(0.0, 200.0, 10_001)
-    force = np.array([3.0, -4.0, 5.0])
-    applied = np.broadcast_to(force, (len(time), 3)).copy()
-    applied[0] = 1e6  # ends no step
-    error = np.exp(-0.1 * time)[:, np.newaxis] * (1.0, -2.0, 3.0)
-    numbers = Course(time, 2.0 * applied, applied, error).numbers()
-    for end in (20.0, 57.0, 200.0):
-        effort, e_f = np.abs(force) * np.sqrt(end), np.exp(-0.1 * (end - 5.0)) * np.arange(1, 4)
-        for signal, times in ((APPLIED, 1.0), (COMMANDED, 2.0)):
-            np.testing.assert_allclose(numbers[signal, T_F[end]], [*(times * effort), *e_f])
-        np.testing.assert_allclose(numbers[EXCHANGED, T_F[end]], [*effort[[0, 2, 1]], *e_f])
+    outcomes = [Outcome(0, indices[time]) for time in END_TIMES]
+    rows = np.tile([0.0, 3.0, -4.0, 5.0], (10_001, 1))
+    rows[:, 0] = 0.02 * np.arange(len(rows))
+    rows[0, 1:] = 1e6
+    table = Table.of(Header(COMMANDED_PORTS, Experiment(200.0, 0.02), {}), rows)
+    numbers = numbers_of(outcomes, table)
+    for time in (20.0, 57.0, 200.0):
+        e_f = np.arange(1, 4) / time
+        for signal, effort in (
+            (APPLIED, np.multiply(time, (1, 2, 3))),
+            (EXCHANGED, np.multiply(time, (1, 3, 2))),
+            (COMMANDED, np.multiply(np.sqrt(time), (3.0, 4.0, 5.0))),
+        ):
+            np.testing.assert_allclose(numbers[signal, T_F[time]], [*effort, *e_f])
 
 
 def test_the_score_is_a_sum_of_logarithms():
@@ -64,7 +52,7 @@ def test_the_score_is_a_sum_of_logarithms():
     assert found.ours.score == pytest.approx(12 * np.log(2.0))
     assert found.ours.factor == pytest.approx(2.0)
     assert found.ours.options == (0, 0, APPLIED, T_F[100.0])
-    assert found.scores.shape == (2, 2, len(choices.SIGNALS), len(END_TIMES))
+    assert found.scores.shape == (2, 2, len(SIGNALS), len(T_F))
 
 
 def test_the_nearest_variant_is_found():
@@ -127,7 +115,7 @@ def test_the_section_says_what_was_planted():
     assert "- nearest of all: sea: rough; observer: fast; T_f = 60 s." in text
     assert "At most 6, 6, 6 of the twelve numbers" in text
     # 1,000 N.s in 40 s: 158 N.s^0.5; with 130 it takes 59.2 s.
-    assert "below 158 N·√s: with the printed 130 it takes 59.2 s" in text
+    assert "at least 158 N·√s: with the printed 130 it would take 59.2 s" in text
     assert "| sea | rough |  | 4.16 | 4.1: calm |" in text
 
 
@@ -136,7 +124,7 @@ def test_every_combination_has_a_row_at_its_best_end_time(tmp_path):
     write_variants(tmp_path / "variants.csv", found)
     with (tmp_path / "variants.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 2 * 2 * len(choices.SIGNALS)
+    assert len(rows) == 2 * 2 * len(SIGNALS)
     best = min(rows, key=lambda row: float(row["score"]))
     assert (best["sea"], best["observer"], best["T_f"]) == ("rough", "fast", "60 s")
     assert float(best["proposed L2 effort q [N·m·√s]"]) == pytest.approx(40.0)

@@ -12,8 +12,8 @@ import pytest
 from orchestrator.errors import InputError
 from orchestrator.experiments.preparation import loaded
 from orchestrator.studies.engine import Run
-from orchestrator.studies.space import MOST_RUNS, Space
-from orchestrator.studies.study import study_of
+from orchestrator.studies.space import Space
+from orchestrator.studies.study import MOST_RUNS, study_of
 
 qmc = pytest.importorskip("scipy.stats.qmc", reason="needs scipy: the extra `studies`")
 
@@ -132,6 +132,7 @@ def test_points_are_told_apart_by_the_digest():
         ({"vary": {"plant.noise.seed": [1.5]}}, "plant.noise.seed = 1.5: not an integer"),
         ({"vary": {"plant.eta.x": [1.0]}}, "plant.eta.x is of causality output and cannot be set"),
         ({"vary": {"step": ["fast"]}}, "step = 'fast': not a number"),
+        ({"vary": {"step": [0.02, 10**400]}}, "step = 1000.*: not a number"),
         ({"vary": {"step": [0.02, 0.0]}}, "step 0 s must be positive"),
         ({"stop_time": -1.0}, "stop time -1 s"),
         (

@@ -90,6 +90,12 @@ def test_every_entry_has_a_meaning():
             {"vary": {"plant.ell": {"from": 0, "to": 2, "n": 2, "spacing": "log"}}},
             "plant.ell: spacing = 'log' needs two positive ends",
         ),
+        ({"vary": {"plant.ell": {"from": 1, "to": 2, "n": 10**12}}}, "from 1 to 1,000,000"),
+        ({"vary": {"plant.ell": {"from": 1, "to": 10**400, "n": 3}}}, "plant.ell: to = 1000"),
+        ({"vary": {"plant.ell": {"from": float("nan"), "to": 1, "n": 3}}}, "from = nan is of"),
+        ({"sample": {"n": 10, "range": {"plant.ell": [1, float("inf")]}}}, "write [low, high]"),
+        ({"stop_time": float("inf")}, "stop_time = inf is of the wrong type"),
+        ({"stop_time": {"base": 1, "per": {"plant.ell": 10**400}}}, "not a number of seconds"),
         ({"vary": {"ell": [1.0]}}, "'ell': write component.port"),
         ({"parameters": {"step": 0.01}}, "'step': write component.port"),
         (

@@ -1,0 +1,64 @@
+"""The ready studies in the report: what their runs show of thousands of vehicles."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from orchestrator.paper.formatting import picture, plain
+from orchestrator.studies.study import Study, read_study, ready_studies
+from orchestrator.studies.sweep import Means, swept
+
+_WITHOUT = (
+    f"Not in this report: {', '.join(ready_studies())}, studies of more than 10,000 runs each. "
+    "`auv-fmu report --studies` makes them, or what is missing of them."
+)
+
+
+def make_studies(
+    names: Sequence[str], folder: Path, kind: str, command: Sequence[str]
+) -> list[Study]:
+    """Make what is missing of some studies.
+
+    Args:
+        names: of ready studies, or paths of files.
+        folder: in which each has a folder, from one report to the next.
+        kind: of the bundle's FMUs.
+        command: for the record.
+
+    Raises:
+        InputError: something about a study is not usable, or cannot be written.
+        KeyboardInterrupt: somebody wants it to stop; what is done is kept.
+
+    """
+    studies = [read_study(name) for name in names]
+    for study in studies:
+        swept(study, Means(kind=kind), folder / study.name, command, progress=True)
+    return studies
+
+
+def sections(studies: Sequence[Study], kept: Path, folder: Path) -> Iterator[str]:
+    """A section for each study, in Markdown.
+
+    Args:
+        studies: that were made.
+        kept: the folder that has their folders.
+        folder: of the report, into which their figures go.
+
+    """
+    if not studies:
+        yield _WITHOUT
+    for study in studies:
+        title = plain(study.title or study.name)
+        yield f"### {title}"
+        figures = Path("figures", "studies", study.name)
+        (folder / figures).mkdir(parents=True)
+        for figure in study.figures:
+            file = kept / study.name / f"{figure}.png"
+            if file.is_file():
+                shutil.copy(file, folder / figures)
+                yield picture(f"{title}: {figure}", (figures / file.name).as_posix())
+        if study.remark:
+            yield study.remark.strip()
+        yield f"- `auv-fmu sweep {study.name}`"
