@@ -30,6 +30,7 @@ from time import process_time
 from auv_fmu.closed_loop import Setting, closed_loop
 from orchestrator.analysis.signals import NU, POSITION, THETA_HAT
 from orchestrator.experiments.preparation import load, loaded
+from orchestrator.master.experiment import Experiment
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Run
 from orchestrator.studies.space import Space
@@ -107,7 +108,9 @@ def check(n: int) -> None:
 
 
 def is_straight(engine: BatchEngine, run: Run) -> bool:
-    """Whether a run ends in the state in which the straight line ends."""
+    """Whether a run ends in the state in which the straight line ends, which has equal steps."""
+    experiment = Experiment(run.stop_time, run.step, run.order)
+    run = run._replace(stop_time=experiment.time(experiment.full_steps))
     table = engine.table(run)
     delayed = run.order == "jacobi"
     *_, before, last = closed_loop(len(table) - 1, engine.setting(run), delayed)
