@@ -20,7 +20,8 @@ import argparse
 import os
 import platform
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from random import Random
 from statistics import median
@@ -55,6 +56,11 @@ def resident() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
+def make(engine: BatchEngine, runs: Iterable[Run]) -> None:
+    """Make runs and forget them."""
+    deque(engine.outcomes(runs), maxlen=0)
+
+
 def straight(setting: Setting, steps: int) -> None:
     """Make a run and forget it."""
     deque(closed_loop(steps, setting), maxlen=0)
@@ -66,11 +72,11 @@ def compare(engine: BatchEngine, steps: int, repetitions: int) -> None:
     for name in _SCENARIOS:
         run = Run(0, name, {}, steps * _STEP, _STEP)
         setting = engine.setting(run)
-        list(engine.outcomes([run]))
-        rows = []
-        for _ in range(repetitions):
-            slow = timed(lambda: straight(setting, steps))
-            rows.append((slow, timed(lambda: list(engine.outcomes([run])))))
+        make(engine, [run])
+        rows = [
+            (timed(partial(straight, setting, steps)), timed(partial(make, engine, [run])))
+            for _ in range(repetitions)
+        ]
         a, b = (1e6 * median(times) / steps for times in zip(*rows, strict=True))
         ratio = median(slow / fast for slow, fast in rows)
         print(
@@ -84,7 +90,7 @@ def grow(engine: BatchEngine) -> None:
     print(f"{'runs':>8} {'us a run':>9} {'resident [MB]':>14}")
     for n in _MANY:
         runs = (Run(i, "fig5", {"plant.eta0.y": float(i % 7)}, 1.0, _STEP) for i in range(n))
-        seconds = timed(lambda: deque(engine.outcomes(runs), maxlen=0))
+        seconds = timed(partial(make, engine, runs))
         print(f"{n:8} {1e6 * seconds / n:9.1f} {resident():14.1f}")
 
 

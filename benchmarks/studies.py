@@ -35,8 +35,12 @@ from orchestrator.studies.study import study_of
 
 SCENARIO = "fig4"
 
-#: Runs that are made before anything is timed: FMUs are unpacked by then, equations compiled.
-_WARM = 20
+#: Blocks that each worker makes before anything is timed: by then FMUs are loaded, equations
+#: compiled, and blocks as long as they shall be.
+_WARM = 3
+
+#: Runs that tell roughly how long one takes.
+_TRIED = 5
 
 
 class Timed(NamedTuple):
@@ -75,12 +79,10 @@ class Cost(NamedTuple):
 def cost(engine: Engine, runs: Iterable[Run], workers: int) -> Cost:
     """What runs take when some processes make them."""
     with making(Timed(engine), iter(runs), workers=workers) as blocks:
-        warm, seconds, start = 0, [], 0.0
-        for block in blocks:
-            if warm < _WARM:
-                warm, start = warm + len(block), perf_counter()
-                continue
-            seconds += [outcome.indices["seconds"] for outcome in block]
+        for _ in islice(blocks, _WARM * workers):
+            pass
+        start = perf_counter()
+        seconds = [outcome.indices["seconds"] for block in blocks for outcome in block]
         return Cost(median(seconds), (perf_counter() - start) / len(seconds))
 
 
@@ -145,8 +147,9 @@ def main() -> None:
     for name, make in engines.items():
         engine = make()
         space = starts(1_000_000, options.stop_time)
-        once = cost(engine, islice(space, 5 * _WARM), 1)
-        n = 2 * _WARM + round(options.seconds / once.processor)
+        tried = Timed(engine).outcomes([space[i] for i in range(_TRIED)])
+        once = min(outcome.indices["seconds"] for outcome in tried)
+        n = 2 * _WARM + round(options.seconds / once)
         pairs = [
             [cost(engine, islice(space, n), workers) for workers in (1, 2)]
             for _ in range(options.repetitions)

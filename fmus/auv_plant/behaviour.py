@@ -117,7 +117,9 @@ def _check_level(state: PlantState, rotation: Rotation) -> None:
 
 
 def _seen(parameters: Parameters, state: PlantState, rotation: Rotation) -> Outputs:
-    euler, y, dy, nu = plant.outputs(parameters, state, rotation)
+    euler, y, dy, nu = plant.outputs(
+        state, rotation, parameters.ell, parameters.roll.rolls, parameters.current
+    )
     return {
         "eta": (*state.position, *euler),
         "nu": nu,

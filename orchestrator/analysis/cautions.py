@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from auv_fmu.observer import EXACT, FORMS, exact_gain
 from auv_fmu.proof.gain_conditions import bounds
 from auv_fmu.proof.sampling import observer_rate, robust_rate
 from orchestrator.analysis.signals import ELL, THETA_HAT, VEHICLE, parameter, vehicle
@@ -11,10 +12,17 @@ from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 
 _K_D, _LAMBDA, _EPS_T = "controller.k_d", "controller.lambda", "controller.eps_t"
-_H_MAX = "controller.h_max"
+_H_MAX, _OBSERVER = "controller.h_max", "controller.observer"
 
 #: h p beyond which a mode of Euler's scheme changes its sign in every step, and grows.
 _REVERSES, _GROWS = 1.0, 2.0
+
+
+def gain_of_a_step(system: System, h: float) -> float:
+    """k_d as a step of h seconds takes it [1/s]: the form of the observer may change it."""
+    k_d, form = float(system.value(port_name(_K_D)) or 0.0), port_name(_OBSERVER)
+    is_exact = system.has(form) and FORMS.get(str(system.value(form))) == EXACT
+    return exact_gain(k_d, h) if is_exact else k_d
 
 
 def cautions(system: System, experiment: Experiment) -> list[str]:
@@ -26,7 +34,7 @@ def cautions(system: System, experiment: Experiment) -> list[str]:
         return float(system.value(port_name(name)) or 0.0)
 
     h = min(experiment.step, value(_H_MAX))
-    h_p = h * observer_rate(value(_LAMBDA), value(_K_D))
+    h_p = h * observer_rate(value(_LAMBDA), gain_of_a_step(system, h))
     if h_p <= _GROWS:
         return []
     return [

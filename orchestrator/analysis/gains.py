@@ -1,12 +1,15 @@
-"""The gain check: the conditions of Theorems 1 and 2 for a set of parameters."""
+"""The gain check: Theorem 1 or 2 for a set of parameters."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
-from auv_fmu.proof.gain_conditions import Bounds, Condition, bounds, conditions
+from auv_fmu.output_feedback import Gains
+from auv_fmu.proof.attraction import Theorem, theorem
 from auv_fmu.proof.sampling import observer_rate
 from auv_fmu.saturation import MAXIMUM_SLOPE
+from orchestrator.analysis.cautions import gain_of_a_step
 from orchestrator.analysis.signals import ELL, vehicle
 from orchestrator.errors import InputError
 from orchestrator.system.names import port_name
@@ -15,15 +18,17 @@ from orchestrator.system.structure import System
 #: What the paper says of these conditions, in Remark 4, and what they leave open.
 _NOTE = """\
 The conditions are sufficient, and Remark 4 calls them conservative: a run may well be stable
-where they are violated. The zetas of (26) and (29) bound terms of the unknown vehicle and cannot
-be computed; a condition that needs them is only shown to be possible, never met."""
+where they are violated. The zetas of (26) and (29) are known from below only: a condition that is
+open with the least of them may be violated with the true ones, and none that has them can be met
+for certain, because C_2 has a pole at the vertical. The report has the proofs, under "What is wrong
+in the paper"; so has docs/paper.md."""
 
 _PAPER = """\
-These are the paper's own gains, and they miss (30): lambda_min(K_2 Lambda) = 10 is not above 15."""
+These are the paper's own gains: they miss (30), and no gains meet (31) for this vehicle."""
 
 
-def evaluate(system: System) -> tuple[Bounds, tuple[Condition, ...]]:
-    """Bounds of the vehicle and conditions on the gains, from the parameters of a system.
+def evaluate(system: System) -> Theorem:
+    """The theorem for the parameters of a system.
 
     Raises:
         InputError: a parameter does not exist or cannot be set.
@@ -39,51 +44,66 @@ def evaluate(system: System) -> tuple[Bounds, tuple[Condition, ...]]:
         raise InputError(
             f"controller.saturation = {saturation}: use one of {', '.join(MAXIMUM_SLOPE)}"
         )
-    known = bounds(vehicle(value), value(ELL))
     K1, K2 = (tuple(value(f"controller.{K}[{i}]") for i in range(1, 4)) for K in ("K1", "K2"))
-    return known, conditions(
-        known,
-        K1,
-        K2,
-        value("controller.lambda"),
-        value("controller.k_d"),
-        MAXIMUM_SLOPE[saturation],
-    )
+    lambda_, k_d, gamma = (value(f"controller.{name}") for name in ("lambda", "k_d", "gamma"))
+    gains = Gains(K1=K1, K2=K2, lambda_=lambda_, k_d=k_d, gamma=gamma)
+    return theorem(vehicle(value), value(ELL), gains, MAXIMUM_SLOPE[saturation])
 
 
 def check(system: System) -> str:
-    """The conditions in words and numbers, for the parameters of a system.
+    """The theorem in words and numbers, for the parameters of a system.
 
     Raises:
         InputError: a parameter does not exist or cannot be set.
 
     """
-    known, found = evaluate(system)
-    lines = [
-        "over all attitudes:",
-        f"  lambda_m2 = {known.lambda_m2:.6g} kg, lambda_M2 = {known.lambda_M2:.6g} kg",
-        f"  lambda_d2 = {known.lambda_d2:.6g} kg/s, lambda_D2 = {known.lambda_D2:.6g} kg/s",
-        "",
-    ]
-    for condition in found:
-        rest = f" + {condition.zetas}" if condition.zetas else ""
-        lines += [
-            f"{condition.number}  {condition.statement}",
-            f"  {condition.left:.6g} > {condition.right:.6g}{rest}: {condition.verdict}",
-        ]
-    lines += ["", _NOTE, "", *_sampling(system)]
+    lines = [*stated(evaluate(system)), "", _NOTE, "", *_sampling(system)]
     if not system.parameters:
         lines += ["", _PAPER]
     return "\n".join(lines)
 
 
+def stated(found: Theorem) -> Iterator[str]:
+    """Bounds, conditions, alphas and region of attraction, in lines."""
+    known, zetas, alphas = found.bounds, found.zetas, found.alphas
+    yield "over all attitudes:"
+    yield f"  lambda_m2 = {known.lambda_m2:.6g} kg, lambda_M2 = {known.lambda_M2:.6g} kg"
+    yield f"  lambda_d2 = {known.lambda_d2:.6g} kg/s, lambda_D2 = {known.lambda_D2:.6g} kg/s"
+    yield f"  zeta_1 + zeta_2 >= {zetas.zeta_1_2:.4g} kg/s"
+    yield f"  zeta_3 + zeta_4 >= {zetas.zeta_3_4:.4g} kg/s"
+    yield ""
+    for condition in found.conditions:
+        least = f" + {condition.zetas}, at least {condition.right + condition.least:.4g}"
+        yield f"{condition.number}  {condition.statement}"
+        yield (
+            f"  {condition.left:.6g} > {condition.right:.6g}{least if condition.zetas else ''}: "
+            f"{condition.verdict}"
+        )
+    if found.zeta_of_any_gains >= known.lambda_d2:
+        least = f"{known.lambda_d2:.6g} > 0.5 (zeta_1 + zeta_2), at least "
+        yield f"(31), (53)  by any gains: {least}{found.zeta_of_any_gains:.4g}: violated"
+    yield ""
+    yield (
+        f"(40)  alpha_1 = {alphas.alpha_1:.4g}, alpha_2 = {alphas.alpha_2:.4g}, "
+        f"alpha_3 <= {alphas.alpha_3:.4g}, alpha_4 <= {alphas.alpha_4:.4g}"
+    )
+    yield (
+        f"(33)  R_A lies within |vartheta| < {found.radius:.3g}"
+        if found.radius
+        else "(33)  R_A is empty"
+    )
+    yield (
+        "(42)  with zetas for a part of the states alone: holds for |x| < "
+        f"{found.x_at_most:.3g} at most, with any gains for |x| < {found.x_of_any_gains:.3g}"
+    )
+
+
 def _sampling(system: System) -> list[str]:
     """What the step asks of k_d."""
-    lambda_, k_d, h = (
-        float(system.value(port_name(f"controller.{name}")) or 0.0)
-        for name in ("lambda", "k_d", "h_max")
+    lambda_, h = (
+        float(system.value(port_name(f"controller.{name}")) or 0.0) for name in ("lambda", "h_max")
     )
-    rate = observer_rate(lambda_, k_d)
+    rate = observer_rate(lambda_, gain_of_a_step(system, h))
     return [
         f"Euler's scheme with internal steps of {h:g} s: the observer's fastest mode has the rate "
         f"{rate:.4g} 1/s,",

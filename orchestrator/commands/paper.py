@@ -1,4 +1,4 @@
-"""`auv-fmu report`."""
+"""`auv-fmu report` and `table`."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from orchestrator.commands.options import OK, add_kind, add_out
 from orchestrator.commands.streams import show
 from orchestrator.experiments.scenario import names
+from orchestrator.paper.printed_table import write_table
 from orchestrator.paper.report import write_report
 from orchestrator.studies.study import ready_studies
 
@@ -25,18 +26,36 @@ def add_to(commands: Any) -> None:
     report.add_argument(
         "--studies",
         action="store_true",
-        help="make the ready studies as well, or what is missing of them",
+        help="hold the printed table against every reading as well, and make the ready studies, "
+        "or what is missing of them",
     )
     add_kind(report)
     add_out(report, Path("results", "report"))
     report.set_defaults(action=_report)
+
+    table = commands.add_parser(
+        "table", help="hold the printed table of section 4.2 against all that the paper leaves open"
+    )
+    add_out(table, Path("results", "table"))
+    table.set_defaults(action=_table)
 
 
 def _report(options: argparse.Namespace) -> int:
     scenarios = [*names(), *options.scenarios]
     ready = ready_studies() if options.studies else ()
     for path in write_report(
-        options.out, scenarios, options.command, kind=options.kind, ready=ready
+        options.out,
+        scenarios,
+        options.command,
+        kind=options.kind,
+        ready=ready,
+        variants=options.studies,
     ):
+        show(path)
+    return OK
+
+
+def _table(options: argparse.Namespace) -> int:
+    for path in write_table(options.out, options.command):
         show(path)
     return OK

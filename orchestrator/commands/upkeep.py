@@ -12,6 +12,7 @@ from orchestrator.exchange.reference import write_reference
 from orchestrator.experiments.bundle import current_fmus, run_fmus
 from orchestrator.experiments.folder import replaced, whole
 from orchestrator.experiments.scenario_page import scenario_page
+from orchestrator.paper.errata import errata_page
 from orchestrator.studies.ready_page import ready_page
 from orchestrator.studies.study_page import study_page
 
@@ -22,9 +23,7 @@ def add_to(commands: Any) -> None:
     add_out(reference, Path("reference"))
     reference.set_defaults(action=_reference)
 
-    docs = commands.add_parser(
-        "docs", help="write the pages of components, scenario files and studies"
-    )
+    docs = commands.add_parser("docs", help="write the pages that say what the code says")
     add_out(docs, Path("docs"))
     docs.set_defaults(action=_docs)
 
@@ -43,6 +42,7 @@ def _docs(options: argparse.Namespace) -> int:
         "scenarios.md": scenario_page(),
         "studies.md": study_page(),
         "ready-studies.md": ready_page(),
+        "paper.md": errata_page(),
     }
     for name, text in pages.items():
         with whole(options.out / name) as partial:

@@ -14,7 +14,7 @@ import numpy as np
 
 from auv_fmu.control_point import ELL
 from auv_fmu.output_feedback import Gains
-from auv_fmu.proof.gain_conditions import bounds, conditions
+from auv_fmu.proof.attraction import theorem
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from auv_fmu.vehicle import Vehicle
 from orchestrator.paper.formatting import actuator_values, numbers
@@ -23,6 +23,7 @@ from orchestrator.paper.measures import (
     largest_estimate,
     total_variation_until,
     turning_radius,
+    way_of,
 )
 from orchestrator.paper.outcomes import Outcome
 from orchestrator.paper.published import (
@@ -33,6 +34,7 @@ from orchestrator.paper.published import (
     TURNING_RADIUS,
 )
 from orchestrator.paper.runs import Run
+from orchestrator.studies.engine import REACHED
 
 #: The runs of the figures, and what the claims change in them.
 FIVE, FIVE_PD = Run("fig5"), Run("fig5-pd")
@@ -188,6 +190,29 @@ def effort_as_printed(five: Outcome, pd: Outcome) -> Finding:
     return Finding(
         f"{actuator_values(proposed)}, and {actuator_values(baseline)}",
         f"{said(bool(holds))}: an RMS of signals within 80 cannot exceed 80 (reading 6)",
+    )
+
+
+@claim(
+    "4.2: the surge efforts, against the impulse that the way to the reference takes",
+    f"{EFFORT_PROPOSED[0]:g}, and {EFFORT_PD[0]:g} N{_SQUARED}",
+    FIVE,
+    FIVE_PD,
+)
+def effort_of_the_way(five: Outcome, pd: Outcome) -> Finding:
+    """No course of the force gives that impulse in that time with the printed effort."""
+    ways = [found for run in (five, pd) if (found := way_of(run.table))]
+    published = EFFORT_PROPOSED[0], EFFORT_PD[0]
+    if len(ways) < len(published):
+        return Finding(f"|e| does not come to {REACHED:g} m", "none")
+    least = [found.least_effort for found in ways]
+    soonest = [found.soonest(effort) for found, effort in zip(ways, published, strict=True)]
+    took = ", and ".join(f"{found.impulse:.4g} N·s in {found.duration:.3g} s" for found in ways)
+    return Finding(
+        f"{took}, until |e| is {REACHED:g} m: not below {numbers(least)} N{_SQUARED} (Cauchy and "
+        "Schwarz)",
+        f"{said(all(np.less_equal(least, published)))}: the printed efforts give these impulses in "
+        f"{numbers(soonest)} s at the soonest",
     )
 
 
@@ -347,14 +372,30 @@ def gradual_degradation_on_the_way(*sevens: Outcome) -> Finding:
     )
 
 
-@claim("Theorem 1: the gains of section 4.1 meet (30)", "presumed")
-def gains_meet_the_condition() -> Finding:
-    """(30) with the gains as printed, which needs no run."""
-    gains = Gains()
-    [condition, *_] = conditions(
-        bounds(Vehicle(), ELL), gains.K1, gains.K2, gains.lambda_, gains.k_d, MAXIMUM_SLOPE["tanh"]
-    )
+@claim("Theorem 1: the gains of section 4.1 meet (30) to (32)", "presumed")
+def gains_meet_the_conditions() -> Finding:
+    """With the gains as printed, which needs no run."""
+    found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE["tanh"])
+    verdicts = [condition.verdict for condition in found.conditions]
+    first, second, _ = found.conditions
     return Finding(
-        f"{condition.left:g}, needed: above {condition.right:g}",
-        f"{said(condition.margin > 0.0)}: {condition.verdict} (reading 10); `auv-fmu gains`",
+        f"{', '.join(verdicts)}: (30) {first.left:g}, needed above {first.right:g}; (31) "
+        f"{second.left:g}, needed above {second.right + second.least:.4g}",
+        f"{said('violated' not in verdicts)} (reading 10); `auv-fmu gains`",
+    )
+
+
+@claim(
+    "Theorem 1: the region of attraction grows with the gains to include any initial condition",
+    "arbitrarily large",
+)
+def region_is_arbitrarily_large() -> Finding:
+    """What (42) can hold for, with any gains."""
+    found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE["tanh"])
+    least, there = found.zeta_of_any_gains, found.bounds.lambda_d2
+    return Finding(
+        f"by any gains (31) asks for lambda_d2 > {least:.4g}, which is {there:g}; (42) holds for "
+        f"|x| < {found.x_of_any_gains:.2g} at most",
+        f"{said(least < there)}: no gain enters alpha_3 with a plus "
+        "([the proof](#the-region-of-attraction-does-not-grow-with-the-gains))",
     )

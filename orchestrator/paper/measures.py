@@ -2,10 +2,61 @@
 
 from __future__ import annotations
 
+from math import sqrt
+from typing import NamedTuple
+
 import numpy as np
 
 from orchestrator.analysis.signals import APPLIED, THETA_HAT, tracking_error
 from orchestrator.master.table import Table
+from orchestrator.studies.engine import REACHED
+
+
+class Way(NamedTuple):
+    """The vehicle's way to the reference.
+
+    Attributes:
+        duration: until |e| is at most :data:`REACHED` [s].
+        impulse: of the surge force, as applied in that time [N.s].
+
+    """
+
+    duration: float
+    impulse: float
+
+    @property
+    def least_effort(self) -> float:
+        """The least L2 norm that a force with this impulse can have in this time [N.s^0.5].
+
+        (integral of tau)^2 <= T * integral of tau^2 by Cauchy and Schwarz, whatever its course.
+        """
+        return abs(self.impulse) / sqrt(self.duration)
+
+    def soonest(self, effort: float) -> float:
+        """The least time in which a force of an L2 norm [N.s^0.5] can have this impulse [s]."""
+        return (self.impulse / effort) ** 2
+
+
+def way(table: Table, reached: float | None) -> Way | None:
+    """The way of a run to its reference; None if it does not come there, or is there already.
+
+    Args:
+        table: of the run.
+        reached: when |e| first is at most :data:`REACHED` [s]; None: never.
+
+    """
+    if not reached:
+        return None
+    until = table.time <= reached
+    # A row holds what was applied in the step that ends there: the first one holds none.
+    force = table[APPLIED[0]][until][1:]
+    return Way(reached, float(force @ np.diff(table.time[until])))
+
+
+def way_of(table: Table) -> Way | None:
+    """The same, with the error of the table."""
+    near = np.linalg.norm(tracking_error(table), axis=1) <= REACHED
+    return way(table, float(table.time[near.argmax()]) if near.any() else None)
 
 
 def turning_radius(table: Table) -> float:

@@ -8,8 +8,8 @@ import re
 READINGS: dict[int, tuple[str, str]] = {
     1: (
         "The plant has six degrees of freedom.",
-        "The controller is derived on five; the plant has roll too, with a righting moment that is "
-        "not given: ours is that of pitch, 5 N·m.",
+        "The controller is derived on five; the plant has roll too, which does not stay zero, with "
+        "a righting moment that is not given: ours is that of pitch, 5 N·m.",
     ),
     2: (
         "The vertical.",
@@ -51,12 +51,13 @@ READINGS: dict[int, tuple[str, str]] = {
     ),
     10: (
         "Gain conditions.",
-        "The paper's gains violate (30), which Remark 4 calls sufficient and conservative.",
+        "The paper's gains violate (30), and any gains (31): Theorem 1 does not apply to this "
+        "vehicle. Remark 4 calls the conditions sufficient and conservative.",
     ),
     11: (
         "Turning radius.",
-        "With the printed parameters (2) turns on a radius of 0.28 m, not 0.6 m; nothing was "
-        "changed to meet it.",
+        "With the printed parameters (2) turns on a radius of 0.28 m, not 0.6 m, which is its "
+        "diameter; nothing was changed to meet it.",
     ),
     12: (
         "The acceleration of the reference",
@@ -68,7 +69,8 @@ READINGS: dict[int, tuple[str, str]] = {
     ),
     14: (
         "P2.3 does not hold with C_2 as printed.",
-        "The proof uses it in (20) and (28); the controller is not affected.",
+        "No C_2 has both P2.2 and P2.3. The proof uses P2.3 in (20) and (28), and can do without; "
+        "the controller is not affected.",
     ),
     15: (
         "Two signals named almost alike.",

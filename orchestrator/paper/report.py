@@ -15,13 +15,14 @@ from orchestrator.experiments.bundle import PYTHON, current_fmus
 from orchestrator.experiments.folder import replaced
 from orchestrator.experiments.record import PACKAGES, Clock, write_files
 from orchestrator.experiments.wiring import closed_loop
-from orchestrator.paper import readings, studies
+from orchestrator.paper import errata, printed_table, readings, studies
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS, show_effect
 from orchestrator.paper.formatting import table
 from orchestrator.paper.outcomes import Outcomes
 from orchestrator.paper.page import contents, html
 from orchestrator.paper.sections import Section, draw_section, sections, written
+from orchestrator.paper.variants import all_variants
 from orchestrator.paper.workers import Workers, workers
 
 #: Folders within the report's: figures, and outcomes that the next report can use again.
@@ -45,6 +46,10 @@ not given. The proposed controller's e_f moves with the phase of the waves (peri
 end of the run, and shrinks with eps_t, as Remark 6 says. The PD controller's e_f is some \
 millimetres, up to a centimetre, for the same reason."""
 
+_NO_VARIANTS = """\
+No choice of what is not given brings all of them together: `auv-fmu table` tries every \
+combination, and so does `auv-fmu report --studies`, for this section."""
+
 
 def write_report(
     folder: Path,
@@ -53,6 +58,7 @@ def write_report(
     stop_time: float | None = None,
     kind: str = PYTHON,
     ready: Sequence[str] = (),
+    variants: bool = False,
 ) -> tuple[Path, Path]:
     """Run what was not run before, and write `report.html`, `report.md` and their figures.
 
@@ -63,6 +69,7 @@ def write_report(
         stop_time: of all runs [s]; None: their own. For a look at the report, not at the paper.
         kind: of the bundle's FMUs in all runs.
         ready: studies that have a section: names, or paths of files.
+        variants: hold the printed table against all that the paper leaves open.
 
     Returns:
         The two files.
@@ -89,8 +96,9 @@ def write_report(
                 crew,
             )
             notes, effects = _draw(chapters, outcomes, unfinished, crew)
+            held = printed_table.section(all_variants(crew)) if variants else _NO_VARIANTS
         shown = list(studies.sections(made, folder / _STUDIES, unfinished))
-        parts = _text(chapters, outcomes, notes, effects, command, unfinished, fmus, shown)
+        parts = _text(chapters, outcomes, notes, effects, command, unfinished, fmus, shown, held)
         body = "\n\n".join(parts)
         body = readings.linked(body)
         text = f"{_TITLE}\n\n{readings.linked(_INTRODUCTION)}\n\n{contents(body)}\n\n{body}\n"
@@ -130,10 +138,13 @@ def _text(
     folder: Path,
     fmus: Path,
     shown: Sequence[str],
+    held: str,
 ) -> Iterator[str]:
     yield "## Every printed number and claim"
     yield _claims(outcomes)
     yield _WHY_NUMBERS_DIFFER
+    yield "## The printed table against every reading"
+    yield held
     yield "## Figures"
     for section in chapters:
         yield from written(section, outcomes, notes[section.name], folder)
@@ -146,6 +157,8 @@ def _text(
     yield from shown
     yield "## Gain conditions"
     yield f"`auv-fmu gains`:\n\n```\n{gains.check(closed_loop(fmus))}\n```"
+    yield "## What is wrong in the paper"
+    yield errata.section()
     yield "## Readings"
     yield readings.section()
     yield "## Versions and commands"

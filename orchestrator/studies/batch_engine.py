@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import cache
 from hashlib import sha256
 from math import isnan, sqrt
@@ -11,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from auv_fmu.closed_loop import Setting, splits
+from auv_fmu.euler import MOST_INTERNAL_STEPS
 from auv_fmu.output_feedback import Gains
 from orchestrator.analysis.metrics import LAST_SECONDS
 from orchestrator.analysis.signals import ACTUATORS, AXES, DY_HAT
@@ -22,7 +24,7 @@ from orchestrator.master.schedule import stages
 from orchestrator.master.table import Table
 from orchestrator.studies.batch import tally
 from orchestrator.studies.batch.columns import COLUMNS
-from orchestrator.studies.batch.kernel import Plan
+from orchestrator.studies.batch.kernel import Moment, Plan
 from orchestrator.studies.batch.library import compiled, digest
 from orchestrator.studies.batch.parameters import setting_of
 from orchestrator.studies.batch.standard import difference
@@ -64,6 +66,7 @@ class BatchEngine:
         for name, system in systems.items():
             if why := difference(system, current_fmus(kind)):
                 raise InputError(f"{name}: {why}, which the batch engine cannot make; {_OTHER}")
+            system.check()
         self._systems = dict(systems)
 
     @property
@@ -72,7 +75,7 @@ class BatchEngine:
         parameters = [(name, system.parameters) for name, system in self._systems.items()]
         return sha256(f"{digest()} {parameters}".encode()).hexdigest()
 
-    def outcomes(self, runs: Sequence[Run]) -> Iterator[Outcome]:
+    def outcomes(self, runs: Iterable[Run]) -> Iterator[Outcome]:
         """Make some runs, in their order."""
         for run in runs:
             [outcome] = self.outcomes_at(run, [run.stop_time])
@@ -151,7 +154,8 @@ def _job(system: System, run: Run) -> _Job:
     """
     changes = {port_name(name): value for name, value in run.parameters.items()}
     system = system.with_parameters(changes)
-    system.check()
+    if not all(_is_parameter(system, name) for name in changes):
+        system.check()
     experiment = Experiment(run.stop_time, run.step, run.order)
     fmus = {name: part.description.modelName for name, part in system.components.items()}
     setting = setting_of(fmus, system.parameters, experiment.step)
@@ -159,7 +163,8 @@ def _job(system: System, run: Run) -> _Job:
         raise InputError(refused_at_start(setting))
     full, stop = experiment.full_steps, experiment.stop_time
     parts = splits(setting, experiment.step)
-    if failure := refused_at_once(setting, parts, _order(system, experiment)):
+    if max(parts) > MOST_INTERNAL_STEPS:
+        failure = refused_at_once(setting, parts, _order(system, experiment))
         raise InputError(refused_at_start(setting) or failure)
     # Where there is none it has no length, and is no step.
     last_parts = (
@@ -175,6 +180,10 @@ def _job(system: System, run: Run) -> _Job:
         experiment.order != ORDERS[0],
     )
     return _Job(system, experiment, setting, plan)
+
+
+def _is_parameter(system: System, name: PortName) -> bool:
+    return bool(system.component(name.component).variable(name.port).causality == "parameter")
 
 
 def _order(system: System, experiment: Experiment) -> list[str]:
@@ -219,25 +228,33 @@ def _made(
         InputError: it has no start.
 
     """
-    setting, plan = job.setting, job.plan
-    run = compiled(type(setting.controller))  # type: ignore[arg-type]
     progress = np.empty(1, int)
-    seed = setting.plant.noise.seed
-    try:
-        made, moment = run(setting, plan, _uniform(seed), ends, tallies, rows, progress)
-    except ArithmeticError:
-        # What the step would have begun with did not come back.
-        made = int(progress[0])
-        if made >= 0:
-            before = plan._replace(steps=made)
-            _, moment = run(
-                setting, before, _uniform(seed), ends[:0], tallies[:0], _NO_ROWS, progress
-            )
+    # Where an equation raises, the compiled text says no more than that.
+    with suppress(ArithmeticError):
+        _run(job, job.plan, ends, tallies, rows, progress)
+    made = int(progress[0])
     if made < 0:
-        raise InputError(refused_at_start(setting))
-    if made == plan.steps:
+        raise InputError(refused_at_start(job.setting))
+    if made == job.plan.steps:
         return made, None
-    return made, refused(setting, plan, made, moment, _order(job.system, job.experiment))
+    # What the step that is refused begins with is what a shorter run ends with.
+    shorter = job.plan._replace(steps=made)
+    moment = _run(job, shorter, ends[:0], tallies[:0], _NO_ROWS, progress)
+    return made, refused(job.setting, job.plan, made, moment, _order(job.system, job.experiment))
+
+
+def _run(
+    job: _Job,
+    plan: Plan,
+    ends: np.ndarray,
+    tallies: np.ndarray,
+    rows: np.ndarray,
+    progress: np.ndarray,
+) -> Moment:
+    """Call the kernel."""
+    run = compiled(type(job.setting.controller))  # type: ignore[arg-type]
+    uniform = _uniform(job.setting.plant.noise.seed)
+    return run(job.setting, plan, uniform, ends, tallies, rows, progress)
 
 
 @cache
@@ -257,18 +274,16 @@ def _uniform(seed: int) -> np.random.Generator:
 def _indices(job: _Job, end: np.void, found: np.void) -> dict[str, float]:
     """The indices of a tally by their names."""
     steps, t = int(end["steps"]), job.experiment.time(int(end["steps"]))
-    x, y, z = found["miss"]
     single = {
-        "time_to_reach": found["reached"],
         "late_error": found["late"],
-        "estimate_error": sqrt((x + y + z) / found["instants"]),
         "largest_speed": found["speed"],
         "largest_drift": found["drift"],
     }
-    if isnan(found["reached"]):
-        del single["time_to_reach"]
-    if not job.has_estimate:
-        del single["estimate_error"]
+    if not isnan(found["reached"]):
+        single["time_to_reach"] = found["reached"]
+    if job.has_estimate and found["instants"]:
+        x, y, z = found["miss"]
+        single["estimate_error"] = sqrt((x + y + z) / found["instants"])
     groups = (
         ("l2_effort.{}", ACTUATORS, np.sqrt(found["square"])),
         ("rms_effort.{}", ACTUATORS, np.sqrt(found["square"] / t)),

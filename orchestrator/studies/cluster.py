@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import os
 import pickle
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
-from itertools import islice
 from logging import CRITICAL
 from queue import Empty, SimpleQueue
 from threading import Lock
@@ -30,8 +30,9 @@ from orchestrator.studies.engine import Engine, Outcome, Run
 from orchestrator.system.leftovers import process_folder
 
 #: How long a block shall take [s]: long beside the millisecond that a task costs, short for who
-#: waits for the last one, or loses it.
-_SECONDS = 1.5
+#: waits for the last one, or loses it. One that takes so many times as long, because its runs take
+#: longer than those before them, comes back with what is done.
+_SECONDS, _OVERTIME = 1.5, 2.0
 
 #: A scheduler shall not have to deal with more blocks a second than this: on large clusters they
 #: get longer.
@@ -169,23 +170,33 @@ class _Share(WorkerPlugin):  # type: ignore[misc]
             for stream in (1, 2):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
 
-    def outcomes(self, runs: list[Run]) -> tuple[float, list[Outcome]]:
-        """What comes out of runs, and how long it took [s]."""
+    def outcomes(self, runs: list[Run], limit: float) -> tuple[float, list[Outcome]]:
+        """How long runs have taken [s], and what has come out of them.
+
+        Args:
+            runs: to be made, or the first of them where all take too long.
+            limit: how long that is [s].
+
+        """
         if __version__ != self._version:
             raise InputError(
                 f"the worker at {self._address} has auv-fmu {__version__}, and who sends the study "
                 f"{self._version}: install the same version everywhere"
             )
         with self._lock:
-            start = monotonic()
-            outcomes = list(self._engine.outcomes(runs))
-            return monotonic() - start, outcomes
+            start, seconds, outcomes = monotonic(), 0.0, []
+            for outcome in self._engine.outcomes(runs):
+                outcomes.append(outcome)
+                seconds = monotonic() - start
+                if seconds > limit:
+                    break
+            return seconds, outcomes
 
 
-def _outcomes(name: str, runs: bytes) -> tuple[float, list[Outcome]]:
+def _outcomes(name: str, runs: bytes, limit: float) -> tuple[float, list[Outcome]]:
     """A task: the outcomes of some runs, pickled so that nobody looks into them on their way."""
-    made: tuple[float, list[Outcome]] = get_worker().plugins[name].outcomes(pickle.loads(runs))
-    return made
+    share: _Share = get_worker().plugins[name]
+    return share.outcomes(pickle.loads(runs), limit)
 
 
 class _Making:
@@ -215,8 +226,7 @@ class _Making:
         for run in runs:
             block.append(run)
             steps += run.stop_time / run.step
-            wanted = max(_SECONDS, self._threads / _RATE)
-            if steps * self._pace >= wanted or len(block) == _MOST_RUNS:
+            if steps * self._pace >= self._seconds or len(block) == _MOST_RUNS:
                 yield block
                 block, steps = [], 0.0
         if block:
@@ -234,16 +244,33 @@ class _Making:
         """
         under_way: dict[Future, list[Run]] = {}
         done: SimpleQueue[Future] = SimpleQueue()
+        rests: deque[list[Run]] = deque()
         while True:
-            for block in islice(blocks, max(0, room() - len(under_way))):
-                future = self._client.submit(_outcomes, self._name, pickle.dumps(block), pure=False)
+            while len(under_way) < room():
+                block = rests.popleft() if rests else next(blocks, None)
+                if block is None:
+                    break
+                future = self._sent(block)
                 under_way[future] = block
                 future.add_done_callback(done.put)
             if not under_way:
                 return
             future = self._next(done)
             block = under_way.pop(future)
-            yield block, self._result(future, block)
+            outcomes = self._result(future, block)
+            if outcomes:
+                n = len(outcomes)
+                rests.extend(block[i : i + n] for i in range(n, len(block), n))
+            yield block, outcomes
+
+    def _sent(self, block: list[Run]) -> Future:
+        limit = _OVERTIME * self._seconds
+        return self._client.submit(_outcomes, self._name, pickle.dumps(block), limit, pure=False)
+
+    @property
+    def _seconds(self) -> float:
+        """How long a block shall take."""
+        return max(_SECONDS, self._threads / _RATE)
 
     def _room(self) -> int:
         self._count()
@@ -293,7 +320,7 @@ class _Making:
                 f"the cluster cannot make runs {block[0].number} to {block[-1].number}: "
                 f"{reason(error)}"
             ) from error
-        self._pace = seconds / sum(run.stop_time / run.step for run in block)
+        self._pace = seconds / sum(run.stop_time / run.step for run in block[: len(outcomes)])
         made: list[Outcome] = outcomes
         return made
 

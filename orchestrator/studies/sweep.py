@@ -142,7 +142,7 @@ def swept(
         KeyboardInterrupt: somebody wants it to stop.
 
     """
-    _check_installed()
+    check_installed()
     systems = {name: loaded(name, means.kind) for name in study.scenario}
     space = Space(study, systems)
     plans = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
@@ -172,7 +172,13 @@ def _draw(plans: Sequence[Plan], title: str, result: StudyResult) -> list[str]:
     return notes
 
 
-def _check_installed() -> None:
+def check_installed() -> None:
+    """Check that what studies need is there.
+
+    Raises:
+        InputError: it is not.
+
+    """
     missing = [package for package in _NEEDED if find_spec(package) is None]
     if missing:
         raise InputError(f"studies need {', '.join(missing)}: pip install 'auv-fmu[studies]'")

@@ -102,7 +102,13 @@ def scene(setting: Setting, vehicles: Vehicles, t: float, n: Vector3) -> Scene:
         n: three independent standard normal numbers, of the localisation system.
 
     """
-    seen = plant.outputs(setting.plant, vehicles.plant, vehicles.rotation)
+    seen = plant.outputs(
+        vehicles.plant,
+        vehicles.rotation,
+        setting.plant.ell,
+        setting.plant.roll.rolls,
+        setting.plant.current,
+    )
     return Scene(
         seen,
         plant.measure(seen.y, n, setting.plant.noise.std),

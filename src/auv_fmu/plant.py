@@ -160,7 +160,9 @@ def turned_without_roll(rotation: Rotation, q: float, r: float, h: float) -> Vec
 
 
 def step(
-    parameters: Parameters,
+    vehicle: Vehicle,
+    roll: RollAxis,
+    current: Vector3,
     state: PlantState,
     rotation: Rotation,
     tau: Vector3,
@@ -170,7 +172,8 @@ def step(
     """One Euler step of the vehicle under held inputs.
 
     Args:
-        parameters: of the plant.
+        vehicle, roll: parameters.
+        current: velocity of the water [m/s], earth frame.
         state: at the beginning of the step.
         rotation: body to earth, of its quaternion; its outputs need it too.
         tau: (tau_u, tau_q, tau_r) that acts [N, N.m].
@@ -178,12 +181,11 @@ def step(
         h: step [s].
 
     """
-    roll = parameters.roll
     (x, y, z), quaternion, nu, _ = state
     u, v, w, p, q, r = nu
-    du, dv, dw, dp, dq, dr = accelerations_6dof(parameters.vehicle, roll, nu, rotation, tau, tau_w)
+    du, dv, dw, dp, dq, dr = accelerations_6dof(vehicle, roll, nu, rotation, tau, tau_w)
     dx, dy, dz = rotate(rotation, (u, v, w))
-    c_x, c_y, c_z = parameters.current
+    c_x, c_y, c_z = current
     position = x + h * dx, y + h * dy, z + h * dz
     if c_x or c_y or c_z:
         position = x + h * (dx + c_x), y + h * (dy + c_y), z + h * (dz + c_z)
@@ -245,28 +247,43 @@ def steps(
     while n > 0:
         if T_u or T_q or T_r:
             acting = respond_all(state.tau, tau, parameters.T, h)
-        state = step(parameters, state, rotation, acting, tau_w, h)
+        state = step(
+            parameters.vehicle,
+            parameters.roll,
+            parameters.current,
+            state,
+            rotation,
+            acting,
+            tau_w,
+            h,
+        )
         rotation = rotation_from_quaternion(state.quaternion)
         n -= 1
     return state, rotation
 
 
-def outputs(parameters: Parameters, state: PlantState, rotation: Rotation) -> PlantOutputs:
+def outputs(
+    state: PlantState, rotation: Rotation, ell: float, rolls: bool, current: Vector3
+) -> PlantOutputs:
     """Euler angles, control point (9), its velocity (10), and the velocity of the vehicle.
 
     Args:
-        parameters: of the plant.
         state: of the vehicle.
         rotation: body to earth, of its quaternion.
+        ell: distance of the control point [m].
+        rolls: whether the vehicle does.
+        current: velocity of the water [m/s], earth frame.
 
     """
-    ell = parameters.ell
     position, _, nu, _ = state
-    c_x, c_y, c_z = parameters.current
+    c_x, c_y, c_z = current
     if c_x or c_y or c_z:
-        nu = over_ground(nu, rotation, parameters.current)
+        nu = over_ground(nu, rotation, current)
+    euler = euler_from_rotation(rotation)
+    if not rolls:
+        euler = euler_without_roll(rotation)
     return PlantOutputs(
-        euler_from_rotation(rotation) if parameters.roll.rolls else euler_without_roll(rotation),
+        euler,
         control_point(position, rotation, ell),
         control_point_velocity(rotation, nu, ell),
         nu,

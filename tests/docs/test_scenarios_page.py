@@ -21,7 +21,7 @@ def test_page_is_what_the_declarations_say():
 def test_docs_writes_the_page_and_those_of_the_components(tmp_path):
     assert main(["docs", "--out", str(tmp_path)]) == 0
     written = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.md")}
-    assert {"scenarios.md", "components/AuvPlant.md"} <= written
+    assert {"scenarios.md", "paper.md", "components/AuvPlant.md"} <= written
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=range(len(EXAMPLES)))

@@ -183,7 +183,10 @@ def _plant(said: dict[str, Any]) -> Iterator[str]:
     parameters, outputs = said["parameters"], said["outputs"]
     state = PlantState(tuple(position), tuple(quaternion), tuple(nu), tuple(acting))
     rotation = rotation_from_quaternion(state.quaternion)
-    euler, y, dy, over_ground = plant.outputs(OF_THE_PLANT.of(parameters), state, rotation)
+    known = OF_THE_PLANT.of(parameters)
+    euler, y, dy, over_ground = plant.outputs(
+        state, rotation, known.ell, known.roll.rolls, known.current
+    )
     if not parameters["roll"] and (nu[3] or abs(rotation[1][2]) > TOLERANCE):
         yield "roll where there is none"
     eta, found_nu, found_y, found_dy, tau = (outputs[i:j] for i, j in pairwise(_PLANT_OUTPUTS))

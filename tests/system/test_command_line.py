@@ -159,11 +159,17 @@ def test_gains_prints_both_sides_and_the_verdicts(workplace, capsys):
     assert main(["gains"]) == 0
     shown = capsys.readouterr().out
     assert "10 > 15: violated" in shown
-    assert "the paper's own gains, and they miss (30)" in shown
+    assert "15 + 0.5 (zeta_1 + zeta_2), at least 191.7: violated" in shown
+    assert "alpha_1 = -5, alpha_2 = 0, alpha_3 <= -161.7, alpha_4 <= 960.7" in shown
+    assert "R_A is empty" in shown
+    assert "the paper's own gains: they miss (30), and no gains meet (31)" in shown
     assert main(["gains", "--set", "controller.lambda=3"]) == 0
     shown = capsys.readouterr().out
-    assert "30 > 25: holds" in shown
+    assert "30 > 25: met" in shown
     assert "paper's own gains" not in shown
+    # Theorem 2 weighs K_1 with s'_M = 2 / pi: 20 / pi + 5 is 11.3662.
+    assert main(["gains", "--set", "controller.saturation=arctan"]) == 0
+    assert "30 > 11.3662 + 0.5 (zeta_1 + zeta_2)" in capsys.readouterr().out
 
 
 def test_edited_copy_of_a_comparison_compares_like_with_like(workplace):

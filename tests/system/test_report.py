@@ -5,18 +5,20 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
+from orchestrator.analysis.gains import stated
 from orchestrator.commands import paper
 from orchestrator.commands.main import main
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
+from orchestrator.paper.errata import errata, of_the_paper
 from orchestrator.paper.report import write_report
 from orchestrator.paper.studies import make_studies, sections
 from orchestrator.studies.study import ready_studies
+from support.variants import planted
 
 STRANGER = """\
 title = "Mine | <b>own</b>"
@@ -65,7 +67,11 @@ def folder(tmp_path_factory, dist: Path) -> Path:
     (theirs / "lost.toml").write_text(STRANGER.replace("mine.fmu", "lost.fmu"))
     report = tmp_path_factory.mktemp("report")
     files = [str(theirs / f"{name}.toml") for name in ("stranger", "lost")]
-    write_report(report, [*SCENARIOS, *files], ["auv-fmu", "report"], stop_time=1.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("orchestrator.paper.report.all_variants", lambda crew: planted())
+        write_report(
+            report, [*SCENARIOS, *files], ["auv-fmu", "report"], stop_time=1.0, variants=True
+        )
     return report
 
 
@@ -87,6 +93,12 @@ def test_every_claim_has_a_row_and_every_effect_a_section(text):
         assert f"](figures/{effect.name}.png)" in text
 
 
+def test_the_printed_table_stands_beside_every_reading(text):
+    """Ours is twice what is printed."""
+    assert "\n## The printed table against every reading\n" in text
+    assert "\n| proposed L2 effort u [N·√s] | 130 | 260 |" in text
+
+
 def test_the_stranger_is_in_the_report(folder, text, page):
     assert "\n### Mine \\| \\<b\\>own\\</b\\>\n" in text
     assert ">Mine | &lt;b&gt;own&lt;/b&gt;</h3>" in page
@@ -98,6 +110,12 @@ def test_the_stranger_is_in_the_report(folder, text, page):
 def test_a_scenario_that_cannot_run_says_why_and_breaks_nothing(text):
     [reason] = re.findall(r"\*\*The run lost ended early:\*\* (.*)", text)
     assert "lost.fmu: no such file" in reason
+
+
+def test_what_is_wrong_in_the_paper_is_there_with_the_gain_check(text):
+    for erratum in errata():
+        assert f"\n#### {erratum.title}\n" in text
+    assert "\n".join(stated(of_the_paper())) in text
 
 
 def test_links_lead_somewhere(folder, page):
@@ -153,8 +171,8 @@ def test_a_report_without_studies_says_how_they_are_made(text):
 def test_files_on_the_command_line_come_after_the_scenarios(tmp_path, monkeypatch, capsys):
     asked = []
 
-    def write_report(*arguments: object, kind: str, ready: Sequence[str]) -> tuple[Path, Path]:
-        assert (kind, ready) == ("python", ())
+    def write_report(*arguments: object, **options: object) -> tuple[Path, Path]:
+        assert options == {"kind": "python", "ready": (), "variants": False}
         asked.append(arguments)
         return Path("a"), Path("b")
 

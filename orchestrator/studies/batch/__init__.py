@@ -9,7 +9,7 @@ module                    what it holds
 :mod:`.columns`           which columns these rows have
 :mod:`.tally`             the indices of a run, on the way
 :mod:`.equations`         equations as numba compiles them
-:mod:`.flat`              all numbers of nested tuples
+:mod:`.flat`              all numbers of nested tuples, and sums over them
 :mod:`.library`           the kernel, compiled once and kept in the user's cache folder
 :mod:`.verdict`           why a run ends early, in the words of the FMUs
 ========================  ============================================================

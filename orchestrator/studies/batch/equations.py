@@ -9,16 +9,19 @@ from __future__ import annotations
 
 import ast
 import inspect
+import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import CodeType, FunctionType, ModuleType
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numba
+from numba import types
+from numba.extending import intrinsic
 
 from orchestrator.studies.batch import kernel, tally
-from orchestrator.studies.batch.flat import overload_flat
+from orchestrator.studies.batch.flat import overload_all
 
 #: Where a number is not finite, Python raises in some places; here it is found afterwards.
 OPTIONS: Any = {"nogil": True, "error_model": "numpy"}
@@ -30,7 +33,25 @@ _WITHIN: Any = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapp
 #: What is compiled besides the package of the equations.
 _PACKAGE, _MODULES = "auv_fmu", (kernel.__name__, tally.__name__)
 
-overload_flat()
+overload_all()
+
+
+def _pure(name: str) -> Any:
+    """A function of LLVM, which is what the C library has by that name, and has no memory."""
+
+    @intrinsic
+    def function(_: Any, x: Any) -> Any:
+        def call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            double = context.get_value_type(types.float64)
+            return builder.call(builder.module.declare_intrinsic(name, [double]), arguments)
+
+        return types.float64(types.float64), call
+
+    return function
+
+
+#: Sine and cosine of an angle are computed once, together, wherever they are needed.
+_PURE = {math.sin: _pure("llvm.sin"), math.cos: _pure("llvm.cos")}
 
 
 class Equations:
@@ -73,6 +94,8 @@ class Equations:
         return vars(self.module(sys.modules[function.__module__]))[function.__name__]
 
     def _counterpart(self, value: Any) -> Any:
+        if isinstance(value, BuiltinFunctionType):
+            return _PURE.get(value, value)
         if isinstance(value, ModuleType) and _is_compiled(value.__name__):
             return self.module(value)
         if isinstance(value, FunctionType) and _is_compiled(value.__module__):

@@ -19,7 +19,7 @@ from auv_fmu.euler import LARGEST_STATE
 from auv_fmu.output_feedback import Gains
 from auv_fmu.types import Vector3, Vector6
 from auv_fmu.vectors import difference
-from orchestrator.studies.batch.flat import flat
+from orchestrator.studies.batch.flat import flat, nought, square
 from orchestrator.studies.batch.tally import Row, Step, take_row, take_step
 
 #: The controller's part of the loop: whoever compiles this module for another one puts it here.
@@ -66,7 +66,7 @@ def run(
     tallies: np.ndarray,
     rows: np.ndarray,
     progress: np.ndarray,
-) -> tuple[int, Moment]:
+) -> Moment:
     """Make one run.
 
     Args:
@@ -76,12 +76,11 @@ def run(
         ends: of the tallies, as :data:`.tally.END` says.
         tallies: to be filled.
         rows: to be filled, one more than steps; or none.
-        progress: of which the first element becomes the number of steps taken, or -1: also where
-            an equation raises.
+        progress: of which the first element becomes the number of steps taken. The next one is
+            refused if there are fewer than planned; -1: already the start is.
 
     Returns:
-        The number of steps taken, and what the next one begins with. It is refused if there are
-        fewer than planned; -1: already the start is.
+        What the run ends with, if it makes all steps. It may not return: equations raise.
 
     """
     noisy = setting.plant.noise.std > 0.0
@@ -89,36 +88,37 @@ def run(
     n, spare = normals(generator, noisy, (False, 0.0))
     moment, done = begin(setting, n)
     if not is_sound(moment):
-        return -1, moment
-    progress[0] = 0
-    row = row_of(setting, 0.0, moment, done)
-    for j in range(len(tallies)):
-        take_row(tallies[j], row, ends[j])
-    if len(rows):
-        fill(rows[0], 0.0, moment, done)
+        return moment
     gains = law.sampled(setting.controller, plan.h / plan.parts.controller)
-    for k in range(plan.steps):
+    k, t = 0, 0.0
+    while True:
+        # Here, where the controller is about to need the sines of the same attitude.
+        row = row_of(setting, t, moment, done)
+        for j in range(len(tallies)):
+            if k <= ends[j].steps:
+                take_row(tallies[j], row, ends[j])
+        if len(rows):
+            fill(rows[k], t, moment, done)
+        progress[0] = k
+        if k == plan.steps:
+            break
         whole = k < plan.full
-        t, end = k * plan.h, (k + 1) * plan.h if whole else plan.stop
+        end = (k + 1) * plan.h if whole else plan.stop
         h, parts = (plan.h, plan.parts) if whole else (end - t, plan.last_parts)
         if not whole:
             gains = law.sampled(setting.controller, h / parts.controller)
         n, spare = normals(generator, noisy, spare)
-        tau_before, dy = done.tau, moment.scene.plant.dy
-        after, done = step(setting, gains, moment, plan.delayed, end, h, parts, n)
-        if not is_sound(after):
-            return k, moment
-        progress[0] = k + 1
-        moment = after
-        row = row_of(setting, end, moment, done)
-        made = Step(t, done.told, done.tau, tau_before, difference(done.velocity, dy), k == 0)
+        tau, dy = done.tau, moment.scene.plant.dy
+        moment, done = step(setting, gains, moment, plan.delayed, end, h, parts, n)
+        if not is_sound(moment):
+            break
+        miss = difference(done.velocity, dy)
+        one = Step(t, end, done.told, done.tau, tau, miss, k == 0)
         for j in range(len(tallies)):
             if k < ends[j].steps:
-                take_row(tallies[j], row, ends[j])
-                take_step(tallies[j], row.t, made, setting.plant.limits, ends[j])
-        if len(rows):
-            fill(rows[k + 1], end, moment, done)
-    return plan.steps, moment
+                take_step(tallies[j], one, setting.plant.limits, ends[j])
+        k, t = k + 1, end
+    return moment
 
 
 def begin(setting: Setting, n: Vector3) -> tuple[Moment, Done]:
@@ -183,24 +183,13 @@ def is_sound(moment: Moment) -> bool:
         is_bounded(vehicles.plant)
         and is_bounded(vehicles.planner)
         and is_bounded(moment.control)
-        and is_finite((scene.y, scene.plant.dy, scene.reference, moment.before))
+        and nought((scene.y, scene.plant.dy, scene.reference, moment.before)) == 0.0
     )
 
 
 def is_bounded(state: Any) -> bool:
     """Whether all of a state is finite, and its norm not too large."""
-    square = 0.0
-    for x in flat(state):
-        square += x * x
-    return square <= LARGEST_STATE * LARGEST_STATE
-
-
-def is_finite(values: Any) -> bool:
-    """Whether all of them are: times zero, what is not finite is not zero."""
-    total = 0.0
-    for x in flat(values):
-        total += 0.0 * x
-    return total == 0.0
+    return square(state) <= LARGEST_STATE * LARGEST_STATE
 
 
 def normals(

@@ -20,7 +20,7 @@ from orchestrator.studies.batch.kernel import Moment
 
 
 @cache
-def compiled(gains: type[Any]) -> Callable[..., tuple[int, Moment]]:
+def compiled(gains: type[Any]) -> Callable[..., Moment]:
     """The function :func:`.kernel.run` for the controller with a type of gains.
 
     It is compiled when it is first called, which takes some ten seconds, unless some process of
@@ -34,9 +34,7 @@ def compiled(gains: type[Any]) -> Callable[..., tuple[int, Moment]]:
     path = _place()
     made = EQUATIONS.anew(kernel, path or Path(kernel.__file__))
     vars(made)["law"] = Law(*(EQUATIONS.function(function) for function in LAWS[gains]))
-    run: Callable[..., tuple[int, Moment]] = numba.njit(
-        made.run.py_func, cache=path is not None, **OPTIONS
-    )
+    run: Callable[..., Moment] = numba.njit(made.run.py_func, cache=path is not None, **OPTIONS)
     return run
 
 

@@ -59,6 +59,7 @@ class Step(NamedTuple):
     """What of a step the indices follow from."""
 
     begun: float  #: [s]
+    ended: float  #: [s]
     command: Vector3  #: (tau_u, tau_q, tau_r), as it reached the actuators [N, N.m]
     tau: Vector3  #: applied [N, N.m]
     before: Vector3  #: applied in the step before [N, N.m]
@@ -92,9 +93,9 @@ def take_row(tally: Any, row: Row, end: Any) -> None:
             tally.final[i] = max(tally.final[i], abs(row.e[i]))
 
 
-def take_step(tally: Any, t: float, step: Step, limits: Limits, end: Any) -> None:
-    """Take a step into account that has ended at t [s]."""
-    h = t - step.begun
+def take_step(tally: Any, step: Step, limits: Limits, end: Any) -> None:
+    """Take a step into account."""
+    h = step.ended - step.begun
     for i in range(3):
         tally.square[i] += step.tau[i] * step.tau[i] * h
         if not step.is_first:

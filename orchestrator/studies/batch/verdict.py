@@ -63,21 +63,18 @@ def _controller_at_start(setting: Setting) -> _Result:
 
 
 def refused_at_once(setting: Setting, parts: Splits, names: Sequence[str]) -> str:
-    """Why already the first step is refused, whatever it begins with; empty: it is not.
+    """Which component makes too many internal steps of the first step, whatever it begins with.
 
     Args:
         setting: of the loop.
-        parts: that its step would be split into.
+        parts: that its step would be split into, some of them too many.
         names: of the components in the order in which they are stepped.
 
     """
     counts = parts._asdict()
-    for name in names:
-        n = counts.get(name, 1)
-        if n > MOST_INTERNAL_STEPS:
-            why = f"step {setting.h:g} s needs {n} internal steps; raise h_max"
-            return _stopped(name, 0.0, why)
-    return ""
+    name = next(name for name in names if counts.get(name, 1) > MOST_INTERNAL_STEPS)
+    why = f"step {setting.h:g} s needs {counts[name]} internal steps; raise h_max"
+    return _stopped(name, 0.0, why)
 
 
 def refused(setting: Setting, plan: Plan, k: int, moment: Moment, names: Sequence[str]) -> str:
@@ -143,7 +140,8 @@ class _Step:
 
 
 def _plant(setting: Setting, state: Any, rotation: Any) -> _Result:
-    seen = plant.outputs(setting.plant, state, rotation)
+    known = setting.plant
+    seen = plant.outputs(state, rotation, known.ell, known.roll.rolls, known.current)
     return state, {**_named("y", AXES, seen.y), **_named("dy", AXES, seen.dy)}
 
 

@@ -79,7 +79,9 @@ def _are_numbers(value: Any) -> bool:
 
 #: What the table of a figure may hold, in the order of the reference page.
 ENTRIES: Mapping[str, Entry] = {
-    "kind": Entry(f"name out of {', '.join(KINDS)}", KINDS.__contains__, "What it is.", ""),
+    "kind": Entry(
+        f"name out of {', '.join(KINDS)}", lambda value: value in tuple(KINDS), "What it is.", ""
+    ),
     "x": Entry(
         "name, or list of names",
         _are_names,

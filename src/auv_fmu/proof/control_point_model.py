@@ -80,18 +80,31 @@ class ActuatedDynamics:
         return np.array([0.0, self.vehicle.righting_pitch * np.sin(theta), 0.0])
 
     def C_1_bar(self, v: Matrix) -> Matrix:
-        """Centripetal and Coriolis forces of (7) in sway and heave, (2,) [N].
+        """Centripetal and Coriolis matrix of (8), (2, 3), at v = (u, q, r) [m/s, rad/s].
 
-        (8) prints a matrix of three columns that multiplies v = (u, q, r) and holds m11 u; the
-        product is (m11 u r, -m11 u q), as in (2).
+        It multiplies v: (7) prints w behind it, for which it has a column too many, and (2) has the
+        product (m11 u r, -m11 u q).
         """
-        u, q, r = v
-        return np.array([self.vehicle.m11 * u * r, -self.vehicle.m11 * u * q])
+        m11_u = self.vehicle.m11 * v[0]
+        return np.array([[0.0, 0.0, m11_u], [0.0, -m11_u, 0.0]])
 
 
 def J(theta: float, psi: float, ell: float) -> Matrix:
     """The Jacobian (11) as a matrix, (3, 3)."""
     return np.column_stack(jacobian(rotation_from_euler(0.0, theta, psi), ell))
+
+
+def J_delta(theta: float, psi: float, w: Matrix) -> Matrix:
+    """J_delta(eta, w) of (12), (3,): what sway and heave w = (v, w) [m/s] add to dy/dt."""
+    return kinematic_disturbance(theta, psi, w)[:3]
+
+
+def drift(ell: float) -> Matrix:
+    """The derivative of J^-1 J_delta by w, (3, 2) [1/m].
+
+    J^-1 J_delta = (0, -w / ell, v / ell) at every attitude, so its derivative by eta is zero.
+    """
+    return np.array([[0.0, 0.0], [0.0, -1.0 / ell], [1.0 / ell, 0.0]])
 
 
 def J_dot(theta: float, psi: float, dtheta: float, dpsi: float, ell: float) -> Matrix:
@@ -124,17 +137,17 @@ def G_2(vehicle: Vehicle, theta: float, psi: float, ell: float) -> Matrix:
 
 
 def C_2(vehicle: Vehicle, theta: float, psi: float, dy: Matrix, ell: float) -> Matrix:
-    """C_2 = -J^-T M_1 J^-1 dJ/dt J^-1 of (15), (3, 3) [kg/s].
+    """C_2 = -J^-T M_1 J^-1 dJ/dt J^-1 of (15), (3, 3) [kg/s], linear in a velocity.
 
-    C_2(eta, dy) has no sway and heave to turn by: the (u, q, r) that dJ/dt is taken at are those of
-    (13) with J_delta left out. With v and w the attitude turns differently, and P2.2 holds only for
-    the rate of M_2 that leaves them out too, which is how it is tested.
+    Along a motion dJ/dt follows from (u, q, r) = J^-1 (dy - J_delta), so C_2 stands at the velocity
+    dy - J_delta there. The paper writes C_2(eta, dy), and works with it as a function that is
+    linear in dy: at that velocity sway and heave are left out of the rate of J.
 
     Args:
         vehicle: parameters.
         theta, psi: pitch and yaw [rad].
         dy: velocity of the control point [m/s]; the attitude turns as (4) says for
-            (u, q, r) = J^-1 dy, without sway and heave.
+            (u, q, r) = J^-1 dy.
         ell: distance of the control point [m].
 
     """
@@ -142,3 +155,76 @@ def C_2(vehicle: Vehicle, theta: float, psi: float, dy: Matrix, ell: float) -> M
     *_, dtheta, dpsi = kinematic_matrix(theta, psi) @ J_inverse @ dy
     rate = J_dot(theta, psi, dtheta, dpsi, ell)
     return -J_inverse.T @ ActuatedDynamics(vehicle).M_1 @ J_inverse @ rate @ J_inverse
+
+
+def d(vehicle: Vehicle, theta: float, psi: float, w: Matrix, dy: Matrix, ell: float) -> Matrix:
+    """d(eta, w, dy) as printed below (15), (3,) [N], without its term in d(J^-1 J_delta)/d eta = 0.
+
+    Args:
+        vehicle: parameters.
+        theta, psi: pitch and yaw [rad].
+        w: sway and heave (v, w) [m/s].
+        dy: velocity of the control point [m/s].
+        ell: distance of the control point [m].
+
+    """
+    model = ActuatedDynamics(vehicle)
+    J_inverse: Matrix = np.linalg.inv(J(theta, psi, ell))
+    v, v_delta = J_inverse @ dy, drift(ell) @ w
+    coriolis = model.C_1_bar(v) @ v - 2.0 * model.C_1_bar(v_delta) @ v
+    force: Matrix = J_inverse.T @ (model.C_1(w) @ v + _forced_drift(model, coriolis, ell))
+    return force
+
+
+def d_missing(
+    vehicle: Vehicle, theta: float, psi: float, w: Matrix, dy: Matrix, ell: float
+) -> Matrix:
+    """What d of (15) lacks, (3,) [N]: linear in dy, and zero without sway and heave.
+
+    C_1_bar(v) v at v = J^-1 dy - J^-1 J_delta is expanded below (14) as if C_1_bar(a) b were
+    C_1_bar(b) a. (It has C_1_bar(J^-1 J_delta) = 0, so that the mixed terms as printed vanish.) And
+    C_2(eta, dy) turns the attitude by dy, not by dy - J_delta.
+
+    Args:
+        vehicle, theta, psi, w, dy, ell: as for :func:`d`.
+
+    """
+    model = ActuatedDynamics(vehicle)
+    J_inverse: Matrix = np.linalg.inv(J(theta, psi, ell))
+    v, v_delta = J_inverse @ dy, drift(ell) @ w
+    coriolis = model.C_1_bar(v_delta) @ v - model.C_1_bar(v) @ v_delta
+    turning = C_2(vehicle, theta, psi, J_delta(theta, psi, w), ell) @ dy
+    force: Matrix = J_inverse.T @ _forced_drift(model, coriolis, ell) - turning
+    return force
+
+
+def tau_w2(
+    vehicle: Vehicle,
+    theta: float,
+    psi: float,
+    w: Matrix,
+    tau_w1: Matrix,
+    tau_w1_bar: Matrix,
+    ell: float,
+) -> Matrix:
+    """tau_w2(eta, w, t) of (15), (3,) [N].
+
+    Args:
+        vehicle, theta, psi, w, ell: as for :func:`d`.
+        tau_w1: disturbance of (6), in u, q, r [N, N.m].
+        tau_w1_bar: disturbance of (7), in v, w [N].
+
+    """
+    model = ActuatedDynamics(vehicle)
+    v_delta = drift(ell) @ w
+    unactuated = model.D_1_bar @ w + tau_w1_bar + model.C_1_bar(v_delta) @ v_delta
+    actuated = tau_w1 - model.C_1(w) @ v_delta - model.D_1 @ v_delta
+    J_inverse: Matrix = np.linalg.inv(J(theta, psi, ell))
+    force: Matrix = J_inverse.T @ (actuated + _forced_drift(model, unactuated, ell))
+    return force
+
+
+def _forced_drift(model: ActuatedDynamics, force: Matrix, ell: float) -> Matrix:
+    """M_1 d(J^-1 J_delta)/dw M_1_bar^-1 times a force in sway and heave, (3,) [N, N.m]."""
+    forced: Matrix = model.M_1 @ drift(ell) @ np.linalg.solve(model.M_1_bar, force)
+    return forced

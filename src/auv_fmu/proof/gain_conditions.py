@@ -1,14 +1,16 @@
 """The gain conditions of Theorem 1, (30) to (32), and of Theorem 2, (52) to (54).
 
-The zetas of (26) and (29) bound what the paper leaves unknown. Every condition is therefore
-stated without them: the left side, the known part of the right side, and the room that is left
-for the zetas. A condition with no room is violated whatever they are.
+The zetas of (26) and (29) bound what the paper leaves unknown, and :mod:`.zetas` bounds them from
+below. So a condition is stated as its left side, the known part of the right side, and what the
+zetas take at least. It is violated if they take more than there is, met if it has none, open
+otherwise.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+from auv_fmu.proof.zetas import Zetas
 from auv_fmu.types import Vector3
 from auv_fmu.vehicle import Vehicle
 
@@ -27,25 +29,31 @@ class Bounds(NamedTuple):
 
 
 class Condition(NamedTuple):
-    """One inequality left > right + (unknown zetas)."""
+    """One inequality left > right + zetas."""
 
     number: str  #: of the equation
     statement: str  #: as the paper writes it
     left: float
     right: float  #: without the zetas
-    zetas: str  #: what is left out on the right; empty: nothing
+    zetas: str  #: their term on the right; empty: none
+    least: float  #: what that term is at least
 
     @property
-    def margin(self) -> float:
-        """What is left for the zetas; the condition is violated for certain if not positive."""
+    def room(self) -> float:
+        """What is there for the zetas."""
         return self.left - self.right
 
     @property
+    def margin(self) -> float:
+        """What is left at most; the condition is violated for certain if it is not positive."""
+        return self.room - self.least
+
+    @property
     def verdict(self) -> str:
-        """What can be said without the zetas."""
+        """What is known for certain."""
         if self.margin <= 0.0:
             return "violated"
-        return f"holds if {self.zetas} < {self.margin:.4g}" if self.zetas else "holds"
+        return "open" if self.zetas else "met"
 
 
 def bounds(vehicle: Vehicle, ell: float) -> Bounds:
@@ -62,12 +70,19 @@ def bounds(vehicle: Vehicle, ell: float) -> Bounds:
 
 
 def conditions(
-    known: Bounds, K1: Vector3, K2: Vector3, lambda_: float, k_d: float, maximum_slope: float
+    known: Bounds,
+    zetas: Zetas,
+    K1: Vector3,
+    K2: Vector3,
+    lambda_: float,
+    k_d: float,
+    maximum_slope: float,
 ) -> tuple[Condition, Condition, Condition]:
     """(52) to (54), which for tanh, with s'_MM = 1, are (30) to (32).
 
     Args:
         known: eigenvalues of M_2 and D_2.
+        zetas: what they are at least.
         K1, K2: diagonals of K_1 and K_2 [N].
         lambda_: diagonal entry of Lambda [m/s].
         k_d: gain of the observer [1/s].
@@ -82,6 +97,7 @@ def conditions(
             min(K2) * lambda_,
             0.5 * k_2 * lambda_ + k_2,
             "",
+            0.0,
         ),
         Condition(
             "(31), (53)",
@@ -89,6 +105,7 @@ def conditions(
             known.lambda_d2,
             maximum_slope * k_1 + 0.5 * k_2,
             "0.5 (zeta_1 + zeta_2)",
+            0.5 * zetas.zeta_1_2,
         ),
         Condition(
             "(32), (54)",
@@ -96,5 +113,6 @@ def conditions(
             k_d,
             (2.0 * maximum_slope * k_1 + k_2) / known.lambda_m2,
             "0.5 (zeta_3 + zeta_4) / lambda_m2",
+            0.5 * zetas.zeta_3_4 / known.lambda_m2,
         ),
     )

@@ -82,16 +82,19 @@ def test_command_does_the_work_of_the_force(euler, force, ell):
     np.testing.assert_allclose(actuator_command(rotation, force, ell), expected, atol=1e-12)
 
 
-def test_velocity_is_the_derivative_of_the_position_of_a_rolling_vehicle():
+def test_velocity_is_the_derivative_of_the_position_of_a_vehicle_that_rolls_in_a_current():
     """(10) with the full rotation against a central difference of (9) along a motion."""
     nu, h = (0.8, -0.3, 0.2, 0.7, -0.5, 0.9), 1e-5
-    parameters = Parameters(eta0=(1.0, 2.0, 3.0, 0.9, -0.6, 2.0), nu0=nu)
+    current = (0.3, -0.4, 0.2)
+    parameters = Parameters(eta0=(1.0, 2.0, 3.0, 0.9, -0.6, 2.0), nu0=nu, current=current)
     undriven = (0.0,) * 3
     state, rotation = begin(parameters, undriven)
 
     def moved_y(dt):
         moved = steps(parameters, state, rotation, undriven, (0.0,) * 6, dt, 1)
-        return outputs(parameters, *moved).y
+        return outputs(*moved, 0.35, True, current).y
 
     difference = np.subtract(moved_y(h), moved_y(-h)) / (2 * h)
-    np.testing.assert_allclose(outputs(parameters, state, rotation).dy, difference, atol=1e-8)
+    np.testing.assert_allclose(
+        outputs(state, rotation, 0.35, True, current).dy, difference, atol=1e-8
+    )

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu import observer
+from auv_fmu import observer, output_feedback
+from auv_fmu.output_feedback import Gains, virtual_velocity
 from auv_fmu.saturation import hyperbolic_tangent
 from support.strategies import speeds, vectors
 
@@ -61,6 +62,18 @@ def test_observer_is_the_one_of_the_proof(y, y_hat, dy, dy_hat_o, ddy_r):
 
     rate = (dy_o(h) - dy_o(-h)) / (2 * h) - ddy_r
     np.testing.assert_allclose(rate, k_d * (dy - dy_o(0.0)), rtol=1e-6, atol=1e-4)
+
+
+def test_24_starts_from_dy_r():
+    """At t = 0 the integral in (24) is empty: what is left is dy_r, and not zero as printed below.
+
+    Fig. 4 at its start: a reference at rest, and a control point that is 6.6 m away.
+    """
+    state, y_d = output_feedback.initial_state(Gains(), (2.35, 6.0, 0.0)), (0.35, 0.0, -2.0)
+    e_z = np.subtract(state.y_hat, y_d)
+    dy_r = virtual_velocity((0.0, 0.0, 0.0), s(e_z), 1.0)
+    assert state.dy_hat_o == (0.0, 0.0, 0.0)
+    np.testing.assert_allclose(dy_r, -np.tanh([2.0, 6.0, 2.0]))
 
 
 def test_state_of_the_observer_is_equation_24():

@@ -104,7 +104,9 @@ def moved(state, tau, tau_w, h, parameters=PARAMETERS, n=1):
 
 
 def seen(state, parameters=PARAMETERS):
-    return plant.outputs(parameters, state, rotation_from_quaternion(state.quaternion))
+    rotation = rotation_from_quaternion(state.quaternion)
+    rolls, current = parameters.roll.rolls, parameters.current
+    return plant.outputs(state, rotation, parameters.ell, rolls, current)
 
 
 def test_surge_under_constant_force_follows_the_analytic_solution_of_euler():

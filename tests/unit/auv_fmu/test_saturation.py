@@ -1,6 +1,6 @@
 """Definition 2 and Lemma 1."""
 
-from math import cosh, log
+from math import cosh, log, tanh
 
 import numpy as np
 import pytest
@@ -106,6 +106,12 @@ def test_lemma_1_iv_to_vi(name, x, k, psi):
     values = np.array(saturation(SATURATIONS[name], x)[0])
     left = np.array(x) @ np.diag(psi) @ values
     assert left >= min(psi) * (values @ values) * (1 - ROUNDING)
+
+
+def test_lemma_1_as_printed_fails():
+    """(vi) without its square for 2 tanh(xi), s'_M = 2; (i) for ln(cosh(xi)) at k_1 = 2."""
+    assert (2.0 * tanh(0.1)) ** 2 > 2.0 * 0.1**2
+    assert tanh(2.0 * 0.1) ** 2 / (2.0 * 2.0) > log(cosh(0.1))
 
 
 @every

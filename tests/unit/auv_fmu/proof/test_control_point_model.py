@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import control_point_velocity
@@ -13,9 +14,14 @@ from auv_fmu.proof.control_point_model import (
     M_2,
     ActuatedDynamics,
     J,
+    J_delta,
     J_dot,
+    d,
+    d_missing,
+    drift,
     kinematic_disturbance,
     kinematic_matrix,
+    tau_w2,
 )
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 from support.strategies import angles, forces, lengths, pitch_angles, speeds, vectors
@@ -43,7 +49,7 @@ def test_equations_6_and_7_are_equation_2(theta, nu, tau, tau_w):
         tau - MODEL.C_1(unactuated) @ actuated - MODEL.D_1 @ actuated - MODEL.G_1(theta) - tau_w1,
     )
     rate_bar = np.linalg.solve(
-        MODEL.M_1_bar, -MODEL.C_1_bar(actuated) - MODEL.D_1_bar @ unactuated - tau_w1_bar
+        MODEL.M_1_bar, -MODEL.C_1_bar(actuated) @ actuated - MODEL.D_1_bar @ unactuated - tau_w1_bar
     )
     du, dv, dw, dq, dr = accelerations(VEHICLE, nu, np.sin(theta), tau, tau_w)
     np.testing.assert_allclose(rate, [du, dq, dr], atol=1e-12)
@@ -83,6 +89,74 @@ def test_equation_14_holds_along_the_motion_of_the_vehicle(theta, psi, nu, tau):
         + MODEL.G_1(theta)
     )
     np.testing.assert_allclose(left, tau, atol=1e-4)
+
+
+def acceleration(theta, psi, nu, tau, tau_w):
+    """d2y/dt2 by (1) and (2): of R (u, v + ell r, w - ell q), by the product rule."""
+    R = np.column_stack(rotation_from_euler(0.0, theta, psi))
+    u, v, w, q, r = nu
+    dtheta, dpsi = euler_rates(theta, q, r)
+    omega = np.array([-dpsi * np.sin(theta), dtheta, dpsi * np.cos(theta)])
+    du, dv, dw, dq, dr = accelerations(VEHICLE, nu, np.sin(theta), tau, tau_w)
+    in_body = np.array([u, v + ELL * r, w - ELL * q])
+    rate = np.array([du, dv + ELL * dr, dw - ELL * dq])
+    return R @ (np.cross(omega, in_body) + rate)
+
+
+@given(
+    theta=pitch_angles,
+    psi=angles,
+    nu=vectors(speeds, 5),
+    tau=vectors(forces, 3),
+    tau_w=vectors(forces, 5),
+)
+def test_equation_15_holds_with_what_d_lacks(theta, psi, nu, tau, tau_w):
+    u, v, w, q, r = nu
+    at, unactuated = (VEHICLE, theta, psi), np.array([v, w])
+    in_body = (u, v, w, 0.0, q, r)
+    dy = np.array(control_point_velocity(rotation_from_euler(0.0, theta, psi), in_body, ELL))
+    tau_w1, tau_w1_bar = np.array(tau_w)[[0, 3, 4]], np.array(tau_w)[[1, 2]]
+    ddy = acceleration(theta, psi, nu, tau, tau_w)
+    as_printed = (
+        M_2(*at, ELL) @ ddy
+        + C_2(*at, dy, ELL) @ dy
+        + D_2(*at, ELL) @ dy
+        + d(*at, unactuated, dy, ELL)
+        + G_2(*at, ELL)
+        + tau_w2(*at, unactuated, tau_w1, tau_w1_bar, ELL)
+    )
+    missing = d_missing(*at, unactuated, dy, ELL)
+    force = np.linalg.solve(J(theta, psi, ELL).T, tau)
+    scale = 1.0 + np.abs(as_printed).max() + np.abs(missing).max()
+    np.testing.assert_allclose(as_printed + missing, force, atol=1e-10 * scale)
+
+
+def test_equation_15_as_printed_lacks_a_force():
+    """Level, at u = 1 m/s and w = 0.1 m/s: m55 m11 u w / (m33 ell^3) = 43.7 N."""
+    w = np.array([0.0, 0.1])
+    missing = d_missing(VEHICLE, 0.0, 0.0, w, np.array([1.0, 0.0, 0.1]), ELL)
+    by_c_1_bar = 22.5 * 25.0 * 1.0 * 0.1 / (30.0 * ELL**3)
+    turning = C_2(VEHICLE, 0.0, 0.0, np.array([0.0, 0.0, 0.1]), ELL) @ [1.0, 0.0, 0.1]
+    np.testing.assert_allclose(missing + turning, [0.0, 0.0, -by_c_1_bar], atol=1e-12)
+
+
+@given(theta=pitch_angles, psi=angles, w=vectors(speeds, 2), dy=vectors(speeds, 3), k=speeds)
+def test_what_d_lacks_is_linear_in_dy_and_in_w(theta, psi, w, dy, k):
+    """So the proof keeps its form: the zetas grow with the bound on w of Assumption 1."""
+    w, dy = np.array(w), np.array(dy)
+    found = d_missing(VEHICLE, theta, psi, w, dy, ELL)
+    for larger in (
+        d_missing(VEHICLE, theta, psi, k * w, dy, ELL),
+        d_missing(VEHICLE, theta, psi, w, k * dy, ELL),
+    ):
+        np.testing.assert_allclose(larger, k * found, atol=1e-9 * (1 + np.abs(found).max()))
+
+
+@given(theta=pitch_angles, psi=angles, w=vectors(speeds, 2), ell=lengths)
+def test_drift_does_not_depend_on_the_attitude(theta, psi, w, ell):
+    """J^-1 J_delta, which (15) has a derivative by eta of, and by w."""
+    found = np.linalg.solve(J(theta, psi, ell), J_delta(theta, psi, np.array(w)))
+    np.testing.assert_allclose(found, drift(ell) @ w, atol=1e-12 / ell)
 
 
 @given(theta=pitch_angles, psi=angles, rates=vectors(speeds, 2), ell=lengths)
@@ -125,6 +199,19 @@ def test_p2_3_holds_for_parallel_velocities(theta, psi, dy, k):
     np.testing.assert_allclose(left, right, atol=1e-8 * (1 + np.abs(left).max()))
 
 
+def test_p2_2_fails_where_sway_and_heave_are_left_out():
+    """The true rate of M_2 less twice C_2(eta, dy), at level attitude with a sway of 0.2 m/s.
+
+    dy = J_delta: the vehicle does not turn, and M_2 is at rest, but C_2(eta, dy) is not zero. By
+    hand its symmetric part has (m66 / ell^2 - m11) v / ell.
+    """
+    dy = J_delta(0.0, 0.0, np.array([0.2, 0.0]))
+    C = C_2(VEHICLE, 0.0, 0.0, dy, ELL)
+    symmetric = -(C + C.T)
+    expected = (VEHICLE.m66 / ELL**2 - VEHICLE.m11) * 0.2 / ELL
+    assert symmetric[0, 1] == pytest.approx(expected) and expected > 55.0
+
+
 def test_p2_3_fails_for_other_velocities():
     """A counterexample to P2.3 with C_2 as printed below (15).
 
@@ -137,6 +224,105 @@ def test_p2_3_fails_for_other_velocities():
     np.testing.assert_allclose(
         C_2(VEHICLE, 0.0, 0.0, x_2, ELL) @ x_1, [0.0, -VEHICLE.m66 / ELL**3, 0.0], atol=1e-9
     )
+
+
+def test_no_c_2_has_both_p2_2_and_p2_3():
+    """P2.3 leaves one that is linear in the velocity, by polarisation, and it has not P2.2.
+
+    C(x) y = (C_2(x) y + C_2(y) x) / 2 has the product C_2(dy) dy of (15). Under surge alone M_2 is
+    at rest, so P2.2 asks for y^T C(x) y = 0: it is -m66 / (2 ell^3).
+    """
+    x, y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+
+    def C(a, b):
+        crossed = C_2(VEHICLE, 0.0, 0.0, a, ELL) @ b + C_2(VEHICLE, 0.0, 0.0, b, ELL) @ a
+        return crossed / 2.0
+
+    np.testing.assert_allclose(C_2(VEHICLE, 0.0, 0.0, x, ELL), 0.0, atol=1e-12)
+    assert y @ C(x, y) == pytest.approx(-VEHICLE.m66 / (2.0 * ELL**3))
+
+
+@given(theta=pitch_angles, psi=angles, x=vectors(speeds, 3), y=vectors(speeds, 3))
+def test_christoffel_symbols_have_both_p2_2_and_p2_3(theta, psi, x, y):
+    """<C(x) y, z> = (D_x M(y, z) + D_y M(x, z) - D_z M(x, y)) / 2, with D M = C_2 + C_2^T.
+
+    P2.3 is its symmetry. It does the work of C_2 at z = y = x: what (15) has beside it does none.
+    """
+
+    def rate(a):
+        C = C_2(VEHICLE, theta, psi, a, ELL)
+        return C + C.T
+
+    def symbols(a, b):
+        along = np.array([a @ rate(e) @ b for e in np.eye(3)])
+        return (rate(a) @ b + rate(b) @ a - along) / 2.0
+
+    x, y = np.array(x), np.array(y)
+    product = C_2(VEHICLE, theta, psi, x, ELL) @ x
+    scale = 1.0 + np.abs(rate(x)).max() * 30.0 + np.abs(rate(y)).max() * 30.0
+    assert y @ rate(x) @ y == pytest.approx(2.0 * y @ symbols(x, y), abs=1e-9 * scale)
+    assert x @ product == pytest.approx(x @ symbols(x, x), abs=1e-9 * scale)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 80.0, 89.0])
+def test_p2_4_fails_at_the_vertical(degrees):
+    """Yaw at r = 1 / ell rolls the axes of (1) at r tan(theta): C_2 has m55 tan(theta) / ell^3."""
+    theta = np.radians(degrees)
+    starboard = np.array([0.0, 1.0, 0.0])
+    found = np.linalg.norm(C_2(VEHICLE, theta, 0.0, starboard, ELL), 2)
+    assert found >= VEHICLE.m55 * np.tan(theta) / ELL**3
+    assert found == pytest.approx(
+        np.hypot(VEHICLE.m55 * np.tan(theta), VEHICLE.m66) / ELL**3, rel=0.2
+    )
+
+
+@given(theta=angles, psi=angles, phi=angles, omega=vectors(speeds, 3), ell=lengths)
+def test_p2_4_has_no_pole_with_the_full_rotation(theta, psi, phi, omega, ell):
+    """J = R P and dJ/dt = R S(omega) P with the body's own rates: |C_2| <= lambda_M2 |omega|."""
+    R = np.column_stack(rotation_from_euler(phi, theta, psi))
+    P = J(0.0, 0.0, ell)
+    p, q, r = omega
+    S = np.array([[0.0, -r, q], [r, 0.0, -p], [-q, p, 0.0]])
+    J_inverse = np.linalg.inv(R @ P)
+    C = -J_inverse.T @ MODEL.M_1 @ J_inverse @ R @ S @ P @ J_inverse
+    lambda_M2 = max(VEHICLE.m11, VEHICLE.m55 / ell**2, VEHICLE.m66 / ell**2)
+    assert np.linalg.norm(C, 2) <= lambda_M2 * np.linalg.norm(omega) * (1.0 + 1e-9) + 1e-9
+
+
+@given(speed=st.floats(0.0, 1e6))
+def test_p2_5_fails_for_an_unbounded_velocity(speed):
+    """d(x + h) - d(x) along x = (speed, 0, 0), at one h: it grows with the speed.
+
+    d is quadratic: m66 m11 / (m22 ell^3) times the product of the velocities ahead and to the side.
+    """
+    still, h = np.zeros(2), np.array([0.0, 1.0, 0.0])
+    x = np.array([speed, 0.0, 0.0])
+    change = d(VEHICLE, 0.0, 0.0, still, x + h, ELL) - d(VEHICLE, 0.0, 0.0, still, x, ELL)
+    expected = VEHICLE.m66 * VEHICLE.m11 / (VEHICLE.m22 * ELL**3) * speed
+    np.testing.assert_allclose(change, [0.0, expected, 0.0], rtol=1e-9, atol=1e-9)
+
+
+@given(
+    theta=pitch_angles,
+    psi=angles,
+    w=vectors(speeds, 2),
+    x_1=vectors(speeds, 3),
+    x_2=vectors(speeds, 3),
+)
+def test_p2_5_holds_for_a_bounded_second_velocity(theta, psi, w, x_1, x_2):
+    """Which is all that (26) and (29) need: x_2 = dy_r there, and |dy_r| is bounded by (16).
+
+    d = L(w) dy + Q(dy) with a quadratic Q, |Q(h)| <= k |h|^2 / 2: so the change of d is
+    L(w) h + DQ(x_2) h + Q(h), within (|L(w)| + k |x_2|) |h| + k |h|^2 / 2.
+    """
+    at, w, x_1, x_2 = (VEHICLE, theta, psi), np.array(w), np.array(x_1), np.array(x_2)
+    change = np.linalg.norm(d(*at, w, x_1, ELL) - d(*at, w, x_2, ELL))
+    h = np.linalg.norm(x_1 - x_2)
+    J_inverse = np.linalg.inv(J(theta, psi, ELL))
+    of_w = np.linalg.norm(J_inverse.T @ MODEL.C_1(w) @ J_inverse, 2)
+    k = VEHICLE.m11 * max(VEHICLE.m66 / VEHICLE.m22, VEHICLE.m55 / VEHICLE.m33) / ELL**3
+    bound = (of_w + k * np.linalg.norm(x_2)) * h + k * h * h / 2.0
+    assert change <= bound * (1.0 + 1e-9) + 1e-9
 
 
 @given(theta=pitch_angles, psi=angles, x=vectors(speeds, 3), ell=lengths)

@@ -9,9 +9,11 @@ from hypothesis import strategies as st
 
 from auv_fmu.proof.control_point_model import D_2, M_2
 from auv_fmu.proof.gain_conditions import Bounds, bounds, conditions
+from auv_fmu.proof.zetas import Zetas, at_least
 from auv_fmu.vehicle import Vehicle
 from support.strategies import angles, lengths, pitch_angles
 
+NO_ZETAS = Zetas(0.0, 0.0)
 PAPER = ((10.0, 10.0, 10.0), (10.0, 10.0, 10.0), 1.0, 50.0, 1.0)
 
 
@@ -24,12 +26,13 @@ def test_bounds_are_the_extreme_eigenvalues_at_every_attitude(theta, psi, ell):
     np.testing.assert_allclose(found, known, rtol=1e-7)
 
 
-def test_the_papers_gains_miss_condition_30_and_may_meet_the_others():
-    first, second, third = conditions(bounds(Vehicle(), 0.35), *PAPER)
+def test_the_papers_gains_miss_conditions_30_and_31():
+    first, second, third = conditions(
+        bounds(Vehicle(), 0.35), at_least(Vehicle(), 0.35, 1.0), *PAPER
+    )
     assert (first.left, first.right, first.verdict) == (10.0, 15.0, "violated")
-    assert (second.left, second.right) == (30.0, 15.0)
-    assert second.verdict == "holds if 0.5 (zeta_1 + zeta_2) < 15"
-    assert (third.left, third.right) == (50.0, pytest.approx(30.0 / 25.0))
+    assert (second.left, second.right, second.room, second.verdict) == (30, 15, 15, "violated")
+    assert (third.left, third.right, third.verdict) == (50.0, pytest.approx(30.0 / 25.0), "open")
 
 
 def evaluated(formula, symbols):
@@ -38,11 +41,12 @@ def evaluated(formula, symbols):
     return eval(product, {}, symbols)
 
 
-@given(values=st.lists(st.floats(0.1, 9.0), min_size=17, max_size=17))
+@given(values=st.lists(st.floats(0.1, 9.0), min_size=19, max_size=19))
 def test_statements_are_the_conditions(values):
     """Each inequality, read as a formula, has the sides that were computed for it."""
     K_1, K_2 = values[0:3], values[3:6]
     known, (Lambda, k_d, s_MM), zetas = Bounds(*values[6:10]), values[10:13], values[13:17]
+    least = Zetas(*values[17:19])
     symbols = {
         "lambda_d2": known.lambda_d2,
         "lambda_m2": known.lambda_m2,
@@ -55,25 +59,28 @@ def test_statements_are_the_conditions(values):
         "s_MM": s_MM,
         **{f"zeta_{i}": zeta for i, zeta in enumerate(zetas, start=1)},
     }
-    found = conditions(known, K_1, K_2, Lambda, k_d, s_MM)
+    found = conditions(known, least, K_1, K_2, Lambda, k_d, s_MM)
     assert [condition.number for condition in found] == ["(30), (52)", "(31), (53)", "(32), (54)"]
     for condition in found:
         left, right = condition.statement.replace(" lambda ", " Lambda ").split(" > ")
         assert evaluated(left, symbols) == pytest.approx(condition.left)
         unknown = evaluated(f"({condition.zetas}+0.0)", symbols)
         assert evaluated(right, symbols) == pytest.approx(condition.right + unknown)
+        of_least = {"zeta_1": least.zeta_1_2, "zeta_3": least.zeta_3_4, "zeta_2": 0, "zeta_4": 0}
+        unknown = evaluated(f"({condition.zetas}+0.0)", symbols | of_least)
+        assert unknown == pytest.approx(condition.least)
 
 
 def test_condition_30_can_be_met_by_a_larger_lambda():
     """K2 lambda > 0.5 K2 lambda + K2 for equal gains means lambda > 2."""
     known = bounds(Vehicle(), 0.35)
     K1, K2, _, k_d, slope = PAPER
-    assert conditions(known, K1, K2, 2.0, k_d, slope)[0].verdict == "violated"
-    assert conditions(known, K1, K2, 2.01, k_d, slope)[0].verdict == "holds"
+    assert conditions(known, NO_ZETAS, K1, K2, 2.0, k_d, slope)[0].verdict == "violated"
+    assert conditions(known, NO_ZETAS, K1, K2, 2.01, k_d, slope)[0].verdict == "met"
 
 
 def test_theorem_2_weighs_k1_with_the_largest_slope():
     known = bounds(Vehicle(), 0.35)
-    _, second, third = conditions(known, *PAPER[:-1], 2.0)
+    _, second, third = conditions(known, NO_ZETAS, *PAPER[:-1], 2.0)
     assert second.right == 2.0 * 10.0 + 0.5 * 10.0
     assert third.right == pytest.approx((2.0 * 2.0 * 10.0 + 10.0) / 25.0)

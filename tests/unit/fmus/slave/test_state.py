@@ -88,11 +88,13 @@ SPOILED = {
     "state of truth values": ("state", lambda saved: [[True] * 3, *saved["state"][1:]]),
     "state out of bounds": ("state", lambda saved: [[1e120, 0.0, 0.0], *saved["state"][1:]]),
     "zero quaternion": ("state", lambda saved: [
-        saved["state"][0], [0.0] * 4, saved["state"][2],
+        saved["state"][0], [0.0] * 4, *saved["state"][2:],
     ]),
     "long quaternion": ("state", lambda saved: [
-        saved["state"][0], [1.0, 0.0, 1.0, 0.0], saved["state"][2],
+        saved["state"][0], [1.0, 0.0, 1.0, 0.0], *saved["state"][2:],
     ]),
+    "force beyond its limit": ("state", lambda saved: [*saved["state"][:-1], [1e6, 0.0, 0.0]]),
+    "force of another state": ("state", lambda saved: [*saved["state"][:-1], [1.0, 0.0, 0.0]]),
     "generator of another version": ("hidden", with_generator(0, 2)),
     "generator of no version": ("hidden", with_generator(0, "three")),
     "generator too short": ("hidden", with_generator(1, lambda numbers: numbers[:-2])),
@@ -250,6 +252,31 @@ def test_run_continued_from_a_state_is_the_same_run_bit_for_bit(driver, serialis
         other.slave._set_fmu_state(saved)
         other.time = time
         assert other.run(50, 100) == expected
+
+
+#: What is not in the paper, in a run of AuvPlant.
+ADDITIONS = {"roll": False, "current__x": 0.3, "actuator__T__u": 0.2, "actuator__T__q": 1e-3}
+
+
+def test_state_of_a_vehicle_with_additions_continues_bit_for_bit_too():
+    driver = ClassInstance("AuvPlant", **ADDITIONS)
+    driver.run(0, 50)
+    saved, time = json.loads(json.dumps(driver.slave._get_fmu_state())), driver.time
+    expected = driver.run(50, 100)
+    other = ClassInstance("AuvPlant")
+    other.slave._set_fmu_state(saved)
+    other.time = time
+    assert other.run(50, 100) == expected
+
+
+def test_state_that_rolls_is_none_of_a_vehicle_that_does_not():
+    driver = ClassInstance("AuvPlant")
+    driver.run(0, 50)
+    saved = driver.slave._get_fmu_state()
+    other = ClassInstance("AuvPlant", **ADDITIONS)
+    other.slave._set_fmu_state({**saved, "parameters": {**saved["parameters"], "roll": False}})
+    assert other.get("fault") is True
+    assert "its roll, which is held at zero, is not zero" in other.messages()[0]
 
 
 def test_state_holds_parameters_faults_and_inputs(driven):

@@ -19,8 +19,12 @@ def result() -> Result:
     return simulate("fig4", stop_time=0.1)
 
 
-def test_package_shows_its_three_names():
-    assert set(orchestrator.__all__) == {"Result", "load", "simulate"} <= set(dir(orchestrator))
+def test_package_shows_its_four_names():
+    assert (
+        set(orchestrator.__all__)
+        == {"Result", "load", "simulate", "sweep"}
+        <= set(dir(orchestrator))
+    )
     assert not hasattr(orchestrator, "nothing")
 
 

@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
+from auv_fmu.vehicle import Vehicle, accelerations
 from orchestrator.analysis.signals import APPLIED, THETA_HAT, Y_D
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observer import Header
 from orchestrator.master.table import Table
 from orchestrator.paper import claims
 from orchestrator.paper.claims import CLAIMS, Claim
-from orchestrator.paper.measures import largest_error_after, total_variation_until, turning_radius
+from orchestrator.paper.measures import (
+    Way,
+    largest_error_after,
+    total_variation_until,
+    turning_radius,
+    way_of,
+)
 from orchestrator.paper.outcomes import Outcome
 from orchestrator.system.names import PortName
 
@@ -179,6 +189,61 @@ def test_largest_error_forgets_the_start():
     assert claims.gradual_degradation_on_the_way(*runs[::-1]).verdict == "**differs**"
 
 
+def arriving(force, steps=10):
+    """A vehicle that pushes all the while until the reference is 0.5 m away, 20 s a step."""
+    offsets = np.array([30.0] * steps + [0.5])
+    table = still(offsets)
+    columns = {name.replace(".", "__"): table[name] for name in table.columns}
+    pushes = {"plant__tau_applied__u": np.broadcast_to(force, steps + 1)}
+    return table_of(table.time, dict(table.parameters), **columns, **pushes)
+
+
+@given(arrays(float, 11, elements=st.floats(-80.0, 80.0)))
+def test_no_force_has_less_effort_than_its_impulse_takes(force):
+    """The effort by its definition, (59) without 1/T_f; the first row ends no step."""
+    found = way_of(arriving(force))
+    assert found.duration == 200.0
+    effort = np.sqrt(20.0 * np.sum(force[1:] ** 2))
+    assert found.least_effort <= effort * (1.0 + 1e-12) + 1e-12
+
+
+def test_a_constant_force_has_the_least_effort():
+    """5 N for 200 s: 1,000 N.s, 5 sqrt(200) N.s^0.5; half the effort takes four times as long."""
+    found = way_of(arriving(5.0))
+    assert found.impulse == pytest.approx(1000.0)
+    assert found.least_effort == pytest.approx(5.0 * np.sqrt(200.0))
+    assert found.soonest(found.least_effort / 2.0) == pytest.approx(800.0)
+
+
+@given(st.lists(st.floats(0.0, 80.0), min_size=50, max_size=200))
+def test_a_way_against_damping_takes_an_impulse_of_its_own(forces):
+    """Straight on from rest, by (2): d11 times the way, and what the speed at its end takes.
+
+    31 m against 30 kg/s are 930 N.s, which an effort of 130 N.s^0.5 gives in 51 s at the soonest.
+    """
+    h, u, x, vehicle = 0.02, 0.0, 0.0, Vehicle()
+    for force in forces:
+        du, *_ = accelerations(vehicle, (u, 0.0, 0.0, 0.0, 0.0), 0.0, (force, 0.0, 0.0), (0.0,) * 5)
+        x, u = x + h * u, u + h * du
+    impulse, duration = h * sum(forces), h * len(forces)
+    assert impulse == pytest.approx(vehicle.d11 * x + vehicle.m11 * u)
+    effort = np.sqrt(h * np.sum(np.square(forces)))
+    assert Way(duration, vehicle.d11 * x).least_effort <= effort * (1.0 + 1e-12) + 1e-12
+    assert Way(0.0, vehicle.d11 * 31.0).soonest(130.0) == pytest.approx(51.0, abs=0.5)
+
+
+def test_efforts_are_held_against_the_impulse_of_the_way():
+    """1,000 N.s in 200 s: 71 N.s^0.5, which 130 and 235 exceed; 4,000 N.s take 283."""
+    enough, short = outcome(arriving(5.0)), outcome(arriving(20.0))
+    assert claims.effort_of_the_way(enough, enough).verdict.startswith("agrees")
+    found = claims.effort_of_the_way(enough, short)
+    assert found.ours.startswith("1000 N·s in 200 s, and 4000 N·s in 200 s")
+    assert "not below 70.7, 283 N" in found.ours
+    assert found.verdict.startswith("**differs**")
+    away = outcome(still(np.array([9.0, 8.0])))
+    assert claims.effort_of_the_way(away, enough).verdict == "none"
+
+
 def estimating(largest, **metrics):
     estimates = {k.replace(".", "__"): 0.5 for k in THETA_HAT} | {
         "controller__theta_hat[2]": largest
@@ -213,10 +278,17 @@ def test_intolerable_chattering_is_not_said_to_be_seen_where_it_is_not():
     assert claims.intolerable_chattering(rough).verdict == "agrees"
 
 
-def test_gains_of_the_paper_miss_30():
-    """Reading 10: lambda_min(K_2 Lambda) = 10 is not above 0.5 10 1 + 10 = 15."""
-    found = claim_of(claims.gains_meet_the_condition).finding([])
-    assert found.ours == "10, needed: above 15"
+def test_gains_of_the_paper_miss_30_and_31():
+    """Reading 10: lambda_min(K_2 Lambda) = 10 is not above 15, nor lambda_d2 = 30 above 192."""
+    found = claim_of(claims.gains_meet_the_conditions).finding([])
+    assert found.ours.startswith("violated, violated, open: (30) 10, needed above 15; (31) 30,")
+    assert found.verdict.startswith("**differs**")
+
+
+def test_no_gains_make_the_region_arbitrarily_large():
+    """2 lambda_d2 / (m11 m66 / (m22 ell^3)) = 0.12."""
+    found = claim_of(claims.region_is_arbitrarily_large).finding([])
+    assert "lambda_d2 > 124.9, which is 30; (42) holds for |x| < 0.12 at most" in found.ours
     assert found.verdict.startswith("**differs**")
 
 

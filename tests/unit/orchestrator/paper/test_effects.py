@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.master.table import Table
 from orchestrator.paper import effects
-from orchestrator.paper.effects import EFFECTS, NOISE_LEVELS, show_effect
+from orchestrator.paper.effects import EFFECTS, LAMBDAS, NOISE_LEVELS, STEPS, show_effect
 from orchestrator.paper.outcomes import Outcome, Outcomes
 
 
@@ -66,6 +66,22 @@ def test_order(tables):
     assert "proposed 3 in Gauss-Seidel order and 6 in Jacobi order; PD 9 and 408." in shown.text
 
 
+def test_step(tables):
+    """The proposed controller moves by 5 %; tau_q of the PD controller falls from 8 to 5."""
+    proposed = [{"l2_effort": (100.0 - 5.0 * (i > 0), 1.0, 2.0)} for i in range(len(STEPS))]
+    pd = [{"l2_effort": (9.0, 8.0 - i, 7.0)} for i in range(len(STEPS))]
+    shown = effects.step(*made(tables["effect-step"], *proposed, *pd))
+    assert "in tau_q is 8, 7, 6, 5 N·m·√s" in shown.text
+    assert "change by 5 % at most" in shown.text
+    [line, *_] = shown.figure.axes[0].lines
+    assert dict(zip(*line.get_data(), strict=True)) == {
+        0.02: 100.0,
+        0.01: 95.0,
+        0.005: 95.0,
+        0.002: 95.0,
+    }
+
+
 def test_noise(tables):
     def metrics(level):
         # 1 mm: peaks of 1; 1 cm: peaks of 10.
@@ -76,6 +92,23 @@ def test_noise(tables):
     assert "at 1 N; 1, 1 N·m; 1 cm drives them to 10 N; 10, 10 N·m, and 1 %" in shown.text
     [line, *_] = shown.figure.axes[0].lines
     np.testing.assert_allclose(line.get_xdata(), line.get_ydata(), atol=1e-8)
+
+
+def test_condition_30(tables):
+    """A peak of 10 lambda, and an error of 1 / lambda."""
+    runs = [
+        {
+            "peak_command": (10.0 * value, value, value),
+            "final_error": (1.0 / value,) * 3,
+            "saturated_fraction": (0.0, 0.01 * value, 0.0),
+        }
+        for value in LAMBDAS
+    ]
+    shown = effects.condition_30(*made(tables["effect-lambda"], *runs))
+    assert "the peaks are 10 N; 1, 1 N·m at the paper's lambda = 1 and 21 N; 2.1" in shown.text
+    assert "where 2.1 % of the steps saturate; e_f falls from 1, 1, 1 to 0.476" in shown.text
+    [line, *_] = shown.figure.axes[0].lines
+    np.testing.assert_allclose(line.get_ydata(), 10.0 * line.get_xdata())
 
 
 def test_saturation(tables):

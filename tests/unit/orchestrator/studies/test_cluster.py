@@ -21,6 +21,7 @@ pytest.importorskip("distributed", reason="needs the extra `studies`")
 from dask import config
 
 from orchestrator.errors import InputError
+from orchestrator.studies import cluster
 from orchestrator.studies.cluster import FATAL, making
 
 
@@ -45,6 +46,17 @@ def test_runs_are_taken_as_they_are_needed():
     with making(Toy(0.2), (run(next(taken)) for _ in count()), workers=2) as blocks:
         next(blocks)
         assert next(taken) < 20
+
+
+def test_runs_that_take_longer_than_those_before_come_in_smaller_blocks(monkeypatch):
+    monkeypatch.setattr(cluster, "_SECONDS", 0.2)
+    slow, longest = 0.05, 0.4
+    runs = [run(number, {"toy.seconds": slow * (number >= 300)}) for number in range(360)]
+    with making(Toy(), runs, workers=2) as blocks:
+        made = list(blocks)
+    assert numbers_and_squares(made) == expected(runs)
+    for block in made:
+        assert sum(outcome.number >= 300 for outcome in block) <= longest / slow + 1
 
 
 def test_a_worker_that_is_killed_costs_no_run():

@@ -1,0 +1,188 @@
+"""What the paper leaves open of the runs behind its printed table, and how it can be filled in.
+
+Section 4.2 prints twelve numbers. What made them is not all said: each :class:`Choice` is one thing
+that is not, or that is printed so that another meaning can be thought of. Where an option
+contradicts what is printed, it says what.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from auv_fmu.disturbance import Disturbance
+from auv_fmu.euler import STEP
+from auv_fmu.motion_planner import TAU_D
+from auv_fmu.vehicle import Vehicle
+from orchestrator.master.experiment import ORDERS
+from orchestrator.studies.engine import Run
+
+#: The scenarios of the two columns of the table.
+PROPOSED, PD = "fig5", "fig5-pd"
+
+#: End times that are looked at [s].
+END_TIMES = tuple(map(float, range(20, 201)))
+
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
+class Option(NamedTuple):
+    """One way to fill something in.
+
+    Attributes:
+        text: what it is.
+        parameters: that it sets, by `component.parameter`.
+        against: what is printed that it contradicts; empty for none.
+        order: of evaluation, if it sets that.
+
+    """
+
+    text: str
+    parameters: Mapping[str, Any] = _NOTHING
+    against: str = ""
+    order: str = ""
+
+
+class Choice(NamedTuple):
+    """Something that the paper leaves open.
+
+    Attributes:
+        name: what it is.
+        options: ways to fill it in.
+        ours: which of them the scenarios have.
+        of_proposed: whether it is the proposed controller's alone.
+
+    """
+
+    name: str
+    options: tuple[Option, ...]
+    ours: int = 0
+    of_proposed: bool = False
+
+
+_WAVES = Disturbance()
+
+#: What the reference's surge force drives it at, straight on [m/s].
+_UNDER_WAY = TAU_D[0] / Vehicle().d11
+
+#: Choices that a run depends on.
+OF_RUNS = (
+    Choice(
+        "eps_t of the proposed controller",
+        (Option("10, as for PD"), Option("1, as for Fig. 4", {"controller.eps_t": 1.0})),
+        of_proposed=True,
+    ),
+    Choice(
+        "observer",
+        (Option("(51)"), Option("(24), integral from zero", {"controller.observer": "integral"})),
+        of_proposed=True,
+    ),
+    Choice(
+        "start",
+        (
+            Option("(2, 6, 0), the reference at z = -30 m"),
+            Option("the origin", {"plant.eta0.x": 0.0, "plant.eta0.y": 0.0}, "4.1: (2, 6, 0)"),
+            Option("the reference at z = +30 m", {"planner.eta0.z": 30.0}, "4.2: z_d(0) = -30"),
+        ),
+    ),
+    Choice(
+        "noise",
+        (
+            Option("none"),
+            Option("1 mm", {"plant.noise.std": 1e-3}),
+            Option("1 cm", {"plant.noise.std": 1e-2}, "Fig. 4: no saturation"),
+        ),
+    ),
+    Choice(
+        "Jacobian",
+        (
+            Option("of the whole attitude"),
+            Option(
+                "(11) as printed",
+                {"controller.printed_jacobian": True},
+                "Fig. 5: feasible commands",
+            ),
+        ),
+    ),
+    Choice(
+        "vehicle",
+        (
+            Option("six degrees of freedom, 5 N·m rights the roll"),
+            Option("six, nothing rights the roll", {"plant.righting.roll": 0.0}),
+            Option("five", {"plant.roll": False}, "4.1: 6-DOF"),
+        ),
+    ),
+    Choice(
+        "disturbance",
+        (
+            Option("tau_w as in (2)"),
+            Option(
+                "-tau_w",
+                {"disturbance.A_f": -_WAVES.A_f, "disturbance.A_d": -_WAVES.A_d},
+                "(2): the minus of tau_w",
+            ),
+        ),
+    ),
+    Choice(
+        "theta_hat(0)",
+        (
+            Option("0"),
+            Option(
+                "1, and theta_0",
+                {f"controller.theta_0[{i}]": 1.0 for i in range(1, 5)},
+                "4.1: theta_0 = 0",
+            ),
+        ),
+    ),
+    Choice(
+        "order",
+        (
+            Option("everything at t_k"),
+            Option("Jacobi, 20 ms late", order=ORDERS[1]),
+        ),
+    ),
+    Choice(
+        "reference at t = 0",
+        (
+            Option("at rest"),
+            Option("under way, tau_ud / d11", {"planner.nu0.u": _UNDER_WAY}),
+        ),
+    ),
+)
+
+#: What the efforts are taken of: (59) speaks of "the control input".
+SIGNALS = (
+    Option("applied, (u, q, r)"),
+    Option("commanded, (u, q, r)"),
+    Option("applied, (u, r, q)", against="below (6): tau_a = (tau_u, tau_q, tau_r)"),
+)
+
+#: Choices that are left when a run is done.
+OF_READING = (
+    Choice("efforts", SIGNALS),
+    Choice(
+        "T_f",
+        tuple(Option(f"{time:g} s") for time in END_TIMES),
+        ours=END_TIMES.index(100.0),
+    ),
+)
+
+
+def options_of(choice: Choice, scenario: str) -> tuple[Option, ...]:
+    """The options of a choice in a scenario: one where it has none."""
+    if choice.of_proposed and scenario != PROPOSED:
+        return (choice.options[choice.ours],)
+    return choice.options
+
+
+def runs(scenario: str, of_runs: Sequence[Choice] = OF_RUNS) -> Iterator[Run]:
+    """A run for each combination, in the order of the choices; the last varies fastest."""
+    combinations = product(*(options_of(choice, scenario) for choice in of_runs))
+    for number, combination in enumerate(combinations):
+        parameters = {
+            name: value for option in combination for name, value in option.parameters.items()
+        }
+        order = next((option.order for option in combination if option.order), ORDERS[0])
+        yield Run(number, scenario, parameters, END_TIMES[-1], STEP, order)

@@ -1,0 +1,113 @@
+"""What Theorem 1 or 2 covers: the alphas of (40), and how far the region (33) can reach at most.
+
+The zetas are known from below only, so all that follows from them is known from above: what is
+said here to be covered by no choice is covered by none.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import NamedTuple
+
+from auv_fmu.output_feedback import Gains
+from auv_fmu.proof.gain_conditions import Bounds, Condition, bounds, conditions
+from auv_fmu.proof.zetas import Zetas, at_least, coupling
+from auv_fmu.vehicle import Vehicle
+
+
+class Alphas(NamedTuple):
+    """What alpha_1 to alpha_4, which (40) leaves of (37), are at most; two need no zetas."""
+
+    alpha_1: float
+    alpha_2: float
+    alpha_3: float
+    alpha_4: float
+
+
+class Theorem(NamedTuple):
+    """The theorem for a vehicle and its gains."""
+
+    bounds: Bounds
+    zetas: Zetas
+    conditions: tuple[Condition, Condition, Condition]
+    alphas: Alphas
+    x_at_most: float  #: |x| at which (42) may hold, at most, with these gains
+    x_of_any_gains: float  #: the same with any gains
+    zeta_of_any_gains: float  #: what 0.5 (zeta_1 + zeta_2) of (31) is at least with any gains
+    stretch: float  #: sqrt of the max in (33): |x| never exceeds this times |vartheta(0)|
+
+    @property
+    def radius(self) -> float:
+        """What the radius of the region of attraction (33) is at most; zero: it is empty."""
+        return self.x_at_most / self.stretch if min(self.alphas) > 0.0 else 0.0
+
+
+def theorem(vehicle: Vehicle, ell: float, gains: Gains, maximum_slope: float) -> Theorem:
+    """The conditions, the alphas and the region of attraction.
+
+    Args:
+        vehicle: parameters.
+        ell: distance of the control point [m].
+        gains: of the controller.
+        maximum_slope: s'_MM of its saturation function; 1 is Theorem 1.
+
+    """
+    known, zetas = bounds(vehicle, ell), at_least(vehicle, ell, gains.lambda_)
+    found = conditions(known, zetas, gains.K1, gains.K2, gains.lambda_, gains.k_d, maximum_slope)
+    k = coupling(vehicle, ell)
+    return Theorem(
+        known,
+        zetas,
+        found,
+        alphas(known, found, gains),
+        reach(found[1].room, k),
+        reach(known.lambda_d2, k),
+        0.5 * at_least(vehicle, ell, 0.0).zeta_1_2,
+        stretch(known, gains, maximum_slope),
+    )
+
+
+def alphas(known: Bounds, found: tuple[Condition, Condition, Condition], gains: Gains) -> Alphas:
+    """alpha_1 to alpha_4, defined below (40): the margins of (30) to (32), and one more.
+
+    Args:
+        known: eigenvalues of M_2.
+        found: the conditions.
+        gains: of the controller.
+
+    """
+    first, second, third = (condition.margin for condition in found)
+    return Alphas(first, first + 0.5 * max(gains.K2), second, third * known.lambda_m2)
+
+
+def reach(room: float, k: float) -> float:
+    """What |x| is at most where (42) holds, even if (26) is asked for no further than there.
+
+    (42) and alpha_m <= alpha_3 ask for 2 zeta_1 + zeta_2 (1 + |x|^2) < 2 room; a chi_1 of
+    k |x|^2 / 2 asks for zeta_1 + zeta_2 |x| >= k |x| / 2. As 1 + |x|^2 >= 2 |x|, both need
+    k |x| < 2 room.
+
+    Args:
+        room: lambda_d2 less what the gains take of it in (31) [kg/s].
+        k: coupling [kg/m].
+
+    """
+    return max(2.0 * room / k, 0.0)
+
+
+def stretch(known: Bounds, gains: Gains, maximum_slope: float) -> float:
+    """sqrt(max{lambda_u / lambda_x, lambda_max(Gamma^-1) / (2 lambda_x)}) of (46) and (33).
+
+    (33) prints min for max, but (47) has a sum over both parts of vartheta, which only the larger
+    factor bounds. Lemma 1 (i) weighs k_2 by s'_MM.
+
+    Args:
+        known: eigenvalues of M_2.
+        gains: of the controller.
+        maximum_slope: s'_MM of its saturation function.
+
+    """
+    lambda_x = 0.5 * min(min(gains.K2) / maximum_slope, known.lambda_m2)
+    lambda_u = 0.5 * max(max(gains.K2) * maximum_slope, known.lambda_M2)
+    of_theta = 0.5 / gains.gamma if gains.gamma else inf
+    return sqrt(max(lambda_u, of_theta) / lambda_x)

@@ -1,0 +1,35 @@
+"""Variants of the printed table whose numbers are known by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from orchestrator.paper.choices import END_TIMES, PD, PROPOSED, SIGNALS, Choice, Option
+from orchestrator.paper.sensitivity import PUBLISHED, Sensitivity
+
+#: A choice of both controllers, and one of the proposed alone.
+SEA = Choice("sea", (Option("calm"), Option("rough", against="4.1: calm")))
+OBSERVER = Choice("observer", (Option("slow"), Option("fast")), of_proposed=True)
+
+APPLIED, COMMANDED, EXCHANGED = range(len(SIGNALS))
+T_F = {time: i for i, time in enumerate(END_TIMES)}
+
+
+def planted(**cells):
+    """Ours is twice what is printed everywhere, but where something else is planted."""
+    numbers = {
+        PROPOSED: np.full((2, 2, len(SIGNALS), len(END_TIMES), 6), 2.0),
+        PD: np.full((2, 1, len(SIGNALS), len(END_TIMES), 6), 2.0),
+    }
+    for scenario, values in {"proposed": PROPOSED, "pd": PD}.items():
+        for where, value in cells.get(scenario, {}).items():
+            numbers[values][where] = value
+    ways = {PROPOSED: np.full((2, 2, 2), np.nan), PD: np.full((2, 1, 2), np.nan)}
+    ways[PROPOSED][0] = 40.0, 1000.0
+    ways[PROPOSED][1] = 20.0, 2000.0
+    ways[PD][0] = 16.0, 1200.0
+    return Sensitivity(
+        {scenario: values * PUBLISHED[scenario] for scenario, values in numbers.items()},
+        ways,
+        (SEA, OBSERVER),
+    )

@@ -1,0 +1,145 @@
+"""(33), (40), (42) and (47): what the theorems cover at most."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from auv_fmu.output_feedback import Gains
+from auv_fmu.proof.attraction import alphas, reach, stretch, theorem
+from auv_fmu.proof.gain_conditions import Bounds, bounds, conditions
+from auv_fmu.proof.zetas import Zetas
+from auv_fmu.vehicle import Vehicle
+from support.strategies import speeds, vectors
+
+ELL = 0.35
+#: A vehicle for which Theorem 1 may hold, and gains that meet (30).
+DAMPED, QUICK = Vehicle(d11=500.0, d55=200.0, d66=200.0), Gains(lambda_=2.1)
+positive = st.floats(0.1, 100.0)
+three = vectors(speeds, 3)
+gains = st.builds(
+    lambda k_1, k_2, lambda_, k_d: Gains((k_1,) * 3, (k_2,) * 3, lambda_, k_d),
+    *[positive] * 4,
+)
+
+
+@given(gains=gains)
+def test_alphas_are_those_below_40(gains):
+    found = theorem(Vehicle(), ELL, gains, 1.0)
+    known, zetas = found.bounds, found.zetas
+    k_1, k_2, lambda_ = gains.K1[0], gains.K2[0], gains.lambda_
+    expected = (
+        k_2 * lambda_ - 0.5 * k_2 * lambda_ - k_2,
+        k_2 * lambda_ - 0.5 * k_2 * lambda_ - 0.5 * k_2,
+        known.lambda_d2 - k_1 - 0.5 * k_2 - 0.5 * zetas.zeta_1_2,
+        gains.k_d * known.lambda_m2 - 2.0 * k_1 - k_2 - 0.5 * zetas.zeta_3_4,
+    )
+    assert found.alphas == pytest.approx(expected)
+
+
+@given(
+    t_ez=three,
+    t_z=three,
+    r_1=three,
+    r_2=three,
+    gains=gains,
+    damping=vectors(positive, 3),
+    inertia=vectors(positive, 3),
+)
+def test_alphas_bound_what_is_known_of_37(t_ez, t_z, r_1, r_2, gains, damping, inertia):
+    """The terms of (37) without chi, xi and theta, for any D_2 and M_2, against (40).
+
+    Tanh(e - z) and Tanh(z) are any vectors here.
+    """
+    t_ez, t_z, r_1, r_2 = map(np.array, (t_ez, t_z, r_1, r_2))
+    k_1, k_2, lambda_ = gains.K1[0], gains.K2[0], gains.lambda_
+    pulled = k_1 * np.tanh(r_1 - r_2)
+    exact = (
+        -k_2 * lambda_ * (t_ez @ t_ez + t_z @ t_z - t_ez @ t_z)
+        - r_1 @ (damping * r_1)
+        - gains.k_d * r_2 @ (inertia * r_2)
+        - (r_1 + r_2) @ pulled
+        - k_2 * (r_1 @ t_z + 2.0 * r_2 @ t_ez)
+    )
+    known = Bounds(min(inertia), max(inertia), min(damping), max(damping))
+    found = alphas(known, conditions(known, Zetas(0.0, 0.0), *gains[:4], 1.0), gains)
+    bound = -sum(alpha * (x @ x) for alpha, x in zip(found, (t_ez, t_z, r_1, r_2), strict=True))
+    assert exact <= bound + 1e-9 * (1.0 + abs(bound) + abs(exact))
+
+
+def test_alphas_of_the_paper():
+    """Without the zetas -5, 0, 15 and 1220: (33) is empty before they are known."""
+    found = theorem(Vehicle(), ELL, Gains(), 1.0)
+    free = [a + 0.5 * z for a, z in zip(found.alphas, (0.0, 0.0, *found.zetas), strict=True)]
+    assert free == pytest.approx([-5.0, 0.0, 15.0, 1220.0])
+    assert found.radius == 0.0
+
+
+@given(gains=gains)
+def test_no_gains_meet_31_with_the_vehicle_of_the_paper(gains):
+    found = theorem(Vehicle(), ELL, gains, 1.0)
+    assert found.conditions[1].verdict == "violated"
+    assert found.alphas.alpha_3 < found.bounds.lambda_d2 - found.zeta_of_any_gains < 0.0
+    assert found.radius == 0.0
+
+
+@given(gains=gains, more=st.floats(1.0, 10.0))
+def test_no_gain_makes_alpha_3_larger(gains, more):
+    """It holds gains with a minus alone: the region does not grow with them."""
+    alpha_3 = theorem(DAMPED, ELL, gains, 1.0).alphas.alpha_3
+    for name in ("K1", "K2", "lambda_", "k_d"):
+        larger = gains._replace(**{name: np.multiply(more, getattr(gains, name))})
+        found = theorem(DAMPED, ELL, larger, 1.0)
+        assert found.alphas.alpha_3 <= alpha_3
+        assert found.x_at_most <= found.x_of_any_gains
+
+
+def test_the_control_point_must_be_far_ahead():
+    """(31) with vanishing gains: above 0.56 m, and not at the paper's 0.35 m."""
+    none = Gains((1e-9,) * 3, (1e-9,) * 3, 1e-9)
+    verdicts = [theorem(Vehicle(), ell, none, 1.0).conditions[1].verdict for ell in (0.56, 0.57)]
+    assert verdicts == ["violated", "open"]
+
+
+def test_a_vehicle_and_gains_that_the_theorem_may_cover():
+    found = theorem(DAMPED, ELL, QUICK, 1.0)
+    assert [condition.verdict for condition in found.conditions] == ["met", "open", "open"]
+    assert 0.0 < found.radius == found.x_at_most / found.stretch
+
+
+@given(room=positive, k=positive, share=st.floats(0.0, 1.0))
+def test_no_zetas_reach_further(room, k, share):
+    """(26) as chi_1 = k |x|^2 / 2 needs it at |x|, and (42) with alpha_3: not both beyond."""
+    x = 1.001 * reach(room, k)
+    zeta_1 = share * k * x / 2.0
+    zeta_2 = (k * x / 2.0 - zeta_1) / x
+    twice_alpha_3 = 2.0 * room - (zeta_1 + zeta_2)
+    assert not twice_alpha_3 > zeta_1 + zeta_2 * x**2
+
+
+def test_zetas_that_reach_as_far_are_there():
+    """zeta_1 = k |x| / 2 and zeta_2 = 0, for states up to |x|."""
+    x = 0.999 * reach(30.0, 500.0)
+    assert 2.0 * 30.0 - 500.0 * x / 2.0 > 500.0 * x / 2.0
+
+
+@given(u=st.floats(0.0, 10.0), theta=st.floats(0.0, 10.0), gamma=positive)
+def test_33_needs_the_max_for_47(u, theta, gamma):
+    """The sum in (47) is bounded by stretch^2 |vartheta|^2, and by no smaller multiple."""
+    known, gains = bounds(Vehicle(), ELL), Gains(gamma=gamma)
+    lambda_x, lambda_u = min(5.0, known.lambda_m2 / 2), max(5.0, known.lambda_M2 / 2)
+    factors = np.array([lambda_u / lambda_x, 0.5 / gamma / lambda_x])
+    assert stretch(known, gains, 1.0) ** 2 == pytest.approx(factors.max())
+    needed = factors @ [u * u, theta * theta]
+    assert needed <= factors.max() * (u * u + theta * theta) * (1.0 + 1e-12)
+
+
+def test_33_as_printed_admits_starts_that_47_excludes():
+    """On the boundary of (33) with min, all of vartheta in u: (47) is missed by (13.6)^2."""
+    known, zeta, alpha_m = bounds(Vehicle(), ELL), 1.0, 10.0
+    lambda_x, lambda_u = min(5.0, known.lambda_m2 / 2), max(5.0, known.lambda_M2 / 2)
+    factors = (lambda_u / lambda_x, 0.5 / lambda_x)
+    square = (2.0 * alpha_m - 2.0 * zeta) / (2.0 * zeta * min(factors))
+    asked = 0.5 * (2.0 * zeta) + 0.5 * (2.0 * zeta) * factors[0] * square
+    assert alpha_m < asked
+    assert np.sqrt(max(factors) / min(factors)) == pytest.approx(13.6, abs=0.05)

@@ -1,0 +1,133 @@
+"""What is wrong in the paper: page, report and gain check say the same, and it is so."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from auv_fmu import motion_planner, plant
+from auv_fmu.closed_loop import PAPER, LongestSteps, closed_loop
+from auv_fmu.output_feedback import Gains
+from auv_fmu.pd import PdGains
+from auv_fmu.vehicle import Vehicle, accelerations
+from orchestrator.analysis import gains
+from orchestrator.experiments.wiring import closed_loop as loop_of
+from orchestrator.paper.errata import errata, errata_page, of_the_paper, section
+from orchestrator.paper.published import EFFORT_PD, EFFORT_PROPOSED, TURNING_RADIUS
+
+ROOT = Path(__file__).parents[4]
+PAGE = ROOT / "docs" / "paper.md"
+QUIET = PAPER._replace(plant=plant.Parameters(noise=plant.Localisation(std=0.0)))
+
+
+def text_of(title):
+    [found] = [erratum for erratum in errata() if erratum.title == title]
+    return found.text
+
+
+def test_page_is_what_the_code_says():
+    assert errata_page() == PAGE.read_text(encoding="utf-8"), "run `auv-fmu docs`"
+
+
+def test_gains_prints_the_lines_of_the_page(dist):
+    system = loop_of(dist)
+    assert gains.evaluate(system) == of_the_paper()
+    lines = list(gains.stated(of_the_paper()))
+    assert "\n".join(lines) in gains.check(system)
+    assert "\n".join(lines) in errata_page()
+
+
+def test_report_and_page_have_the_same_points():
+    titles = [erratum.title for erratum in errata()]
+    assert len(set(titles)) == len(titles)
+    report, page = section(), errata_page()
+    for erratum in errata():
+        assert f"#### {erratum.title}\n\n{erratum.text}\n\n" in report
+        assert f"## {erratum.title}\n\n{erratum.text}\n\n" in page
+
+
+@pytest.mark.parametrize("erratum", errata(), ids=lambda erratum: erratum.title)
+def test_every_point_is_shown_by_tests_that_are_there(erratum):
+    assert erratum.tests
+    for test in erratum.tests:
+        file, name = test.split("::")
+        assert f"\ndef {name}(" in (ROOT / file).read_text(encoding="utf-8")
+
+
+def peak(lambda_):
+    """Largest surge command of Fig. 4 without noise [N]; it comes within the first seconds."""
+    setting = QUIET._replace(controller=Gains(lambda_=lambda_))
+    return max(abs(instant.command[0]) for instant in closed_loop(1500, setting))
+
+
+def test_30_costs_what_is_said():
+    text = text_of("(30) and the limits (3) pull apart")
+    assert f"{peak(2.1):.0f} N where 80 can be had" in text
+    assert f"{peak(1.0):.0f} N at the paper's 1" in text
+
+
+def figure_5(controller):
+    """Fig. 5 with a controller."""
+    planner = motion_planner.Parameters(eta0=(0.0, 0.0, -30.0, 0.0, 0.0))
+    return QUIET._replace(controller=controller, planner=planner)
+
+
+def test_surge_efforts_cannot_be_smaller():
+    text = text_of("4.2: surge efforts below what the way takes")
+    least = []
+    for controller in (Gains(eps_t=10.0), PdGains(eps_t=10.0)):
+        impulse, square = 0.0, 0.0
+        for instant in closed_loop(2500, figure_5(controller)):
+            if np.linalg.norm(np.subtract(instant.scene.plant.y, instant.scene.reference.y_d)) <= 1:
+                break
+            impulse += PAPER.h * instant.tau[0]
+            square += PAPER.h * instant.tau[0] ** 2
+        assert f"{impulse:.0f} N·s in {instant.t:.1f} s" in text
+        least.append(impulse / np.sqrt(instant.t))
+        assert least[-1] <= np.sqrt(square)
+    assert f"at least {least[0]:.0f} and {least[1]:.0f} N·√s" in text
+    assert least[0] > EFFORT_PROPOSED[0] and least[1] > EFFORT_PD[0]
+
+
+def effort(controller, h):
+    """L2 efforts of Fig. 5 after 60 s (reading 6)."""
+    setting = figure_5(controller)._replace(h=h, h_max=LongestSteps())
+    taus = np.array([instant.tau for instant in closed_loop(round(60.0 / h), setting)])[:-1]
+    return np.sqrt(h * (taus**2).sum(axis=0))
+
+
+def test_pd_effort_belongs_to_the_step():
+    text = text_of("4.2: an effort that belongs to the step of 20 ms")
+    printed, half = (effort(PdGains(eps_t=10.0), h) for h in (0.02, 0.01))
+    assert f"is {printed[1]:.0f} N·m·√s after 60 s at the printed step" in text
+    assert f"and {half[1]:.0f} at half of it" in text
+    printed, half = (effort(Gains(eps_t=10.0), h) for h in (0.02, 0.01))
+    np.testing.assert_allclose(half, printed, rtol=0.03)
+
+
+def test_the_circle_is_the_one_of_2():
+    """v and u follow from r in (2) at rest; what is left is a polynomial of fifth degree in r."""
+    text = text_of("4.1: the quoted turning radius has the size of the diameter")
+    m11, m22, d11, d22, d66 = 25.0, 17.5, 30.0, 30.0, 20.0
+    inverse_of_u = np.array([m11 * m22 / d22, 0.0, d11]) / 80.0
+    yaw = np.polymul([-d66, 80.0], np.polymul(inverse_of_u, inverse_of_u))
+    roots = np.roots(np.polyadd(yaw, [-(m11 - m22) * m11 / d22, 0.0]))
+    [r] = roots[np.abs(roots.imag) < 1e-9].real
+    u = 1.0 / np.polyval(inverse_of_u, r)
+    v = -m11 * u * r / d22
+    rest = accelerations(Vehicle(), (u, v, 0.0, 0.0, r), 0.0, (80.0, 0.0, 80.0), (0.0,) * 5)
+    assert rest == pytest.approx((0.0,) * 5, abs=1e-9)
+    radius = np.hypot(u, v) / r
+    assert re.findall(r"\d\.\d{3}", text) == [f"{x:.3f}" for x in (r, radius, 2.0 * radius)]
+    assert round(2.0 * radius, 1) == TURNING_RADIUS
+
+
+@given(st.lists(st.floats(-80.0, 80.0), min_size=1))
+def test_59_cannot_exceed_the_limit(tau):
+    assert np.sqrt(np.mean(np.square(tau))) <= 80.0 * (1.0 + 1e-12)
+    assert max(EFFORT_PROPOSED) > 80.0 and min(EFFORT_PD) > 80.0
