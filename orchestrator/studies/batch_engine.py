@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import cache
 from hashlib import sha256
 from math import isnan, sqrt
+from threading import local
 from typing import NamedTuple
 
 import numpy as np
@@ -253,22 +253,24 @@ def _run(
 ) -> Moment:
     """Call the kernel."""
     run = compiled(type(job.setting.controller))  # type: ignore[arg-type]
-    uniform = _uniform(job.setting.plant.noise.seed)
+    uniform = _NOISE.uniform(job.setting.plant.noise.seed)
     return run(job.setting, plan, uniform, ends, tallies, rows, progress)
 
 
-@cache
-def _generator() -> tuple[np.random.RandomState, np.random.Generator]:
-    """A generator of uniform numbers, and what seeds it; to make one takes longer than a run."""
-    bits = np.random.MT19937()
-    return np.random.RandomState(bits), np.random.Generator(bits)
+class _Noise(local):
+    """The uniform numbers of Python's generator, in each thread; to make it takes a while."""
+
+    def __init__(self) -> None:
+        bits = np.random.MT19937()
+        self._state, self._uniform = np.random.RandomState(bits), np.random.Generator(bits)
+
+    def uniform(self, seed: int) -> np.random.Generator:
+        """Those of a seed."""
+        self._state.seed([seed % 2**32])
+        return self._uniform
 
 
-def _uniform(seed: int) -> np.random.Generator:
-    """The uniform numbers of Python's generator with a seed."""
-    state, generator = _generator()
-    state.seed([seed % 2**32])
-    return generator
+_NOISE = _Noise()
 
 
 def _indices(job: _Job, end: np.void, found: np.void) -> dict[str, float]:

@@ -57,7 +57,7 @@ _ENGINES = (
     (
         "made of",
         "the FMUs, `--kind python` or `native`, which travel with the study",
-        "the equations, compiled by numba",
+        "the equations, [compiled by numba](batch.md)",
     ),
     ("numbers", "those of `auv-fmu run`", "the same, bit for bit"),
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from random import Random
 from typing import Any
@@ -193,6 +194,14 @@ def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus():
     assert copy.digest == batch.digest
     assert list(copy.outcomes([run])) == list(batch.outcomes([run]))
     assert len(pickle.dumps(batch)) < 1_000_000
+
+
+def test_threads_have_noise_of_their_own():
+    batch, _ = engines("fig4")
+    runs = [Run(i, "fig4", {"plant.noise.seed": i}, 5.0, 0.02) for i in range(20)]
+    with ThreadPoolExecutor(4) as pool:
+        side_by_side = list(pool.map(lambda run: next(batch.outcomes([run])), runs))
+    assert side_by_side == list(batch.outcomes(runs))
 
 
 def test_digest_is_that_of_the_systems_too():
