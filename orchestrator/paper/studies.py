@@ -11,7 +11,7 @@ from orchestrator.studies.study import Study, read_study, ready_studies
 from orchestrator.studies.sweep import Means, swept
 
 _WITHOUT = (
-    f"Not in this report: {', '.join(ready_studies())}, studies of more than 10,000 runs each. "
+    f"Not in this report: {', '.join(ready_studies())}, each 10,000 runs or more. "
     "`auv-fmu report --studies` makes them, or what is missing of them."
 )
 

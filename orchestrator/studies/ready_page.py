@@ -14,16 +14,12 @@ PICTURES = Path("images", "studies")
 _HEAD = """\
 # Ready studies
 
-Six studies come with auv-fmu. Each runs the proposed controller against the PD controller at more
-than 10,000 points, with the compiled equations:
-
-    auv-fmu sweep distance
-
-makes the runs and the figures of the first below `results/distance/`, and so on; `auv-fmu report
---studies` makes all six for the report. What is said below a figure was read off it; the number of
-runs stands in `study.json`. Lines are medians of the runs that have a value in common, bands hold
-the middle 80 % of them; a white or black line is a limit. A study of one's own is a file like
-theirs: [studies](studies.md).
+Six studies come with auv-fmu, each 10,000 runs or more of the proposed controller against the PD
+controller, by the compiled equations. `auv-fmu sweep distance` makes the runs and the figures of
+one of them in `results/distance/`; `auv-fmu report --studies` makes all six for the report. What is
+said below a figure was read off it; the number of runs stands in `study.json`. Lines are medians of
+the runs that have a value in common, bands hold the middle 80 % of them; a white or black line is a
+limit. A study of one's own is a file like theirs: [studies](studies.md).
 
 This page is written by `auv-fmu docs`, from the studies' files.
 """

@@ -91,7 +91,7 @@ Until all runs are done, they are kept in `unfinished.sqlite` beside `study.json
 
 $ready
 
-Each holds the proposed controller against PD, at more than 10,000 points:
+Each is 10,000 runs or more of the proposed controller against PD:
 [what they show](ready-studies.md).
 
 ## A study file
