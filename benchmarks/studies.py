@@ -170,7 +170,10 @@ def main() -> None:
     print(f"{options.runs:g} runs on {options.nodes} nodes of {options.cores} cores:")
     for name, one in costs.items():
         total = options.runs * one / 3600
-        print(f"{name:15}{total:12,.0f} core hours,{total / cores:9.2f} h by all cores")
+        print(
+            f"{name:15}{total:10,.0f} core hours,{total / cores:8.2f} h by all cores; "
+            f"who sends them keeps up with {one / run:,.0f}"
+        )
     keep = options.runs * run / 3600
     print(
         f"who sends and keeps them: {keep:.1f} h, {options.runs * (database + table) / 1e9:.0f} GB"

@@ -79,11 +79,9 @@ def test_a_run_that_ends_every_process_is_the_only_one_that_fails():
     assert made[17].failure == FATAL and not made[17].indices
 
 
-@pytest.fixture
-def impatient():
-    """Who looks for a scheduler gives up soon."""
-    with config.set({"distributed.comm.timeouts.connect": "1s"}):
-        yield
+def gives_up_after(seconds):
+    """Who looks for a scheduler."""
+    return config.set({"distributed.comm.timeouts.connect": seconds})
 
 
 @contextmanager
@@ -133,9 +131,10 @@ def test_a_scheduler_s_workers_come_and_go_while_a_study_is_under_way(scheduler,
     assert made_by - {lost.pid}
 
 
-def test_a_scheduler_that_goes_is_said(scheduler, tmp_path, impatient):
+def test_a_scheduler_that_goes_is_said(scheduler, tmp_path):
     address, process = scheduler
     with (
+        gives_up_after(5.0),
         worker(address, tmp_path),
         making(Toy(0.05), map(run, count()), scheduler=address) as blocks,
     ):
@@ -154,8 +153,9 @@ def test_a_scheduler_that_goes_is_said(scheduler, tmp_path, impatient):
         ({"workers": 0}, "--workers 0: must be at least 1"),
     ],
 )
-def test_who_cannot_make_runs_is_said_in_a_line(means, text, impatient):
+def test_who_cannot_make_runs_is_said_in_a_line(means, text):
     with (
+        gives_up_after(0.5),
         pytest.raises(InputError, match=f"^{re.escape(text)}"),
         making(Toy(), [], **means),
     ):
