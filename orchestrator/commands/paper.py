@@ -9,8 +9,8 @@ from typing import Any
 from orchestrator.commands.options import OK, add_kind, add_out
 from orchestrator.commands.streams import show
 from orchestrator.experiments.scenario import names
-from orchestrator.paper.printed_table import write_table
 from orchestrator.paper.report import write_report
+from orchestrator.paper.table import write_table
 from orchestrator.studies.study import ready_studies
 
 

@@ -17,6 +17,7 @@ module                  what it holds
 :mod:`.sensitivity`     how the printed numbers move with it
 :mod:`.variants`        the runs of all combinations, and what is read off them
 :mod:`.printed_table`   the printed table beside them
+:mod:`.table`           the files of `auv-fmu table`
 :mod:`.sections`        a section for each scenario
 :mod:`.studies`         the ready studies, their figures and what these show
 :mod:`.page`            Markdown as one HTML page

@@ -24,6 +24,7 @@ _BLOCK = 16
 #: Indices of an outcome.
 _EFFORT = [f"l2_effort.{k}" for k in ACTUATORS]
 _ERROR = [f"final_error.{k}" for k in AXES]
+_INDICES = (*_EFFORT, *_ERROR)
 _REACHED = "time_to_reach"
 
 #: u, r and q of (u, q, r).
@@ -55,9 +56,9 @@ def all_variants(crew: Workers, of_runs: Sequence[Choice] = OF_RUNS) -> Sensitiv
     for scenario, found in wanted.items():
         parts = [taken[scenario, first] for first in range(0, len(found), _BLOCK)]
         sizes = [len(options_of(choice, scenario)) for choice in of_runs]
-        each, way = map(np.concatenate, zip(*parts, strict=True))
-        numbers[scenario] = each.reshape(*sizes, *each.shape[1:])
-        ways[scenario] = way.reshape(*sizes, *way.shape[1:])
+        sixes, pairs = map(np.concatenate, zip(*parts, strict=True))
+        numbers[scenario] = sixes.reshape(*sizes, *sixes.shape[1:])
+        ways[scenario] = pairs.reshape(*sizes, *pairs.shape[1:])
     return Sensitivity(numbers, ways, of_runs)
 
 
@@ -66,7 +67,7 @@ def taken_of(engine: BatchEngine, block: Sequence[Run]) -> tuple[np.ndarray, np.
 
     Those of a run that has failed are not numbers, nor is the way of one that has not arrived.
     """
-    numbers = np.full((len(block), len(SIGNALS), len(END_TIMES), 6), np.nan)
+    numbers = np.full((len(block), len(SIGNALS), len(END_TIMES), len(_INDICES)), np.nan)
     ways = np.full((len(block), len(Way._fields)), np.nan)
     for i, run in enumerate(block):
         outcomes = engine.outcomes_at(run, END_TIMES)

@@ -9,7 +9,7 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.paper import printed_table
+from orchestrator.paper import table
 from orchestrator.paper.choices import OF_RUNS, PD, PROPOSED, SIGNALS, Choice
 from orchestrator.paper.measures import way_of
 from orchestrator.paper.variants import all_variants
@@ -63,7 +63,7 @@ def test_options_are_those_of_the_runs(found):
 
 
 def test_the_command_leaves_table_variants_and_record(found, monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(printed_table, "all_variants", lambda crew: found)
+    monkeypatch.setattr(table, "all_variants", lambda crew: found)
     assert main(["table", "--out", str(tmp_path)]) == 0
     assert capsys.readouterr().out.splitlines() == [
         str(tmp_path / name) for name in ("table.md", "variants.csv")

@@ -15,8 +15,9 @@ from orchestrator.master.table import Table
 from orchestrator.paper import choices
 from orchestrator.paper.choices import END_TIMES, OF_RUNS, PD, PROPOSED, SIGNALS, runs
 from orchestrator.paper.measures import Way
-from orchestrator.paper.printed_table import section, write_variants
+from orchestrator.paper.printed_table import section
 from orchestrator.paper.sensitivity import PUBLISHED
+from orchestrator.paper.table import write_variants
 from orchestrator.paper.variants import numbers_of
 from orchestrator.studies.engine import Outcome
 from orchestrator.system.names import port_name
@@ -114,7 +115,7 @@ def test_the_section_says_what_was_planted():
     assert "- nearest of all: sea: rough; observer: fast; T_f = 60 s." in text
     assert "At most 6, 6, 6 of the twelve numbers" in text
     # 1,000 N.s in 40 s: 158 N.s^0.5; with 130 it takes 59.2 s.
-    assert "below 158 N·√s: with the printed 130 it takes 59.2 s" in text
+    assert "at least 158 N·√s: with the printed 130 it would take 59.2 s" in text
     assert "| sea | rough |  | 4.16 | 4.1: calm |" in text
 
 

@@ -1,0 +1,73 @@
+"""The files of `auv-fmu table`."""
+
+from __future__ import annotations
+
+import csv
+import platform
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from orchestrator.experiments.folder import replaced
+from orchestrator.experiments.record import PACKAGES, Clock, write_files
+from orchestrator.paper.printed_table import NUMBERS, section
+from orchestrator.paper.sensitivity import PUBLISHED, Sensitivity
+from orchestrator.paper.variants import all_variants
+from orchestrator.paper.workers import workers
+
+
+def write_table(folder: Path, command: Sequence[str]) -> tuple[Path, Path]:
+    """Make all variants, and write `table.md` and `variants.csv`.
+
+    Args:
+        folder: to write into.
+        command: for the record.
+
+    Returns:
+        The two files.
+
+    Raises:
+        InputError: a package is missing, or the folder cannot be written.
+        KeyboardInterrupt: the user does not want to wait.
+
+    """
+    clock = Clock()
+    with replaced(folder) as unfinished:
+        with workers() as crew:
+            found = all_variants(crew)
+        text = f"# The printed table of section 4.2\n\n{section(found)}\n"
+        (unfinished / "table.md").write_text(text, encoding="utf-8")
+        write_variants(unfinished / "variants.csv", found)
+        write_files(unfinished, _record(command, clock))
+    return folder / "table.md", folder / "variants.csv"
+
+
+def _record(command: Sequence[str], clock: Clock) -> dict[str, object]:
+    return {
+        "command": list(command),
+        **clock.times(),
+        "versions": {"python": platform.python_version()}
+        | {package: version(package) for package in (*PACKAGES, "numba")},
+        "platform": platform.platform(),
+    }
+
+
+def write_variants(path: Path, found: Sensitivity) -> None:
+    """A row for each combination of options, at the end time at which it scores best."""
+    ends = found.scores.argmin(axis=-1)
+    names = [name for scenario in PUBLISHED for name in NUMBERS[scenario]]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([*(choice.name for choice in found.choices), "score", *names])
+        for options in np.ndindex(ends.shape):
+            variant = found.variant((*options, int(ends[options])))
+            chosen = zip(found.choices, variant.options, strict=True)
+            writer.writerow(
+                [
+                    *(choice.options[i].text for choice, i in chosen),
+                    variant.score,
+                    *(value for scenario in PUBLISHED for value in variant.numbers[scenario]),
+                ]
+            )
