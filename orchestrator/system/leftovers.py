@@ -89,11 +89,12 @@ def _process_folder() -> TemporaryDirectory[str]:
         folder = TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
         if fcntl is None:
             return folder
-        # Held until the process ends: nothing closes it.
-        descriptor = os.open(folder.name, os.O_RDONLY)
-        with suppress(OSError):
-            _lock(descriptor)
-            # Another process may have taken it for left before it was locked.
-            if os.path.samestat(os.fstat(descriptor), Path(folder.name).stat()):
-                return folder
-        os.close(descriptor)
+        # Another process may take it for left before it is locked.
+        with suppress(FileNotFoundError):
+            # Held until the process ends: nothing closes it.
+            descriptor = os.open(folder.name, os.O_RDONLY)
+            with suppress(OSError):
+                _lock(descriptor)
+                if os.path.samestat(os.fstat(descriptor), Path(folder.name).stat()):
+                    return folder
+            os.close(descriptor)

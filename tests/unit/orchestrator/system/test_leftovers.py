@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import tempfile
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -68,3 +70,21 @@ def test_temporary_folders_of_killed_processes_go_with_the_next(tmp_path: Path, 
     assert ended(forked(work)) == -signal.SIGKILL
     [second] = tmp_path.iterdir()
     assert second != first
+
+
+def test_a_folder_that_is_taken_for_left_before_it_is_locked_is_not_used(monkeypatch):
+    """Processes that start at the same time remove what they find of each other unlocked."""
+    made = []
+
+    def taken(**how: object) -> TemporaryDirectory[str]:
+        folder = TemporaryDirectory(**how)
+        if not made:
+            shutil.rmtree(folder.name)
+        made.append(folder)
+        return folder
+
+    monkeypatch.setattr(leftovers, "TemporaryDirectory", taken)
+    # Not the folder of this process, which has one.
+    folder = leftovers._process_folder.__wrapped__()
+    assert Path(folder.name).is_dir()
+    assert len(made) == 2
