@@ -38,7 +38,7 @@ from orchestrator.studies.study import BATCH, ENGINES, FMU, Study, read_study, s
 from orchestrator.system.structure import System
 
 #: Packages whose versions the runs depend on.
-_PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy", "pyarrow", "scipy")
+_PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numba", "numpy", "distributed", "pyarrow", "scipy")
 
 #: What a study says of its runs.
 _STATED = ("vary", "sample", "parameters", "stop_time", "step", "order")
