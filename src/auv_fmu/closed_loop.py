@@ -146,65 +146,30 @@ def move(
     return Vehicles(state, rotation, planned, moving)
 
 
-def sampled(gains: Gains, h: float) -> Gains:
-    """Gains of the proposed controller for steps of h seconds."""
-    return output_feedback.sampled(gains, h)
-
-
-def start(gains: Gains, seen: Scene) -> ControllerState:
-    """State of the proposed controller at the start."""
-    return output_feedback.initial_state(gains, seen.y)
-
-
-def command(gains: Gains, state: ControllerState, seen: Scene) -> tuple[ControllerState, Signals]:
-    """What the proposed controller goes on from at an instant, and its signals."""
-    state = output_feedback.gated(gains, state, seen.y)
-    return state, output_feedback.evaluate(gains, state, measurement(seen))
-
-
-def steps(
-    gains: Gains, state: ControllerState, signals: Signals, seen: Scene, h: float, n: int
-) -> ControllerState:
-    """State of the proposed controller after n steps of h seconds."""
-    return output_feedback.steps(gains, state, signals, measurement(seen), h, n)
-
-
-def estimates(state: ControllerState, signals: Signals, seen: Scene) -> tuple[Vector3, Vector4]:
-    """Velocity and parameters that the proposed controller goes by: dy_hat and theta_hat."""
-    return signals.dy_hat, state.theta_hat
-
-
 def measurement(seen: Scene) -> Measurement:
     """What the proposed controller is told."""
     y_d, dy_d, ddy_d = seen.reference
     return Measurement(seen.y, seen.plant.euler, y_d, dy_d, ddy_d)
 
 
-def pd_sampled(gains: PdGains, h: float) -> PdGains:
-    """Gains of the PD controller for steps of h seconds."""
-    return gains
+def start(gains: Gains, measured: Measurement) -> ControllerState:
+    """State of the proposed controller at the start."""
+    return output_feedback.initial_state(gains, measured.y)
 
 
-def pd_start(gains: PdGains, seen: Scene) -> Vector4:
-    """State of the PD controller at the start."""
-    return gains.theta_0
+def command(
+    gains: Gains, state: ControllerState, measured: Measurement
+) -> tuple[ControllerState, Signals]:
+    """What the proposed controller goes on from at an instant, and its signals."""
+    state = output_feedback.gated(gains, state, measured.y)
+    return state, output_feedback.evaluate(gains, state, measured)
 
 
-def pd_command(gains: PdGains, theta_hat: Vector4, seen: Scene) -> tuple[Vector4, PdSignals]:
-    """What the PD controller goes on from at an instant, and its signals."""
-    return theta_hat, pd.evaluate(gains, theta_hat, pd_measurement(seen))
-
-
-def pd_steps(
-    gains: PdGains, theta_hat: Vector4, signals: PdSignals, seen: Scene, h: float, n: int
-) -> Vector4:
-    """State of the PD controller after n steps of h seconds."""
-    return pd.steps(gains, theta_hat, signals, pd_measurement(seen), h, n)
-
-
-def pd_estimates(theta_hat: Vector4, signals: PdSignals, seen: Scene) -> tuple[Vector3, Vector4]:
-    """Velocity and parameters that the PD controller goes by; it is told the velocity."""
-    return seen.plant.dy, theta_hat
+def estimates(
+    state: ControllerState, signals: Signals, measured: Measurement
+) -> tuple[Vector3, Vector4]:
+    """Velocity and parameters that the proposed controller goes by: dy_hat and theta_hat."""
+    return signals.dy_hat, state.theta_hat
 
 
 def pd_measurement(seen: Scene) -> PdMeasurement:
@@ -213,24 +178,51 @@ def pd_measurement(seen: Scene) -> PdMeasurement:
     return PdMeasurement(seen.y, seen.plant.euler, y_d, dy_d, ddy_d, seen.plant.dy)
 
 
-class Law(NamedTuple):
-    """A controller in the loop: how it starts, what it commands, how its state goes on.
+def pd_sampled(gains: PdGains, h: float) -> PdGains:
+    """Gains of the PD controller for steps of h seconds."""
+    return gains
 
-    All are given the gains of a step, which the first makes of those that are set. What it goes by
-    is what it has estimated, or been told.
+
+def pd_start(gains: PdGains, measured: PdMeasurement) -> Vector4:
+    """State of the PD controller at the start."""
+    return gains.theta_0
+
+
+def pd_command(
+    gains: PdGains, theta_hat: Vector4, measured: PdMeasurement
+) -> tuple[Vector4, PdSignals]:
+    """What the PD controller goes on from at an instant, and its signals."""
+    return theta_hat, pd.evaluate(gains, theta_hat, measured)
+
+
+def pd_estimates(
+    theta_hat: Vector4, signals: PdSignals, measured: PdMeasurement
+) -> tuple[Vector3, Vector4]:
+    """Velocity and parameters that the PD controller goes by; it is told the velocity."""
+    return measured.dy, theta_hat
+
+
+class Law(NamedTuple):
+    """A controller in the loop: what it is told, how it starts, what it commands, how it goes on.
+
+    All but the first are given the gains of a step, which the second makes of those that are set.
+    What it goes by is what it has estimated, or been told.
     """
 
+    measurement: Callable[[Scene], Any]
     sampled: Callable[[Any, float], Any]
-    start: Callable[[Any, Scene], Any]
-    command: Callable[[Any, Any, Scene], tuple[Any, Any]]
-    steps: Callable[[Any, Any, Any, Scene, float, int], Any]
-    estimates: Callable[[Any, Any, Scene], tuple[Vector3, Vector4]]
+    start: Callable[[Any, Any], Any]
+    command: Callable[[Any, Any, Any], tuple[Any, Any]]
+    steps: Callable[[Any, Any, Any, Any, float, int], Any]
+    estimates: Callable[[Any, Any, Any], tuple[Vector3, Vector4]]
 
 
 #: The controller that goes with a set of gains.
 LAWS: dict[type, Law] = {
-    Gains: Law(sampled, start, command, steps, estimates),
-    PdGains: Law(pd_sampled, pd_start, pd_command, pd_steps, pd_estimates),
+    Gains: Law(
+        measurement, output_feedback.sampled, start, command, output_feedback.steps, estimates
+    ),
+    PdGains: Law(pd_measurement, pd_sampled, pd_start, pd_command, pd.steps, pd_estimates),
 }
 
 
@@ -268,13 +260,15 @@ def closed_loop(count: int, setting: Setting = PAPER, delayed: bool = False) -> 
     for k in range(count + 1):
         n = gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)
         seen = scene(setting, vehicles, k * h, n)
+        measured = law.measurement(seen)
         if k == 0:
-            control = law.start(gains, seen)
-        control, signals = law.command(gains, control, seen)
+            control = law.start(gains, measured)
+        control, signals = law.command(gains, control, measured)
         now = signals.tau, seen.tau_w
         told, tau_w = before if before and delayed else now
         before = now
         tau = plant.applied(setting.plant, told)
         yield Instant(k * h, vehicles, seen, control, signals, told, tau, tau_w)
-        control = law.steps(gains, control, signals, seen, h / parts.controller, parts.controller)
+        n_c = parts.controller
+        control = law.steps(gains, control, signals, measured, h / n_c, n_c)
         vehicles = move(setting, vehicles, tau, tau_w, h, parts)

@@ -126,9 +126,10 @@ def begin(setting: Setting, n: Vector3) -> tuple[Moment, Done]:
     gains = setting.controller
     vehicles = closed_loop.begin(setting)
     scene = closed_loop.scene(setting, vehicles, 0.0, n)
-    control = law.start(gains, scene)
-    state, signals = law.command(gains, control, scene)
-    velocity, theta_hat = law.estimates(state, signals, scene)
+    measured = law.measurement(scene)
+    control = law.start(gains, measured)
+    state, signals = law.command(gains, control, measured)
+    velocity, theta_hat = law.estimates(state, signals, measured)
     driven, _ = plant.begin(setting.plant, plant.applied(setting.plant, signals.tau))
     return (
         Moment(vehicles, scene, control, (signals.tau, scene.tau_w)),
@@ -159,13 +160,14 @@ def step(
         n: three independent standard normal numbers.
 
     """
-    scene = moment.scene
-    control, signals = law.command(gains, moment.control, scene)
-    velocity, theta_hat = law.estimates(control, signals, scene)
-    now = signals.tau, scene.tau_w
+    measured = law.measurement(moment.scene)
+    control, signals = law.command(gains, moment.control, measured)
+    velocity, theta_hat = law.estimates(control, signals, measured)
+    now = signals.tau, moment.scene.tau_w
     told, tau_w = moment.before if delayed else now
     tau = plant.applied(setting.plant, told)
-    control = law.steps(gains, control, signals, scene, h / parts.controller, parts.controller)
+    n_c = parts.controller
+    control = law.steps(gains, control, signals, measured, h / n_c, n_c)
     vehicles = closed_loop.move(setting, moment.vehicles, tau, tau_w, h, parts)
     return (
         Moment(vehicles, closed_loop.scene(setting, vehicles, end, n), control, now),

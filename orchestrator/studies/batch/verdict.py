@@ -58,7 +58,8 @@ def _controller_at_start(setting: Setting) -> _Result:
     vehicles = begin(setting)
     # Noise is too small to make a difference.
     seen = scene(setting, vehicles, 0.0, (0.0, 0.0, 0.0))
-    state, signals = law.command(gains, law.start(gains, seen), seen)
+    measured = law.measurement(seen)
+    state, signals = law.command(gains, law.start(gains, measured), measured)
     return state, _named("tau", ACTUATORS, signals.tau)
 
 
@@ -105,14 +106,15 @@ class _Step:
         self._setting, self._moment, self._delayed = setting, moment, plan.delayed
         self._law = LAWS[type(setting.controller)]
         self._gains = self._law.sampled(setting.controller, self._h / self._parts.controller)
+        self._measured = self._law.measurement(moment.scene)
 
     def _signals(self) -> tuple[Any, Any]:
-        return self._law.command(self._gains, self._moment.control, self._moment.scene)
+        return self._law.command(self._gains, self._moment.control, self._measured)
 
     def controller(self) -> _Result:
         state, signals = self._signals()
         n = self._parts.controller
-        after = self._law.steps(self._gains, state, signals, self._moment.scene, self._h / n, n)
+        after = self._law.steps(self._gains, state, signals, self._measured, self._h / n, n)
         return after, _named("tau", ACTUATORS, signals.tau)
 
     def disturbance(self) -> _Result:
