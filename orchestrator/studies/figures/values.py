@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from orchestrator.analysis.figures.style import heading
+from orchestrator.analysis.signals import THETA_UNITS
 from orchestrator.errors import InputError
 from orchestrator.experiments.scenario import read_scenario
 from orchestrator.studies.engine import INDICES, REACHED
@@ -37,7 +38,7 @@ _INDICES = {
     "largest_speed": ("largest speed", {"": "m/s"}),
     "largest_drift": ("largest drift", {"": "m/s"}),
 }
-_THETA_UNITS = {"[1]": "N", "[2]": "kg/s", "[3]": "kg/m", "[4]": "kg"}
+_THETA_UNITS = {f"[{i}]": unit for i, unit in enumerate(THETA_UNITS, start=1)}
 
 _MEMBER = re.compile(r"\.(\w+)$|(\[\d\])$")
 _NORM = re.compile(r"\|(.+)\|")
