@@ -4,6 +4,7 @@
 module                    what it holds
 ========================  ============================================================
 :mod:`.entries`           what a file of the user's may hold
+:mod:`.named`             files by name, those that come with the program
 :mod:`.scenario`          scenario files
 :mod:`.scenario_page`     their reference page
 :mod:`.wiring`            which FMUs there are, and which ports feed which

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import InputError, did_you_mean
 from orchestrator.experiments.entries import (
     Entry,
     are_names,
@@ -19,6 +18,7 @@ from orchestrator.experiments.entries import (
     is_table,
     is_text,
 )
+from orchestrator.experiments.named import names_in, path_of
 from orchestrator.reading import explained, text_of
 from orchestrator.system.names import PortName, port_name
 
@@ -134,7 +134,7 @@ ENTRIES: dict[str, Entry] = {
 
 def names() -> list[str]:
     """Scenarios that come with the bundle."""
-    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+    return names_in(FOLDER)
 
 
 def read_scenario(name: str) -> Scenario:
@@ -144,12 +144,7 @@ def read_scenario(name: str) -> Scenario:
         InputError: there is no such scenario, or its file has a mistake.
 
     """
-    if not name.endswith(".toml") and name not in names():
-        raise InputError(
-            f"no scenario {name!r}; there are {', '.join(names())}, or give a .toml or .ssp file"
-            f"{did_you_mean(name, names())}"
-        )
-    path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
+    path = path_of(name, FOLDER, "scenario", ".toml or .ssp")
     text = text_of(path, _WHAT)
     with explained(path, _WHAT):
         return _scenario(path, text)

@@ -21,6 +21,7 @@ from orchestrator.experiments.entries import (
     is_table,
     is_text,
 )
+from orchestrator.experiments.named import names_in, path_of
 from orchestrator.master.experiment import ORDERS
 from orchestrator.reading import explained, text_of
 from orchestrator.system.names import port_name
@@ -213,7 +214,7 @@ _STOP_TIME = {
 
 def ready_studies() -> list[str]:
     """The studies that come with the program."""
-    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+    return names_in(FOLDER)
 
 
 def read_study(name: str) -> Study:
@@ -223,13 +224,7 @@ def read_study(name: str) -> Study:
         InputError: there is no such study, or its file has a mistake.
 
     """
-    ready = ready_studies()
-    if not name.endswith(".toml") and name not in ready:
-        raise InputError(
-            f"no study {name!r}; there are {', '.join(ready)}, or give a .toml file"
-            f"{did_you_mean(name, ready)}"
-        )
-    path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
+    path = path_of(name, FOLDER, "study", ".toml")
     text = text_of(path, _WHAT)
     with explained(path, _WHAT):
         return study_of(path.stem, tomllib.loads(text), path)
