@@ -8,6 +8,7 @@
 room                        what it is for
 ==========================  ==========================================================
 :mod:`.errors`              what can go wrong, in words for the user
+:mod:`.findings`            all that is wrong with a file
 :mod:`.reading`             files of the user's, read with care
 :mod:`.system`              what is simulated, and how it is written down
 :mod:`.master`              how it is stepped

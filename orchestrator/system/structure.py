@@ -8,15 +8,23 @@ from dataclasses import dataclass, field, replace
 from orchestrator.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
+from orchestrator.system.transformation import Transformation
 from orchestrator.system.values import Value, type_of, typed, unit_of
 
 
 @dataclass(frozen=True)
 class Connection:
-    """One value that goes from an output to an input."""
+    """One value that goes from an output to an input.
+
+    Attributes:
+        source, target: its ends.
+        transformation: what happens to the value on its way; None: it arrives bit for bit.
+
+    """
 
     source: PortName
     target: PortName
+    transformation: Transformation | None = None
 
 
 @dataclass(frozen=True)
@@ -28,7 +36,9 @@ class System:
         components: by the names of their instances.
         connections: in the order in which they were stated.
         parameters: values that differ from the components' own, in the variables' types.
-        stop_time, step: the experiment that the system asks for [s]; None: it names none.
+        start_time, stop_time, step: the experiment that the system asks for [s]; None: it names
+            none.
+        steps: of components that ask for one of their own [s].
 
     """
 
@@ -38,6 +48,8 @@ class System:
     parameters: Mapping[PortName, Value] = field(default_factory=dict)
     stop_time: float | None = None
     step: float | None = None
+    start_time: float | None = None
+    steps: Mapping[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """One line: a system's descriptions are long."""

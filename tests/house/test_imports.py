@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 #: Rooms, each of which may import those before it.
 FLOORS = {
     "orchestrator": (
-        "errors", "reading", "system", "master", "analysis", "experiments", "exchange",
+        "errors", "findings", "reading", "system", "master", "analysis", "experiments", "exchange",
         "studies", "paper", "commands",
     ),
     "fmus": ("ports", "slave", "native", "components", "packaging"),
@@ -36,7 +36,7 @@ ALLOWED = {
 }  # fmt: skip
 
 #: Rooms that run any system.
-GENERAL = ("errors", "reading", "system", "master")
+GENERAL = ("errors", "findings", "reading", "system", "master")
 
 
 def folder_of(package: str) -> Path:
