@@ -10,7 +10,7 @@ from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, splits
 from orchestrator.system.transformation import Transformation
 from orchestrator.system.units import conversion, unit_of_port
-from orchestrator.system.values import Value, type_of, typed
+from orchestrator.system.values import Value, type_of, typed, unit_of
 
 #: What can be fed from another type, besides from its own: no value is lost on the way.
 _FED_FROM = {"Real": ("Integer",), "Integer": ("Enumeration",), "Enumeration": ("Integer",)}
@@ -179,7 +179,7 @@ class System:
                 )
         if type_of(a) not in (type_of(b), *_FED_FROM.get(type_of(b), ())):
             raise InputError(f"{source} -> {target}: cannot feed {a.type} into {b.type}")
-        if connection.transformation is not None:
+        if connection.transformation is not None or unit_of(a) == unit_of(b):
             return
         units = unit_of_port(starts, source.port), unit_of_port(ends, target.port)
         try:

@@ -35,18 +35,14 @@ class Unit:
 Units = Mapping[str, Unit]
 
 
-def units_of(component: Component) -> dict[str, Unit]:
-    """The units that an FMU defines."""
-    return {
-        unit.name: _unit(unit.name, unit.baseUnit) for unit in component.description.unitDefinitions
-    }
-
-
-def _unit(name: str, base: Any) -> Unit:
-    if base is None:
-        return Unit(name)
-    exponents = tuple(int(getattr(base, of, 0) or 0) for of in BASES)
-    return Unit(name, exponents, float(base.factor), float(base.offset))
+def _defined(component: Component, name: str) -> Unit:
+    """A unit as an FMU defines it."""
+    for unit in component.description.unitDefinitions:
+        if unit.name == name and unit.baseUnit is not None:
+            base: Any = unit.baseUnit
+            exponents = tuple(int(getattr(base, of, 0) or 0) for of in BASES)
+            return Unit(name, exponents, float(base.factor), float(base.offset))
+    return Unit(name)
 
 
 def unit_of_port(component: Component, port: str, otherwise: Units | None = None) -> Unit | None:
@@ -62,7 +58,7 @@ def unit_of_port(component: Component, port: str, otherwise: Units | None = None
     name = unit_of(variable)
     if not name:
         return None
-    unit = units_of(component).get(name, Unit(name))
+    unit = _defined(component, name)
     if unit.exponents is None:
         unit = (otherwise or {}).get(name, unit)
     declared = variable.declaredType
