@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 from pathlib import Path
 
 from collect import collect, collected
@@ -26,11 +27,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, help="of the clones, the files and what came of them")
     parser.add_argument("--again", action="store_true", help="without collecting anew")
-    parser.add_argument("--only", default="", help="what has this in its path; no page is written")
+    parser.add_argument(
+        "--only", default="", metavar="PATTERN", help="what matches; no page is written"
+    )
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes at a time")
     options = parser.parse_args()
     items = collected(options.folder) if options.again else collect(options.folder)
-    chosen = [item for item in items if options.only in f"{item.place}/{item.path}"]
+    chosen = [item for item in items if re.search(options.only, f"{item.place}/{item.path}")]
     found = compared(chosen, options.folder, options.workers)
     (options.folder / "compared.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
     if not options.only:

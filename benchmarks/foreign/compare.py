@@ -17,7 +17,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-
 from collect import Item
 from other_masters import TOOLS
 
