@@ -9,8 +9,9 @@ from time import monotonic
 import numpy as np
 
 from orchestrator.errors import InputError, StartError, reason
+from orchestrator.master.attendant import Attendance, Attendant, Run
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.instance import ComponentFailed, Instance
+from orchestrator.master.instance import ComponentFailed, Ended, Instance
 from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.isolated import Isolation, isolated
 from orchestrator.master.loaded import all_loaded
@@ -19,8 +20,10 @@ from orchestrator.master.loop import PYTHON_LOOP, Loop
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import schedule, stages
+from orchestrator.master.signals import Signals
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+from orchestrator.system.values import literal, same
 
 
 def simulate(
@@ -29,6 +32,7 @@ def simulate(
     observers: Sequence[Observer] = (),
     isolation: Isolation | None = None,
     loop: Loop = PYTHON_LOOP,
+    attendants: Sequence[Attendant] = (),
 ) -> Ending:
     """Run a system from t = 0.
 
@@ -38,6 +42,7 @@ def simulate(
         observers: take the rows.
         isolation: run each FMU in a process of its own; None: all in this one.
         loop: makes the steps.
+        attendants: act between them, in this order.
 
     Returns:
         How the run has ended: after a failure the observers have the rows before it.
@@ -61,22 +66,27 @@ def simulate(
             row = Row(system, instances)
             _initialise(system, instances, row, experiment, log)
             names = tuple(map(str, row.columns))
-            header = Header(names, experiment, _parameters(instances), loop.name)
+            parameters = _parameters(system, instances, log)
+            header = Header(names, experiment, parameters, loop.name)
         scheduled = schedule(system, plan, instances, row)
         with _told(header, observers) as tell:
             blocks = Blocks(len(row.values), observers)
             interrupts.hand_over = blocks.hand_over
             blocks.append(0.0, row.values)
-            steps = loop.steps(experiment, scheduled, row.values, blocks)
+            signals = Signals(row, [stage.gather for stage in scheduled], system.connections)
+            run = Run(system, experiment, instances, row, scheduled, signals, blocks)
             order = [name for names in plan for name in names]
+            remark = None
             try:
-                failure = _advance(experiment, steps, row, order, blocks, interrupts)
+                failure = _advance(run, loop, Attendance(run, attendants), order, interrupts)
             except NotKept as error:
                 # Rows that cannot be kept need not be computed.
                 failure = str(error)
+            except Ended as end:
+                failure, remark = None, str(end)
             if failure is None:
                 _terminate(instances)
-            ending = Ending(failure, log.messages, tuple(interrupts.signals))
+            ending = Ending(failure, remark, log.messages, tuple(interrupts.signals))
             tell(ending)
         return ending
 
@@ -112,6 +122,7 @@ def _initialise(
     """
     for name, instance in instances.items():
         instance.enter_initialization(system.parameters_of(name), experiment.stop_time)
+        row.enter(name, instance.read(system.open_inputs(name)))
     values = row.values
     targets, sources = row.places(system.connections)
     # Through a chain of all, once more for what its end feeds, and once to see it at rest.
@@ -138,12 +149,27 @@ def _exchange(instances: Mapping[str, Instance], row: Row) -> None:
         raise StartError(f"stopped at t = 0 s: {not_finite}")
 
 
-def _parameters(instances: Mapping[str, Instance]) -> dict[PortName, object]:
-    return {
-        PortName(name, parameter): value
-        for name, instance in instances.items()
-        for parameter, value in instance.parameters().items()
-    }
+def _parameters(
+    system: System, instances: Mapping[str, Instance], log: Log
+) -> dict[PortName, object]:
+    """Values of all parameters as the FMUs hold them; where one is not what was set, the log says.
+
+    Some FMUs overwrite values without a word.
+    """
+    parameters: dict[PortName, object] = {}
+    for name, instance in instances.items():
+        component, wanted = system.components[name], system.parameters_of(name)
+        own = [variable.name for variable in component.having("parameter")]
+        lasting = [port for port in wanted if component.variables[port].initial == "exact"]
+        held = instance.read(list(dict.fromkeys((*own, *lasting))))
+        for port in lasting:
+            if not same(wanted[port], held[port]):
+                log.remark(
+                    f"{name}.{port} was set to {literal(wanted[port])}, and the FMU holds "
+                    f"{literal(held[port])}"
+                )
+        parameters |= {PortName(name, port): held[port] for port in own}
+    return parameters
 
 
 def _terminate(instances: Mapping[str, Instance]) -> None:
@@ -154,29 +180,34 @@ def _terminate(instances: Mapping[str, Instance]) -> None:
 
 
 def _advance(
-    experiment: Experiment,
-    steps: Iterator[int],
-    row: Row,
+    run: Run,
+    loop: Loop,
+    attendance: Attendance,
     order: Sequence[str],
-    blocks: Blocks,
     interrupts: Interrupts,
 ) -> str | None:
     """Step to the end, or to the first failure, and say what it was."""
-    k, failure = 0, None
+    blocks, failure = run.blocks, None
     try:
-        for k in steps:
+        attendance.attend()
+        for _ in loop.steps(run):
+            if run.made >= run.due:
+                attendance.attend()
             if monotonic() > blocks.due:
                 blocks.hand_over()
             if interrupts.signals:
-                failure = f"interrupted at t = {experiment.time(k):.12g} s"
+                failure = f"interrupted at t = {run.time:.12g} s"
                 break
     except ComponentFailed as error:
-        failure = f"stopped at t = {experiment.time(k):.12g} s: {error}"
+        failure = f"stopped at t = {run.time:.12g} s: {error}"
     except KeyboardInterrupt:
-        failure = f"interrupted at t = {experiment.time(k):.12g} s"
+        failure = f"interrupted at t = {run.time:.12g} s"
+    except Ended as end:
+        blocks.hand_over()
+        raise Ended(f"ended at t = {run.time:.12g} s: {end}") from None
     # Also where another component has refused it in the same step.
-    if not_finite := row.not_finite(order):
-        failure = f"stopped at t = {experiment.time(k + 1):.12g} s: {not_finite}"
+    if not_finite := run.row.not_finite(order):
+        failure = f"stopped at t = {run.experiment.time(run.made + 1):.12g} s: {not_finite}"
     blocks.hand_over()
     return failure
 
