@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from orchestrator.errors import InputError
+
+
+class Refused(InputError):
+    """A file is refused for its findings, which hold every problem; the text is the first."""
 
 
 class Findings:
@@ -32,14 +39,24 @@ class Findings:
         elif text not in self.notes:
             self.notes.append(text)
 
+    @contextmanager
+    def collecting(self) -> Iterator[None]:
+        """Take note of the mistake that ends what is done here, and let the rest go on."""
+        try:
+            yield
+        except Refused:
+            pass
+        except InputError as error:
+            self.problem(str(error))
+
     def refuse(self) -> None:
         """Refuse what has problems.
 
         Raises:
-            InputError: with the first of them.
+            Refused: with the first of them.
 
         """
         if self.problems:
             more = len(self.problems) - 1
             others = f" (and {more} more: see `auv-fmu check`)" if more else ""
-            raise InputError(f"{self.problems[0]}{others}")
+            raise Refused(f"{self.problems[0]}{others}")

@@ -35,8 +35,8 @@ their start values. What holds the same bytes is counted once.
 
 Systems that libcosim or ecos can run as well are held against them in Jacobi order, with the same
 steps; FMUs against a plain host of {host} lines that shares nothing with the master, as t_k = k h
-has it. A deviation is the largest over all Real outputs and steps, relative to the size of an output
-where that is above one. Compared with: {tools}.
+has it. A deviation is the largest over all Real outputs and steps, relative to the size of an
+output where that is above one. Compared with: {tools}.
 """
 
 
@@ -93,8 +93,8 @@ def _fmus(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     numbers = [one["deviation"] for one in running if isinstance(one["deviation"], float)]
     yield f"\n## FMUs alone\n\n{len(running)} of {len(there)} run.\n"
     yield (
-        f"{len(numbers)} have Real outputs that the plain host reads as well: "
-        f"{sum(d == 0.0 for d in numbers)} agree bit for bit, {_within(numbers)} to {FMU_BOUND:g}.\n"
+        f"{len(numbers)} have Real outputs that the plain host reads as well: {_equal(numbers)} "
+        f"agree bit for bit, {_within(numbers)} to {FMU_BOUND:g}.\n"
     )
     yield from _rest(running, "deviation")
     yield "| FMUs that do not run | why |\n| --- | --- |"
@@ -109,6 +109,10 @@ def _rest(running: Iterable[Mapping[str, Any]], key: str) -> Iterator[str]:
         deviation = one.get(key)
         if isinstance(deviation, float) and not deviation <= FMU_BOUND:
             yield f"- {_name(one)} deviates by {deviation:.1e}.\n"
+
+
+def _equal(numbers: Iterable[float]) -> int:
+    return sum(d == 0.0 for d in numbers)
 
 
 def _within(numbers: Iterable[float]) -> int:

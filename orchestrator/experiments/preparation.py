@@ -125,10 +125,10 @@ def loaded(
         return Scenario(Path(name).stem, title=Path(name).name), system
     if variant is not None:
         raise InputError(f"{name}: has no variants; an SSP may have")
-    scenario = read_scenario(name)
+    scenario = read_scenario(name, findings)
     check_figure(scenario.figure)
     versions = RUNNABLE if fmi == FMI[0] else WRITABLE
-    return scenario, closed_loop(current_fmus(kind, fmi), scenario, versions)
+    return scenario, closed_loop(current_fmus(kind, fmi), scenario, versions, findings)
 
 
 def check_brings_its_own(name: str, kind: str, fmi: str = FMI[0]) -> None:

@@ -19,6 +19,7 @@ from orchestrator.experiments.entries import (
     is_text,
 )
 from orchestrator.experiments.named import names_in, path_of
+from orchestrator.findings import Findings
 from orchestrator.reading import explained, text_of
 from orchestrator.system.names import PortName, port_name
 
@@ -137,8 +138,12 @@ def names() -> list[str]:
     return names_in(FOLDER)
 
 
-def read_scenario(name: str) -> Scenario:
+def read_scenario(name: str, findings: Findings | None = None) -> Scenario:
     """A scenario of the bundle by its name, or any by the path of its file.
+
+    Args:
+        name: of the scenario, or path of its file.
+        findings: take all mistakes in the file; None: nobody asks for more than the first.
 
     Raises:
         InputError: there is no such scenario, or its file has a mistake.
@@ -147,12 +152,12 @@ def read_scenario(name: str) -> Scenario:
     path = path_of(name, FOLDER, "scenario", ".toml or .ssp")
     text = text_of(path, _WHAT)
     with explained(path, _WHAT):
-        return _scenario(path, text)
+        return _scenario(path, text, findings)
 
 
-def _scenario(path: Path, text: str) -> Scenario:
+def _scenario(path: Path, text: str, findings: Findings | None) -> Scenario:
     content = tomllib.loads(text)
-    check_entries(path, content, ENTRIES)
+    check_entries(path, content, ENTRIES, findings)
     content["parameters"] = {
         port_name(key): value for key, value in flattened(content.get("parameters", {}))
     }

@@ -1,0 +1,107 @@
+"""An FMU examined without loading it: what is wrong with it, and what it cannot do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree import ElementTree
+
+import fmpy
+from fmpy.validation import validate_fmu
+
+from orchestrator.errors import InputError, reason
+from orchestrator.findings import Findings
+from orchestrator.system.component import Component, read_component
+from orchestrator.system.unpacking import unpacked
+
+#: What of an FMU surprises who runs it, by the flag of its description and what that is then.
+_SURPRISES = {
+    ("canBeInstantiatedOnlyOncePerProcess", True): "one instance a process: a further one gets a "
+    "process of its own",
+    ("needsExecutionTool", True): "needs the program that it was made with",
+    ("canHandleVariableCommunicationStepSize", False): "takes steps of one length alone: the stop "
+    "time must be a multiple of the step",
+    ("canRunAsynchronuously", True): "may compute a step while its host goes on",
+    ("canGetAndSetFMUstate", False): "gives no state: a run of it cannot be resumed",
+}
+
+
+def examine(fmu: Path, findings: Findings) -> Component | None:
+    """Take note of all that is wrong with an FMU.
+
+    Args:
+        fmu: the file.
+        findings: take it.
+
+    Returns:
+        The FMU; None: it is none that can be run.
+
+    """
+    with findings.collecting():
+        unpacked(fmu)
+        for flaw in _flaws(fmu):
+            findings.note(flaw)
+        component = read_component(fmu.stem, fmu)
+        if problem := missing_binary(component):
+            findings.problem(problem)
+        for text in (*_dangling(component), *_bad_starts(component), *_aliases(component)):
+            findings.note(text)
+        return component
+    return None
+
+
+def missing_binary(component: Component) -> str | None:
+    """What is to be said if an FMU has no binary for this machine."""
+    folder = unpacked(component.fmu) / "binaries"
+    identifier = component.description.coSimulation.modelIdentifier
+    if (folder / fmpy.platform / f"{identifier}{fmpy.sharedLibraryExtension}").is_file():
+        return None
+    others = sorted(path.name for path in folder.glob("*") if path.is_dir())
+    return f"has no binary for {fmpy.platform}, only for {', '.join(others) or 'no machine'}"
+
+
+def surprises(component: Component) -> Iterator[str]:
+    """What an FMU cannot do, or does in another way than most."""
+    for (flag, value), text in _SURPRISES.items():
+        if getattr(component.description.coSimulation, flag) is value:
+            yield text
+    if component.having("input") and all(
+        unknown.dependencies is None for unknown in component.description.outputs
+    ):
+        yield "does not say what its outputs depend on: each is taken to depend on all inputs"
+
+
+def _flaws(fmu: Path) -> list[str]:
+    """What the standard's schema and rules have against the description."""
+    try:
+        return [str(problem) for problem in validate_fmu(str(fmu))]
+    except Exception as error:
+        return [reason(error)]
+
+
+def _dangling(component: Component) -> Iterator[str]:
+    """References in the structure of the model to variables that do not exist."""
+    root = ElementTree.parse(unpacked(component.fmu) / "modelDescription.xml").getroot()
+    known = range(1, 1 + len(component.description.modelVariables))
+    for unknown in root.iterfind("ModelStructure//Unknown"):
+        for index in (unknown.get("index", ""), *unknown.get("dependencies", "").split()):
+            if not index.isdecimal() or int(index) not in known:
+                yield f"its model structure names variable {index!r}; there are {len(known)}"
+
+
+def _bad_starts(component: Component) -> Iterator[str]:
+    """Start values that are not of the types of their variables, or out of their ranges."""
+    for name in component.variables:
+        try:
+            component.start(name)
+        except InputError as error:
+            yield f"start value of {error}"
+
+
+def _aliases(component: Component) -> Iterator[str]:
+    """Inputs and parameters that are one variable under several names."""
+    seen: dict[tuple[str, int], str] = {}
+    for variable in (*component.having("input"), *component.having("parameter")):
+        other = seen.setdefault((variable.type, variable.valueReference), variable.name)
+        if other != variable.name:
+            yield f"{other} and {variable.name} are one: who sets one sets both"
