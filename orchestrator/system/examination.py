@@ -38,13 +38,13 @@ def examine(fmu: Path, findings: Findings) -> Component | None:
 
     """
     with findings.collecting():
-        unpacked(fmu)
-        for flaw in _flaws(fmu):
-            findings.note(flaw)
+        # What is read of a description with references to nothing depends on the reader.
+        for text in list(_dangling(fmu)) or _flaws(fmu):
+            findings.note(text)
         component = read_component(fmu.stem, fmu)
         if problem := missing_binary(component):
             findings.problem(problem)
-        for text in (*_dangling(component), *_bad_starts(component), *_aliases(component)):
+        for text in (*_bad_starts(component), *_aliases(component)):
             findings.note(text)
         return component
     return None
@@ -79,10 +79,13 @@ def _flaws(fmu: Path) -> list[str]:
         return [reason(error)]
 
 
-def _dangling(component: Component) -> Iterator[str]:
+def _dangling(fmu: Path) -> Iterator[str]:
     """References in the structure of the model to variables that do not exist."""
-    root = ElementTree.parse(unpacked(component.fmu) / "modelDescription.xml").getroot()
-    known = range(1, 1 + len(component.description.modelVariables))
+    try:
+        root = ElementTree.parse(unpacked(fmu) / "modelDescription.xml").getroot()
+    except (OSError, ElementTree.ParseError):
+        return
+    known = range(1, 1 + len(root.findall("ModelVariables/ScalarVariable")))
     for unknown in root.iterfind("ModelStructure//Unknown"):
         for index in (unknown.get("index", ""), *unknown.get("dependencies", "").split()):
             if not index.isdecimal() or int(index) not in known:
