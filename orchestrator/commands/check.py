@@ -10,8 +10,10 @@ from orchestrator.commands.options import BAD_INPUT, OK
 from orchestrator.commands.streams import show
 from orchestrator.experiments.preparation import Request, loaded, prepare
 from orchestrator.findings import Findings
+from orchestrator.master.binary import check_binary
 from orchestrator.system.component import Component
-from orchestrator.system.examination import examine, missing_binary, surprises
+from orchestrator.system.examination import examine, surprises
+from orchestrator.system.unpacking import unpacked
 
 
 def add_to(commands: Any) -> None:
@@ -37,6 +39,9 @@ def _check(options: argparse.Namespace) -> int:
         components = {} if component is None else {component.name: component}
     else:
         components = _components(options, findings)
+    for component in components.values():
+        with findings.collecting():
+            check_binary(component, unpacked(component.fmu))
     for kind, texts in (("problem", findings.problems), ("note", findings.notes)):
         for text in texts:
             show(f"{kind}: {text}")
@@ -55,8 +60,5 @@ def _components(options: argparse.Namespace, findings: Findings) -> dict[str, Co
         scenario, system = loaded(options.file, variant=options.variant, findings=findings)
         with findings.collecting():
             prepare(scenario, system, Request())
-        for name, component in system.components.items():
-            if problem := missing_binary(component):
-                findings.problem(f"{name}: {component.fmu.name} {problem}")
         return dict(system.components)
     return {}

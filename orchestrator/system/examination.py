@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
-import fmpy
 from fmpy.validation import validate_fmu
 
 from orchestrator.errors import InputError, reason
@@ -42,22 +41,10 @@ def examine(fmu: Path, findings: Findings) -> Component | None:
         for text in list(_dangling(fmu)) or _flaws(fmu):
             findings.note(text)
         component = read_component(fmu.stem, fmu)
-        if problem := missing_binary(component):
-            findings.problem(problem)
         for text in (*_bad_starts(component), *_aliases(component)):
             findings.note(text)
         return component
     return None
-
-
-def missing_binary(component: Component) -> str | None:
-    """What is to be said if an FMU has no binary for this machine."""
-    folder = unpacked(component.fmu) / "binaries"
-    identifier = component.description.coSimulation.modelIdentifier
-    if (folder / fmpy.platform / f"{identifier}{fmpy.sharedLibraryExtension}").is_file():
-        return None
-    others = sorted(path.name for path in folder.glob("*") if path.is_dir())
-    return f"has no binary for {fmpy.platform}, only for {', '.join(others) or 'no machine'}"
 
 
 def surprises(component: Component) -> Iterator[str]:

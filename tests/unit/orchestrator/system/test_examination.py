@@ -3,7 +3,6 @@ from __future__ import annotations
 from pathlib import Path
 from zipfile import ZipFile
 
-import fmpy
 import pytest
 
 from orchestrator.findings import Findings
@@ -31,7 +30,7 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 def fmu(tmp_path):
     """Makes an FMU of a description in which some words are others."""
 
-    def make(*changes: tuple[str, str], platform: str = fmpy.platform) -> Path:
+    def make(*changes: tuple[str, str]) -> Path:
         text = DESCRIPTION
         for old, new in changes:
             assert old in text
@@ -39,7 +38,6 @@ def fmu(tmp_path):
         path = tmp_path / "odd.fmu"
         with ZipFile(path, "w") as archive:
             archive.writestr("modelDescription.xml", text)
-            archive.writestr(f"binaries/{platform}/odd{fmpy.sharedLibraryExtension}", "")
         return path
 
     return make
@@ -71,9 +69,9 @@ def test_each_mistake_is_a_note(fmu, change, said):
 def test_all_mistakes_are_said_at_once(fmu):
     findings = Findings()
     changes = [('start="1"', 'start="3"'), ('dependencies="1"', 'dependencies="0"')]
-    examine(fmu(*changes, platform="nowhere"), findings)
-    assert len(findings.notes) >= 2
-    assert findings.problems == [f"has no binary for {fmpy.platform}, only for nowhere"]
+    examine(fmu(*changes), findings)
+    for word in ("odd.p", "variable '0'"):
+        assert any(word in note for note in findings.notes)
 
 
 @pytest.mark.parametrize(
