@@ -79,5 +79,16 @@ class Instance(Protocol):
     def parameters(self) -> dict[str, Any]:
         """Values of all parameters, as the FMU reports them."""
 
+    def state(self) -> bytes:
+        """The FMU's whole state between two steps, from which another instance can go on.
+
+        Raises:
+            ComponentFailed: it cannot be had; see :attr:`.component.Component.gives_state`.
+
+        """
+
+    def restore(self, state: bytes) -> None:
+        """Take on a state; what the row holds of this instance is left as it is."""
+
     def terminate(self) -> None:
         """Let the FMU end what it has begun."""

@@ -162,6 +162,17 @@ class IsolatedInstance:
             raise self._nonsense()
         return values
 
+    def state(self) -> bytes:
+        """The FMU's whole state between two steps."""
+        state = self._ask("state")
+        if not isinstance(state, bytes):
+            raise self._nonsense()
+        return state
+
+    def restore(self, state: bytes) -> None:
+        """Take on a state."""
+        self._ask("restore", state)
+
     def pointers(self) -> layout.Member:
         """There are none: its calls are messages to another process."""
         raise NotImplementedError

@@ -114,6 +114,7 @@ class LoadedInstance:
         self._inputs: list[Block] = []
         self._outputs: list[Block] = []
         self._variables = component.variables
+        self._gives_state = component.gives_state
         self._library = library
         self._listener = listener
         self._complaint = ""
@@ -202,6 +203,33 @@ class LoadedInstance:
             for name, variable in self._variables.items()
             if variable.causality == "parameter"
         }
+
+    def state(self) -> bytes:
+        """The FMU's whole state between two steps."""
+        with self._held("getFMUstate") as state:
+            serialised: bytes = self._call("serializeFMUstate", state)
+        return serialised
+
+    def restore(self, state: bytes) -> None:
+        """Take on a state."""
+        self._complaint, self._worst = "", 0
+        with self._held("deSerializeFMUstate", state) as read:
+            self._call("setFMUstate", read)
+        # Some say in a message alone that it is none of theirs.
+        if self._worst >= fmi2Discard:
+            raise ComponentFailed(self._complaint)
+
+    @contextmanager
+    def _held(self, method: str, *arguments: Any) -> Iterator[Any]:
+        """A state that one of fmpy's methods gives, in the FMU's memory, freed at the end."""
+        if not self._gives_state:
+            raise ComponentFailed(f"{self.name}: its FMU does not give its state away")
+        state = self._call(method, *arguments)
+        try:
+            yield state
+        finally:
+            if not self._library.corrupted:
+                self._call("freeFMUstate", state)
 
     def terminate(self) -> None:
         """Let the FMU end what it has begun."""
