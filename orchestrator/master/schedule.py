@@ -16,14 +16,11 @@ from typing import NamedTuple
 
 from fmpy.fmi2 import fmi2Warning
 
-from orchestrator.master.instance import Instance
+from orchestrator.master.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
 from orchestrator.master.row import Row
 from orchestrator.master.signals import Gathering
 from orchestrator.system.graph import feedthrough_stages, has_feedthrough
 from orchestrator.system.structure import Connection, System
-
-#: What a component is asked for in every step, one after the other.
-CALLS = SET_INPUTS, DO_STEP, GET_OUTPUTS = "setting inputs", "fmi2DoStep", "getting outputs"
 
 
 class Member(NamedTuple):
