@@ -15,6 +15,7 @@ module                  what it holds
 :mod:`.keeper`          the process that starts such processes, and leaves none behind
 :mod:`.log`             what FMUs have to say
 :mod:`.row`             the row of all values
+:mod:`.texts`           texts, for which numbers stand in the row
 :mod:`.transfer`        the FMI calls that move them
 :mod:`.schedule`        which components are stepped when, and on whose outputs
 :mod:`.signals`         what is done to values on their way from outputs to inputs

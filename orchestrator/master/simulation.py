@@ -65,7 +65,8 @@ def simulate(
             _initialise(system, instances, row, experiment, log)
             names = tuple(map(str, row.columns))
             parameters = _parameters(system, instances, log)
-            header = Header(names, experiment, parameters, loop.name)
+            texts = dict.fromkeys(map(str, row.text_ports), row.texts)
+            header = Header(names, experiment, parameters, loop.name, texts)
         scheduled = schedule(system, plan, instances, row)
         with _told(header, observers) as tell:
             blocks = Blocks(len(row.values), observers)
@@ -152,7 +153,8 @@ def _initialise(
     """
     for name, instance in instances.items():
         instance.enter_initialization(system.parameters_of(name), experiment.stop_time)
-        row.enter(name, instance.read(system.open_inputs(name)))
+        held = instance.read(system.open_inputs(name))
+        row.enter({PortName(name, port): value for port, value in held.items()})
     values = row.values
     targets, sources = row.places(system.connections)
     # Through a chain of all, once more for what its end feeds, and once to see it at rest.
