@@ -28,17 +28,19 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="of the clones, the files and what came of them")
     parser.add_argument("--again", action="store_true", help="without collecting anew")
     parser.add_argument(
-        "--only", default="", metavar="PATTERN", help="what matches; no page is written"
+        "--only", default="", metavar="PATTERN", help="run what matches; of the rest, what came"
     )
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes at a time")
     options = parser.parse_args()
     items = collected(options.folder) if options.again else collect(options.folder)
-    chosen = [item for item in items if re.search(options.only, f"{item.place}/{item.path}")]
-    found = compared(chosen, options.folder, options.workers)
-    (options.folder / "compared.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
-    if not options.only:
-        host = Path(__file__).with_name("host.py").read_text(encoding="utf-8")
-        PAGE.write_text(page(found, len(host.splitlines())), encoding="utf-8")
+    chosen = [item for item in items if re.search(options.only, item.name)]
+    kept = options.folder / "compared.json"
+    found = json.loads(kept.read_text(encoding="utf-8")) if options.only and kept.exists() else {}
+    found |= compared(chosen, options.folder, options.workers)
+    kept.write_text(json.dumps(found, indent=1), encoding="utf-8")
+    host = Path(__file__).with_name("host.py").read_text(encoding="utf-8")
+    known = [found[item.name] for item in items if item.name in found]
+    PAGE.write_text(page(known, len(host.splitlines())), encoding="utf-8")
 
 
 if __name__ == "__main__":

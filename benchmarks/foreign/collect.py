@@ -68,6 +68,11 @@ class Item:
     copies: int = 0
 
     @property
+    def name(self) -> str:
+        """Its place and path."""
+        return f"{self.place}/{self.path}"
+
+    @property
     def is_fmu(self) -> bool:
         """Whether it is an FMU, not an archive."""
         return self.path.endswith(_FMU)

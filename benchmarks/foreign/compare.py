@@ -21,7 +21,7 @@ from collect import Item
 from other_masters import TOOLS
 
 #: Steps of every run, and seconds that it may take.
-STEPS, PATIENCE = 200, 120
+STEPS, PATIENCE = 200, 600
 
 #: Of what a tool says, the last line says why it has failed; more than this of it is not kept.
 _LONGEST_REASON = 400
@@ -32,10 +32,11 @@ _HELD = 1e-12
 _HERE = Path(__file__).parent
 
 
-def compared(items: Sequence[Item], folder: Path, workers: int | None) -> list[dict[str, Any]]:
-    """What came of each."""
+def compared(items: Sequence[Item], folder: Path, workers: int) -> dict[str, dict[str, Any]]:
+    """What came of each, by its name."""
     with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(partial(_one, folder), items))
+        names = [item.name for item in items]
+        return dict(zip(names, pool.map(partial(_one, folder), items), strict=True))
 
 
 def _one(folder: Path, item: Item) -> dict[str, Any]:
@@ -45,7 +46,7 @@ def _one(folder: Path, item: Item) -> dict[str, Any]:
     with TemporaryDirectory() as temporary:
         examine = _fmu if item.is_fmu else _archive
         found |= examine(folder.resolve() / item.file, Path(temporary))
-    print(f"{item.place}/{item.path}: {found['outcome']} {found['reason']}", flush=True)
+    print(f"{item.name}: {found['outcome']} {found['reason']}", flush=True)
     return found
 
 

@@ -70,7 +70,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     system = system_of(options.file)
     wanted = changed(system.components[ALONE]) if options.changed else {}
     step = step_of(system)
-    stop_time = min(options.steps * step, system.stop_time or np.inf)
+    stop_time = min((system.start_time or 0.0) + options.steps * step, system.stop_time or np.inf)
     with warnings.catch_warnings(record=True) as caught:
         result = simulate(
             system,
