@@ -8,7 +8,7 @@ from time import monotonic
 
 import numpy as np
 
-from orchestrator.errors import InputError, StartError, reason
+from orchestrator.errors import InputError, StartError, reason, shortened
 from orchestrator.master.attendant import Attendance, Attendant, Run
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.instance import ComponentFailed, Ended, Instance
@@ -19,10 +19,13 @@ from orchestrator.master.log import Log
 from orchestrator.master.loop import PYTHON_LOOP, Loop
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import schedule, stages
-from orchestrator.master.signals import Signals
+from orchestrator.master.schedule import paces, schedule, stages
+from orchestrator.master.signals import Gathering, Signals
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+
+#: In a ring initial values are exchanged so often, until they rest.
+_MOST_ROUNDS = 1000
 
 
 def simulate(
@@ -33,7 +36,7 @@ def simulate(
     loop: Loop = PYTHON_LOOP,
     attendants: Sequence[Attendant] = (),
 ) -> Ending:
-    """Run a system from t = 0.
+    """Run a system.
 
     Args:
         system: what to run.
@@ -53,6 +56,7 @@ def simulate(
     """
     system.check()
     plan = stages(system, experiment.order)
+    slow = {name for name, n in paces(system, experiment.step).items() if n > 1}
     log = Log()
     with held_interrupts() as interrupts, ExitStack() as stack:
         with _explained():
@@ -62,15 +66,15 @@ def simulate(
                 if isolation
                 else all_loaded(components, log)
             )
-            row = Row(system, instances)
+            row = Row(system, instances, slow)
             _initialise(system, instances, row, experiment, log)
             names = tuple(map(str, row.columns))
             header = Header(names, experiment, _parameters(instances), loop.name)
-        scheduled = schedule(system, plan, instances, row)
+        scheduled = schedule(system, experiment, plan, instances, row)
         with _told(header, observers) as tell:
-            blocks = Blocks(len(row.values), observers)
+            blocks = Blocks(len(row.shown), observers)
             interrupts.hand_over = blocks.hand_over
-            blocks.append(0.0, row.values)
+            blocks.append(experiment.start_time, row.shown)
             signals = Signals(row, [stage.gather for stage in scheduled], system.connections)
             run = Run(system, experiment, instances, row, scheduled, signals, blocks)
             order = [name for names in plan for name in names]
@@ -121,19 +125,23 @@ def _initialise(
     for name, instance in instances.items():
         instance.enter_initialization(system.parameters_of(name), experiment.stop_time)
     values = row.values
-    targets, sources = row.places(system.connections)
+    gather = Gathering.along(row, system.connections)
     # Through a chain of all, once more for what its end feeds, and once to see it at rest.
-    for _ in range(len(instances) + 2):
+    for _ in range(max(len(instances) + 2, _MOST_ROUNDS)):
         before = values.copy()
-        values[targets] = values[sources]
+        gather(values)
         _exchange(instances, row)
         if np.array_equal(before, values):
             break
     else:
-        raise InputError("initial values do not come to rest: an algebraic loop")
+        if restless := row.moving(before):
+            raise InputError(
+                f"initial values do not come to rest: {shortened(', '.join(map(str, restless)))} "
+                "in an algebraic loop"
+            )
     for instance in instances.values():
         instance.exit_initialization()
-    values[targets] = values[sources]
+    gather(values)
     _exchange(instances, row)
     if log.refusals:
         raise InputError("; ".join(log.refusals))
@@ -142,6 +150,7 @@ def _initialise(
 def _exchange(instances: Mapping[str, Instance], row: Row) -> None:
     for instance in instances.values():
         instance.exchange()
+    row.show()
     if not_finite := row.not_finite(instances):
         raise StartError(f"stopped at t = 0 s: {not_finite}")
 
