@@ -12,7 +12,7 @@ import numpy as np
 from orchestrator.errors import InputError, last_line
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.library import COMPILERS, machines_compiler
-from orchestrator.master.schedule import stages
+from orchestrator.master.schedule import gathered, stages
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System

@@ -23,6 +23,7 @@ from orchestrator.master.schedule import paces, schedule, stages
 from orchestrator.master.signals import Gathering, Signals
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+from orchestrator.system.values import literal, same
 
 #: In a ring initial values are exchanged so often, until they rest.
 _MOST_ROUNDS = 1000
@@ -69,7 +70,8 @@ def simulate(
             row = Row(system, instances, slow)
             _initialise(system, instances, row, experiment, log)
             names = tuple(map(str, row.columns))
-            header = Header(names, experiment, _parameters(instances), loop.name)
+            parameters = _parameters(system, instances, log)
+            header = Header(names, experiment, parameters, loop.name)
         scheduled = schedule(system, experiment, plan, instances, row)
         with _told(header, observers) as tell:
             blocks = Blocks(len(row.shown), observers)
@@ -123,14 +125,17 @@ def _initialise(
 
     """
     for name, instance in instances.items():
-        instance.enter_initialization(system.parameters_of(name), experiment.stop_time)
+        instance.enter_initialization(
+            system.parameters_of(name), experiment.stop_time, experiment.start_time
+        )
+        row.enter(name, instance.read(system.open_inputs(name)))
     values = row.values
     gather = Gathering.along(row, system.connections)
     # Through a chain of all, once more for what its end feeds, and once to see it at rest.
     for _ in range(max(len(instances) + 2, _MOST_ROUNDS)):
         before = values.copy()
         gather(values)
-        _exchange(instances, row)
+        _exchange(instances, row, experiment)
         if np.array_equal(before, values):
             break
     else:
@@ -142,25 +147,40 @@ def _initialise(
     for instance in instances.values():
         instance.exit_initialization()
     gather(values)
-    _exchange(instances, row)
+    _exchange(instances, row, experiment)
     if log.refusals:
         raise InputError("; ".join(log.refusals))
 
 
-def _exchange(instances: Mapping[str, Instance], row: Row) -> None:
+def _exchange(instances: Mapping[str, Instance], row: Row, experiment: Experiment) -> None:
     for instance in instances.values():
         instance.exchange()
     row.show()
     if not_finite := row.not_finite(instances):
-        raise StartError(f"stopped at t = 0 s: {not_finite}")
+        raise StartError(f"stopped at t = {experiment.start_time:g} s: {not_finite}")
 
 
-def _parameters(instances: Mapping[str, Instance]) -> dict[PortName, object]:
-    return {
-        PortName(name, parameter): value
-        for name, instance in instances.items()
-        for parameter, value in instance.parameters().items()
-    }
+def _parameters(
+    system: System, instances: Mapping[str, Instance], log: Log
+) -> dict[PortName, object]:
+    """Values of all parameters as the FMUs hold them; where one is not what was set, the log says.
+
+    Some FMUs overwrite values without a word.
+    """
+    parameters: dict[PortName, object] = {}
+    for name, instance in instances.items():
+        component, wanted = system.components[name], system.parameters_of(name)
+        own = [variable.name for variable in component.having("parameter")]
+        lasting = [port for port in wanted if component.variables[port].initial == "exact"]
+        held = instance.read(list(dict.fromkeys((*own, *lasting))))
+        for port in lasting:
+            if not same(wanted[port], held[port]):
+                log.remark(
+                    f"{name}.{port} was set to {literal(wanted[port])}, and the FMU holds "
+                    f"{literal(held[port])}"
+                )
+        parameters |= {PortName(name, port): held[port] for port in own}
+    return parameters
 
 
 def _terminate(instances: Mapping[str, Instance]) -> None:
