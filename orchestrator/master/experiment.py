@@ -23,6 +23,16 @@ ROUNDING, _MOST_OF_A_STEP = 1e-9, 1e-3
 MOST_STEPS = 1_000_000_000
 
 
+def order_of(text: str) -> Order:
+    """An order as a command line has it: one of :data:`ORDERS`, or names with commas."""
+    return text if text in ORDERS else tuple(name.strip() for name in text.split(","))
+
+
+def written_order(order: Order) -> str:
+    """An order as a command line has it."""
+    return order if isinstance(order, str) else ",".join(order)
+
+
 @dataclass(frozen=True)
 class Experiment:
     """What to run a system for.
@@ -52,15 +62,14 @@ class Experiment:
             except OverflowError:
                 raise InputError("times and step must be smaller than 1e308 s") from None
         if not all(isfinite(value) and value > 0.0 for value in (self._length, self.step)):
+            after = f" after {self.start_time:g} s" if self.start_time else ""
             raise InputError(
-                f"stop time {self.stop_time:g} s and step {self.step:g} s must be "
-                f"{f'after {self.start_time:g} s and' if self.start_time else ''} positive, and "
-                "finite"
+                f"stop time {self.stop_time:g} s{after} and step {self.step:g} s must be positive, "
+                "and finite"
             )
         if self._length / self.step > MOST_STEPS:
             raise InputError(
-                f"{self._length:g} s in steps of {self.step:g} s are more than "
-                f"{MOST_STEPS:,} steps"
+                f"{self._length:g} s in steps of {self.step:g} s are more than {MOST_STEPS:,} steps"
             )
         if not isinstance(self.order, str):
             object.__setattr__(self, "order", tuple(self.order))
