@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -12,6 +14,7 @@ from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import FMI, PYTHON, current_fmus
 from orchestrator.experiments.scenario import Scenario, read_scenario
 from orchestrator.experiments.wiring import closed_loop
+from orchestrator.findings import Findings
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.isolated import Isolation
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
@@ -35,6 +38,7 @@ class Request:
         kind: of the bundle's FMUs, one of :data:`orchestrator.experiments.bundle.KINDS`.
         isolation: of the FMUs in processes of their own; None: they run in this one.
         loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
+        strict: whether what is not as it should be is refused, even if it is harmless.
 
     """
 
@@ -45,6 +49,7 @@ class Request:
     isolation: Isolation | None = None
     kind: str = PYTHON
     loop: str = LOOPS[0]
+    strict: bool = False
 
 
 @dataclass(frozen=True)
@@ -58,18 +63,25 @@ class Prepared:
     loop: Loop = PYTHON_LOOP
 
 
-def load(name: str | Path, kind: str = PYTHON) -> System:
+def load(
+    name: str | Path, kind: str = PYTHON, *, variant: str | None = None, strict: bool = False
+) -> System:
     """The system of a scenario, or of an SSP, with its experiment.
+
+    What is not as it should be and does no harm is a warning.
 
     Args:
         name: of a scenario of the bundle, or path of a .toml or .ssp file.
         kind: of the bundle's FMUs, `python` or `native`.
+        variant: which of the descriptions in an SSP; None: the default.
+        strict: refuse what otherwise is a warning.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.
 
     """
-    scenario, system = loaded(str(name), kind)
+    with warned(strict) as findings:
+        scenario, system = loaded(str(name), kind, variant=variant, findings=findings)
     return replace(
         system,
         name=scenario.name,
@@ -78,13 +90,30 @@ def load(name: str | Path, kind: str = PYTHON) -> System:
     )
 
 
-def loaded(name: str, kind: str = PYTHON, fmi: str = FMI[0]) -> tuple[Scenario, System]:
+@contextmanager
+def warned(strict: bool = False) -> Iterator[Findings]:
+    """Findings whose notes become warnings, as Python has them."""
+    findings = Findings(strict)
+    yield findings
+    for note in findings.notes:
+        warnings.warn(note, stacklevel=4)
+
+
+def loaded(
+    name: str,
+    kind: str = PYTHON,
+    fmi: str = FMI[0],
+    variant: str | None = None,
+    findings: Findings | None = None,
+) -> tuple[Scenario, System]:
     """A scenario and its system.
 
     Args:
         name: of a scenario of the bundle, or path of a .toml or .ssp file.
         kind: of the bundle's FMUs, `python` or `native`; FMUs that a file names are as they are.
         fmi: their version of FMI. The master can step those of the first.
+        variant: which of the descriptions in an SSP; None: the default.
+        findings: takes what is wrong with it; None: nobody asks for what does no harm.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.
@@ -92,7 +121,10 @@ def loaded(name: str, kind: str = PYTHON, fmi: str = FMI[0]) -> tuple[Scenario, 
     """
     if name.endswith(".ssp"):
         check_brings_its_own(name, kind, fmi)
-        return Scenario(Path(name).stem, title=Path(name).name), read_ssp(Path(name))
+        system = read_ssp(Path(name), variant, findings)
+        return Scenario(Path(name).stem, title=Path(name).name), system
+    if variant is not None:
+        raise InputError(f"{name}: has no variants; an SSP may have")
     scenario = read_scenario(name)
     check_figure(scenario.figure)
     versions = RUNNABLE if fmi == FMI[0] else WRITABLE

@@ -21,6 +21,7 @@ from orchestrator.experiments.preparation import (
     check_brings_its_own,
     loaded,
     prepare,
+    warned,
 )
 from orchestrator.experiments.record import Clock, write_record
 from orchestrator.experiments.run import metrics_json, write_metrics
@@ -177,6 +178,8 @@ def simulate(
     isolate: bool = False,
     step_timeout: float | None = None,
     loop: str = LOOPS[0],
+    variant: str | None = None,
+    strict: bool = False,
 ) -> Result:
     """Run a scenario, an SSP or a system.
 
@@ -197,6 +200,8 @@ def simulate(
         step_timeout: how long an isolated FMU may take for one call [s]; None: 60.
         loop: what makes the steps: `python`, `compiled`, or `auto`, the compiled loop where it is
             to be had; the rows are the same.
+        variant: which of the descriptions in an SSP; None: the default.
+        strict: refuse what otherwise is a warning.
 
     Returns:
         The rows that were computed: all of them, or those before a failure, which
@@ -209,16 +214,19 @@ def simulate(
     """
     if isinstance(system, System):
         check_brings_its_own(str(system), kind)
+        if variant is not None:
+            raise InputError(f"{system}: has no variants; give it to load")
         scenario = Scenario(system.name)
     else:
-        scenario, system = loaded(str(system), kind)
+        with warned(strict) as findings:
+            scenario, system = loaded(str(system), kind, variant=variant, findings=findings)
     if not isinstance(parameters, Mapping | None):
         raise InputError(f"parameters: a mapping by component.parameter, not {parameters!r}")
     changes: dict[PortName, object] = {
         port_name(str(name)): value for name, value in (parameters or {}).items()
     }
     isolation = isolation_of(isolate, step_timeout)
-    request = Request(stop_time, step, order, changes, isolation, kind, loop)
+    request = Request(stop_time, step, order, changes, isolation, kind, loop, strict)
     prepared = prepare(scenario, system, request)
     result = Result(prepared)
     observers: list[Observer] = [result, *([Progress(scenario.name)] * progress)]
