@@ -25,7 +25,7 @@ MOST_STEPS = 1_000_000_000
 
 def order_of(text: str) -> Order:
     """An order as a command line has it: one of :data:`ORDERS`, or names with commas."""
-    return text if text in ORDERS else tuple(name.strip() for name in text.split(","))
+    return tuple(name.strip() for name in text.split(",")) if "," in text else text
 
 
 def written_order(order: Order) -> str:

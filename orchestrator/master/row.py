@@ -121,10 +121,11 @@ class Row:
         )
 
     def hidden(self, ports: Sequence[PortName]) -> tuple[np.ndarray, np.ndarray]:
-        """Where the columns and the hidden places of some outputs are."""
+        """Where the columns and the hidden places of some outputs are, as far as they have any."""
+        known = [port for port in ports if port in self._hidden]
         return (
-            np.array([self.columns[port] for port in ports], dtype=np.intp),
-            np.array([self._hidden[port] for port in ports], dtype=np.intp),
+            np.array([self.columns[port] for port in known], dtype=np.intp),
+            np.array([self._hidden[port] for port in known], dtype=np.intp),
         )
 
     def show(self) -> None:

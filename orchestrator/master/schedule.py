@@ -23,13 +23,14 @@ from typing import NamedTuple
 
 from fmpy.fmi2 import fmi2Warning
 
-from orchestrator.errors import InputError
-from orchestrator.master.experiment import JACOBI, ROUNDING, Experiment, Order
+from orchestrator.errors import InputError, shortened
+from orchestrator.master.experiment import JACOBI, Experiment, Order
 from orchestrator.master.instance import Instance
+from orchestrator.master.paces import paces
 from orchestrator.master.row import Row
 from orchestrator.master.signals import Gathering
 from orchestrator.system.component import Component
-from orchestrator.system.graph import derived_order, has_feedthrough, in_stages
+from orchestrator.system.graph import delayed, derived_order, has_feedthrough, in_stages
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 
@@ -97,6 +98,22 @@ def _check_names(system: System, order: Sequence[str]) -> None:
             )
 
 
+def delays(system: System, order: Order) -> list[str]:
+    """Where an order that follows from the feedthroughs opens a ring of them, in words."""
+    if not isinstance(order, str) or order == JACOBI:
+        return []
+    late = delayed(system, derived_order(system))
+    return [
+        f"{name} takes {shortened(', '.join(str(c.source) for c in late if _feeds(c, name)))} one "
+        "step late: direct feedthroughs form a ring"
+        for name in dict.fromkeys(connection.target.component for connection in late)
+    ]
+
+
+def _feeds(connection: Connection, component: str) -> bool:
+    return connection.target.component == component
+
+
 def gathered(system: System, plan: Sequence[Sequence[str]]) -> list[list[Connection]]:
     """The connections along which values are gathered before each stage.
 
@@ -125,7 +142,7 @@ def schedule(
     """The stages of every step.
 
     Args:
-        system: whose connections say what feeds what.
+        system: whose connections say what feeds what, and whose steps which components are slow.
         experiment: whose step is the communication step.
         plan: its components in :func:`stages`.
         instances: of all components.
@@ -133,25 +150,28 @@ def schedule(
 
     """
     pace = paces(system, experiment.step)
-    found, shown = [], []
+    found: list[Stage] = []
+    shown: list[Stage] = []
     for names, connections in zip(plan, gathered(system, plan), strict=True):
-        # All is gathered before anybody advances, the slow ones first.
-        for every in sorted({pace[c.target.component] for c in connections} - {1}, reverse=True):
-            slow = [c for c in connections if pace[c.target.component] == every]
-            found.append(Stage(Gathering.along(row, slow), [], every))
-        fast = [c for c in connections if pace[c.target.component] == 1]
-        members = [member(instances[name]) for name in names if pace[name] == 1]
-        found.append(Stage(Gathering.along(row, fast), members))
+        taken: dict[int, list[Connection]] = {1: []}
+        for connection in connections:
+            taken.setdefault(pace[connection.target.component], []).append(connection)
+        fast = Stage(
+            Gathering.along(row, taken.pop(1)),
+            [member(instances[name]) for name in names if pace[name] == 1],
+        )
+        # All inputs are gathered before anybody is stepped.
+        found += [Stage(Gathering.along(row, some), [], n) for n, some in taken.items()] + [fast]
         for name in names:
-            if pace[name] > 1:
-                early, later = _shown(system.components[name], experiment.order)
+            if (n := pace[name]) > 1:
                 nothing = Gathering.along(row, ())
-                found += [
-                    Stage(nothing, [member(instances[name])], pace[name]),
-                    Stage(Gathering(*row.hidden(early)), [], pace[name]),
-                ]
-                shown.append(Stage(Gathering(*row.hidden(later)), [], pace[name], at_end=True))
-    return found + shown
+                early, later = (
+                    Gathering(*row.hidden(ports))
+                    for ports in _shown(system.components[name], experiment.order)
+                )
+                found += [Stage(nothing, [member(instances[name])], n), Stage(early, [], n)]
+                shown.append(Stage(later, [], n, at_end=True))
+    return [stage for stage in found + shown if stage.members or len(stage.gather.targets)]
 
 
 def _shown(component: Component, order: Order) -> tuple[list[PortName], list[PortName]]:
@@ -162,30 +182,6 @@ def _shown(component: Component, order: Order) -> tuple[list[PortName], list[Por
         at_once = order != JACOBI and component.has_feedthrough(output.name)
         (early if at_once else later).append(PortName(component.name, output.name))
     return early, later
-
-
-def paces(system: System, step: float) -> dict[str, int]:
-    """How many communication steps each component takes in one of its own.
-
-    Args:
-        system: that says which steps its components want.
-        step: the communication step [s].
-
-    Raises:
-        InputError: a component's step is no multiple of it.
-
-    """
-    found = dict.fromkeys(system.components, 1)
-    for name, own in system.steps.items():
-        system.component(name)
-        n = round(own / step)
-        if n < 1 or abs(own / step - n) > ROUNDING * n:
-            raise InputError(
-                f"{name} wants steps of {own:g} s, which are no multiple of the communication "
-                f"step {step:g} s"
-            )
-        found[name] = n
-    return found
 
 
 def member(instance: Instance) -> Member:

@@ -18,8 +18,9 @@ from orchestrator.master.loaded import all_loaded
 from orchestrator.master.log import Log
 from orchestrator.master.loop import PYTHON_LOOP, Loop
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
+from orchestrator.master.paces import paces
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import paces, schedule, stages
+from orchestrator.master.schedule import delays, schedule, stages
 from orchestrator.master.signals import Gathering, Signals
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
@@ -59,6 +60,8 @@ def simulate(
     plan = stages(system, experiment.order)
     slow = {name for name, n in paces(system, experiment.step).items() if n > 1}
     log = Log()
+    for delay in delays(system, experiment.order):
+        log.remark(delay)
     with held_interrupts() as interrupts, ExitStack() as stack:
         with _explained():
             components = system.components
