@@ -24,7 +24,7 @@ from fmpy.fmi2 import fmi2Warning
 from orchestrator.errors import InputError, StartError, reason
 from orchestrator.master import layout
 from orchestrator.master.channel import Channel, sizes
-from orchestrator.master.instance import ComponentFailed, Instance, Part
+from orchestrator.master.instance import ComponentFailed, Ended, Instance, Part
 from orchestrator.master.interrupts import Interrupts
 from orchestrator.master.keeper import END
 from orchestrator.master.log import Log
@@ -93,6 +93,8 @@ class IsolatedInstance:
     A step is one message there, with the inputs, and one back, with the outputs.
     """
 
+    is_here = False
+
     def __init__(
         self,
         component: Component,
@@ -118,7 +120,7 @@ class IsolatedInstance:
         self.get_outputs: list[Callable[[], int]] = [self._take_outputs]
         self._status, self._log = status, log
         self._timeout, self._interrupts = timeout, interrupts
-        self._doing, self._hangs = "start", False
+        self._doing, self._hangs, self._steps = "start", False, False
         connection.settimeout(min(timeout, _GLANCE))
         self._inputs, self._outputs = np.zeros(0), np.zeros(0)
         inputs, outputs = sizes(component)
@@ -193,7 +195,7 @@ class IsolatedInstance:
         outgoing[0] = t
         outgoing[1] = h
         outgoing[2:] = self._inputs
-        self._doing = "doStep"
+        self._doing, self._steps = "doStep", True
         self._send()
         return 0
 
@@ -223,11 +225,16 @@ class IsolatedInstance:
             self._status(min(self._timeout, _FAREWELL))
 
     def _take_outputs(self) -> int:
+        self._steps = False
         self._receive()
         self._outputs[:] = self._channel.incoming
         return 0
 
     def _ask(self, call: str, *arguments: Any) -> Any:
+        if self._steps:
+            # Another component has ended the run in this step, and its outputs are not wanted.
+            with suppress(ComponentFailed, Ended):
+                self._take_outputs()
         self._doing = call
         self._send({"call": call, "arguments": arguments})
         return self._receive()
@@ -257,11 +264,14 @@ class IsolatedInstance:
         failed: str | None = None,
         fatal: bool = False,
         refused: str | None = None,
+        ended: str | None = None,
     ) -> Any:
         for status, text in messages:
             self._log.take(int(status), str(text))
         if refused is not None:
             raise InputError(str(refused))
+        if ended is not None:
+            raise Ended(str(ended))
         if failed is not None:
             raise ComponentFailed(str(failed), bool(fatal))
         return value

@@ -9,16 +9,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import fmpy
-
 from orchestrator.errors import InputError, reason
 from orchestrator.master.channel import Channel, sizes
-from orchestrator.master.instance import ComponentFailed
+from orchestrator.master.instance import ComponentFailed, Ended
 from orchestrator.master.loaded import LoadedInstance, loaded
 from orchestrator.master.log import Letters
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import member, step
 from orchestrator.system.component import Component
+from orchestrator.system.description import read_description
 from orchestrator.system.structure import System
 
 
@@ -32,7 +31,7 @@ def serve(name: str, fmu: Path, folder: Path, connection: socket.socket) -> None
         connection: to whom wants it simulated.
 
     """
-    component = Component(name, fmu, fmpy.read_model_description(folder))
+    component = Component(name, fmu, read_description(folder).description)
     inputs, outputs = sizes(component)
     # Before the inputs: time and step size.
     channel, letters = Channel(connection, outputs, 2 + inputs), Letters()
@@ -84,6 +83,8 @@ class _Served:
             value = call()
             if value is not None:
                 note["value"] = value
+        except Ended as end:
+            note["ended"] = str(end)
         except ComponentFailed as error:
             note |= {"failed": str(error), "fatal": error.fatal}
         except Exception as error:

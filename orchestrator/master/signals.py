@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -118,6 +119,23 @@ class Signals:
             self._alter(target, *self._own[column])
         elif column in self._before:
             self._row.values[column] = self._before.pop(column)
+
+    def state(self) -> dict[str, Any]:
+        """What is done to them, as JSON has it."""
+        return {
+            "fed": [
+                (column, float(gathering.factors[place]), float(gathering.offsets[place]))
+                for column, (gathering, place) in self._fed.items()
+            ],
+            "before": list(self._before.items()),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Do to them what was done before; the row is left as it is."""
+        for column, factor, offset in state["fed"]:
+            gathering, place = self._fed[column]
+            gathering.set(place, factor, offset)
+        self._before = dict(state["before"])
 
     def _alter(self, target: PortName, factor: float, offset: float) -> None:
         column, values = self._row.columns[target], self._row.values
