@@ -80,7 +80,7 @@ class Host:
         if status >= _DISCARD:
             raise RuntimeError(f"fmi2{name} returns {status}")
 
-    def initialise(self, stop_time: float, values: Mapping[str, float]) -> None:
+    def initialise(self, values: Mapping[str, float]) -> None:
         """Instantiate it, and lead it through initialisation with other start values."""
         library = ctypes.CDLL(None)
         self._callbacks = _Callbacks(
@@ -100,9 +100,9 @@ class Host:
         )
         if not self.instance.value:
             raise RuntimeError("fmi2Instantiate returns NULL")
-        zero, end = ctypes.c_double(0.0), ctypes.c_double(stop_time)
+        zero = ctypes.c_double(0.0)
         self.set(values)
-        self.call("SetupExperiment", 0, zero, zero, 1, end)
+        self.call("SetupExperiment", 0, zero, zero, 0, zero)
         self.call("EnterInitializationMode")
         # Some FMUs take their own values when they enter it.
         self.set(values)
@@ -128,7 +128,7 @@ class Host:
 
     def rows(self, steps: int, step: float, values: Mapping[str, float]) -> np.ndarray:
         """Values of all Real outputs at the start and after each step."""
-        self.initialise(steps * step, values)
+        self.initialise(values)
         outputs = [v for v in self.variables if v.causality == "output" and v.type == "Real"]
         table = [[self.value(output) for output in outputs]]
         for k in range(steps):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,7 @@ def closed_loop(
         for name, value in scenario.parameters.items():
             with findings.collecting():
                 system = system.with_parameters({name: value})
+        system = replace(system, steps=scenario.steps)
     findings.refuse()
     return system
 

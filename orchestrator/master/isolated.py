@@ -146,11 +146,16 @@ class IsolatedInstance:
     def tie(self, values: np.ndarray, parts: Sequence[Part], texts: Texts) -> None:
         """Say where its values are."""
         inputs, outputs = len(self._channel.outgoing) - 2, len(self._channel.incoming)
-        self._inputs, self._outputs = values[:inputs], values[inputs : inputs + outputs]
+        first = next((part.place.start for part in parts if part.causality == "output"), inputs)
+        self._inputs, self._outputs = values[:inputs], values[first : first + outputs]
         self._texts = texts
-        of_texts = [i for p in parts if p.kind == "String" for i in range(len(values))[p.place]]
-        self._text_inputs = [i for i in of_texts if i < inputs]
-        self._text_outputs = [i - inputs for i in of_texts if i >= inputs]
+        for part in parts:
+            if part.kind == "String":
+                places = range(part.place.start, part.place.stop)
+                if part.causality == "input":
+                    self._text_inputs += places
+                else:
+                    self._text_outputs += [place - first for place in places]
 
     def enter_initialization(
         self, values: Mapping[str, Value], stop_time: float, start_time: float = 0.0
