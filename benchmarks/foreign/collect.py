@@ -141,8 +141,11 @@ def _items(clone: _Clone) -> Iterator[tuple[Item, bytes]]:
     for path in map(PurePosixPath, clone.paths):
         if path.suffix in (_FMU, _SSP):
             content = clone.read(str(path))
-            file = f"{'fmus' if path.suffix == _FMU else 'archives'}/{clone.place}/{path}"
-            yield Item(clone.place, str(path), file if content else ""), content
+            kind = "fmus" if path.suffix == _FMU else "archives"
+            file = f"{kind}/{clone.place}/{path}" if content else ""
+            yield Item(clone.place, str(path), file), content
+            if path.suffix == _SSP and content:
+                yield from _inside(clone, path, content)
         elif path.suffix == _STRUCTURE:
             structures.setdefault(path.parent, []).append(path.name)
     for parent, names in structures.items():
@@ -152,6 +155,16 @@ def _items(clone: _Clone) -> Iterator[tuple[Item, bytes]]:
             content = _zipped({**files, DEFAULT: files[name]})
             path = parent / name
             yield Item(clone.place, str(path), f"archives/{clone.place}/{path}{_SSP}"), content
+
+
+def _inside(clone: _Clone, path: PurePosixPath, content: bytes) -> Iterator[tuple[Item, bytes]]:
+    """The FMUs in an archive."""
+    with ZipFile(BytesIO(content)) as archive:
+        for name in archive.namelist():
+            if name.endswith(_FMU):
+                within = f"{path}/{name}"
+                file = f"fmus/{clone.place}/{within}"
+                yield Item(clone.place, within, file), archive.read(name)
 
 
 def _archived(

@@ -43,21 +43,20 @@ def step_of(system: System) -> float:
     return system.step or next(iter(steps), DEFAULT_STEP)
 
 
-def changed(component: Component) -> dict[str, Value]:
-    """Another value for every parameter that has a number; a text could be the name of a file."""
+def changed(component: Component) -> dict[str, float]:
+    """Another value for every Real parameter; others are sizes of arrays and names of files."""
     values = {
         variable.name: _other(variable, component.start(variable.name))
         for variable in component.having("parameter")
+        if variable.type == "Real"
     }
     return {name: value for name, value in values.items() if value is not None}
 
 
-def _other(variable: ModelVariable, start: Value | None) -> Value | None:
-    if isinstance(start, bool):
-        return not start
-    if isinstance(start, str) or start is None:
+def _other(variable: ModelVariable, start: Value | None) -> float | None:
+    if not isinstance(start, float):
         return None
-    by = 1 if isinstance(start, int) else _CHANGE * abs(start) or _CHANGE
+    by = _CHANGE * abs(start) or _CHANGE
     lower, upper = (
         limit if value is None else float(value)
         for value, limit in ((variable.min, -np.inf), (variable.max, np.inf))
