@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from math import isfinite
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 from xml.etree.ElementTree import Element
@@ -145,6 +146,15 @@ class Archive:
             self.problem(f"{owner}: a <{element.tag}> without {name}")
         return element.get(name, "")
 
+    def integer(self, element: Element, name: str) -> int:
+        """An attribute that is an integer; zero where it is not stated or, with a problem, none."""
+        text = element.get(name, "0")
+        try:
+            return int(text)
+        except ValueError:
+            self.problem(f"{name} {text!r} is no integer")
+            return 0
+
     def number(self, element: Element | None, name: str, otherwise: float | None) -> float | None:
         """An attribute that is a number.
 
@@ -156,10 +166,26 @@ class Archive:
         """
         text = None if element is None else element.get(name)
         try:
-            return otherwise if text is None else real(text)
-        except ValueError:
-            self.problem(f"{name} {text!r} is no number")
+            return otherwise if text is None else number(name, text)
+        except InputError as error:
+            self.problem(error)
             return otherwise
+
+
+def number(name: str, text: str) -> float:
+    """The number that an attribute is.
+
+    Raises:
+        InputError: it is none, or not finite.
+
+    """
+    try:
+        found = real(text)
+    except ValueError:
+        raise InputError(f"{name} {text!r} is no number") from None
+    if not isfinite(found):
+        raise InputError(f"{name} {text!r} is not finite")
+    return found
 
 
 def listed(names: Iterable[str]) -> str:
