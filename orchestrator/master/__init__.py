@@ -16,6 +16,7 @@ module                  what it holds
 :mod:`.log`             what FMUs have to say
 :mod:`.row`             the row of all values
 :mod:`.transfer`        the FMI calls that move them
+:mod:`.paces`           which components take longer steps of their own
 :mod:`.schedule`        which components are stepped when, and on whose outputs
 :mod:`.signals`         what is done to values on their way from outputs to inputs
 :mod:`.attendant`       who acts on a run between two steps

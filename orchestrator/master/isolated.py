@@ -138,10 +138,11 @@ class IsolatedInstance:
         self._doing = "instantiate"
         self._receive()
 
-    def tie(self, values: np.ndarray, _: Sequence[Part]) -> None:
+    def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
         """Say where its values are."""
         inputs, outputs = len(self._channel.outgoing) - 2, len(self._channel.incoming)
-        self._inputs, self._outputs = values[:inputs], values[inputs : inputs + outputs]
+        first = next((part.place.start for part in parts if part.causality == "output"), inputs)
+        self._inputs, self._outputs = values[:inputs], values[first : first + outputs]
 
     def enter_initialization(
         self, values: Mapping[str, Value], stop_time: float, start_time: float = 0.0
