@@ -42,8 +42,7 @@ class Gathering:
         for place, connection in enumerate(connections):
             match connection.transformation:
                 case Linear(factor, offset):
-                    # What is added to minus zero stays what it is.
-                    gathering.set(place, factor, offset or OFFSET)
+                    gathering.set(place, factor, offset)
                 case Mapped(pairs):
                     gathering.mapped[place] = dict(pairs)
                     gathering.is_plain = False

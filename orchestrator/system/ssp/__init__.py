@@ -4,6 +4,7 @@
 module                    what it does
 ========================  ============================================================
 :mod:`.document`          a file of an archive as elements, leniently
+:mod:`.validation`        files held against the schemas of the standard
 :mod:`.archive`           an archive: its files, and what is wrong with it
 :mod:`.hierarchy`         systems in systems, their components and connectors
 :mod:`.transformations`   what connections and mappings do to a value

@@ -192,15 +192,13 @@ def definitions_of(archive: Archive, root: Element) -> Definitions:
     for unit in root.findall("Units/Unit"):
         name, base = unit.get("name", ""), unit.find("BaseUnit")
         if base is not None:
-            exponents = tuple(int(archive.number(base, of, 0.0) or 0) for of in BASES)
-            factor, offset = (
-                archive.number(base, "factor", 1.0),
-                archive.number(base, "offset", 0.0),
-            )
-            units[name] = Unit(name, exponents, factor or 1.0, offset or 0.0)
+            exponents = tuple(archive.integer(base, of) for of in BASES)
+            factor = archive.number(base, "factor", 1.0)
+            offset = archive.number(base, "offset", 0.0)
+            units[name] = Unit(name, exponents, 1.0 if factor is None else factor, offset or 0.0)
     enumerations = {
         enumeration.get("name", ""): {
-            item.get("name", ""): int(archive.number(item, "value", 0.0) or 0)
+            item.get("name", ""): archive.integer(item, "value")
             for item in enumeration.findall("Item")
         }
         for enumeration in root.findall("Enumerations/Enumeration")
