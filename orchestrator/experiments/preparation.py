@@ -15,6 +15,7 @@ from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.isolated import Isolation
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
+from orchestrator.master.pace import check_factor
 from orchestrator.system.component import RUNNABLE, WRITABLE
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.reading import read_ssp
@@ -35,6 +36,7 @@ class Request:
         kind: of the bundle's FMUs, one of :data:`orchestrator.experiments.bundle.KINDS`.
         isolation: of the FMUs in processes of their own; None: they run in this one.
         loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
+        real_time: simulated seconds in a second; None: as many as can be had.
 
     """
 
@@ -45,6 +47,7 @@ class Request:
     isolation: Isolation | None = None
     kind: str = PYTHON
     loop: str = LOOPS[0]
+    real_time: float | None = None
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,7 @@ class Prepared:
     experiment: Experiment
     isolation: Isolation | None = None
     loop: Loop = PYTHON_LOOP
+    real_time: float | None = None
 
 
 def load(name: str | Path, kind: str = PYTHON) -> System:
@@ -127,7 +131,9 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
         step = DEFAULT_STEP
     experiment = Experiment(stop_time, step, request.order)
     loop = chosen(request.loop, experiment, request.isolation)
-    return Prepared(scenario, system, experiment, request.isolation, loop)
+    if request.real_time is not None:
+        check_factor(request.real_time)
+    return Prepared(scenario, system, experiment, request.isolation, loop, request.real_time)
 
 
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:

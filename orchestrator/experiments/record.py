@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -49,6 +49,7 @@ def write_record(
     ending: Ending,
     command: Sequence[str],
     clock: Clock,
+    remarks: Mapping[str, object] | None = None,
 ) -> None:
     """Write the record of a run into the folder of its files.
 
@@ -58,6 +59,7 @@ def write_record(
         header, ending: of its table.
         command: that has run it.
         clock: started with it.
+        remarks: what else there is to say of it.
 
     """
     experiment = header.experiment
@@ -75,6 +77,7 @@ def write_record(
             "order": experiment.order,
         },
         "loop": header.loop,
+        **(remarks or {}),
         "fmus": {
             component.name: {
                 "file": component.fmu.name,

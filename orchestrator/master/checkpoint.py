@@ -76,6 +76,7 @@ class Checkpoints:
     As an attendant it comes first: what others do at the same time belongs to what follows.
 
     Attributes:
+        folder: of the checkpoint.
         time: of the checkpoint in the folder [s]; None: there is none.
 
     """
@@ -103,7 +104,7 @@ class Checkpoints:
         """
         if not (isfinite(every) and every > 0.0):
             raise InputError(f"a checkpoint every {every:g} s: must be positive and finite")
-        self._folder, self._identity = folder, identity
+        self.folder, self._identity = folder, identity
         self._every, self._lasting = every, lasting
         self._found = _read(folder)
         if self._found is not None:
@@ -121,9 +122,9 @@ class Checkpoints:
 
     def begin(self, header: Header) -> None:
         """Open the file of rows."""
-        self._folder.mkdir(parents=True, exist_ok=True)
+        self.folder.mkdir(parents=True, exist_ok=True)
         self._known = 0 if self._found is None else self._found.made + 1
-        self._spool = Spool(self._folder / _ROWS, 1 + len(header.columns), self._known)
+        self._spool = Spool(self.folder / _ROWS, 1 + len(header.columns), self._known)
 
     def take(self, rows: np.ndarray) -> None:
         """Write some rows, but for those that are told again."""
@@ -147,7 +148,7 @@ class Checkpoints:
 
     def remove(self) -> None:
         """Remove what a run that has come to its end does not need any more."""
-        rmtree(self._folder)
+        rmtree(self.folder)
 
     def _write(self, run: Run) -> None:
         content = _Stored(
@@ -164,7 +165,7 @@ class Checkpoints:
         run.blocks.hand_over()
         try:
             self._spool.to_disk()
-            with whole(self._folder / _STATE) as partial:
+            with whole(self.folder / _STATE) as partial:
                 partial.write_text(json.dumps(content._asdict()), encoding="utf-8")
         except OSError as error:
             raise NotKept(f"stopped at t = {run.time:g} s: {reason(error)}") from error

@@ -59,6 +59,17 @@ class Lateness:
         return self._worst
 
 
+def check_factor(factor: float) -> None:
+    """Check before a run that a clock can set its pace.
+
+    Raises:
+        InputError: it cannot.
+
+    """
+    if not (isfinite(factor) and factor > 0.0):
+        raise InputError(f"real time times {factor:g}: the factor must be positive and finite")
+
+
 class Pace:
     """An attendant that makes a run wait for a clock, and measures by how much it is late.
 
@@ -72,14 +83,7 @@ class Pace:
     """
 
     def __init__(self, factor: float) -> None:
-        """Run as many simulated seconds in a second.
-
-        Raises:
-            InputError: it is not positive and finite.
-
-        """
-        if not (isfinite(factor) and factor > 0.0):
-            raise InputError(f"real time times {factor:g}: the factor must be positive and finite")
+        """Run as many simulated seconds in a second."""
         self.factor = factor
         self.lateness = Lateness()
         self._origin: float | None = None
@@ -105,6 +109,16 @@ class Pace:
                 run.blocks.hand_over()
             sleep(min(left, _GLANCE))
         self.lateness.take(monotonic() - due)
+
+    def record(self) -> dict[str, float]:
+        """How well it went, for the record of the run [s]."""
+        late = self.lateness
+        return {
+            "factor": self.factor,
+            "late_mean": late.mean,
+            "late_percentile_99": late.percentile,
+            "late_worst": late.worst,
+        }
 
     def __str__(self) -> str:
         """How well it went, in words."""
