@@ -95,6 +95,7 @@ def _identity(prepared: Prepared) -> Identity:
         "the components": ", ".join(system.components),
         **{f"the FMU of {name}": digest_of(of.fmu) for name, of in system.components.items()},
         **{f"what feeds {wire.target}": repr(wire) for wire in system.connections},
+        **{f"the step of {name}": repr(step) for name, step in system.steps.items()},
         **{str(name): repr(value) for name, value in system.parameters.items()},
         **{name: repr(value) for name, value in vars(experiment).items()},
     }

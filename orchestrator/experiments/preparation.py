@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -12,10 +14,13 @@ from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import FMI, PYTHON, current_fmus
 from orchestrator.experiments.scenario import Scenario, read_scenario
 from orchestrator.experiments.wiring import closed_loop
-from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.findings import Findings
+from orchestrator.master.experiment import ORDERS, Experiment, Order
 from orchestrator.master.isolated import Isolation
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
-from orchestrator.master.pace import check_factor
+from orchestrator.master.paces import paces, with_common_step
+from orchestrator.master.real_time import check_factor
+from orchestrator.master.schedule import delays, stages
 from orchestrator.system.component import RUNNABLE, WRITABLE
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.reading import read_ssp
@@ -31,22 +36,26 @@ class Request:
 
     Attributes:
         stop_time, step: experiment [s]; None: the scenario's or the system's own.
-        order: of evaluation.
+        order: of evaluation; None: the scenario's own, or else the first of :data:`ORDERS`.
         parameters: values that win over the scenario's.
         kind: of the bundle's FMUs, one of :data:`orchestrator.experiments.bundle.KINDS`.
         isolation: of the FMUs in processes of their own; None: they run in this one.
         loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
+        strict: whether what is not as it should be is refused, even if it is harmless.
+        steps: of components that take longer ones of their own [s]; they win over the scenario's.
         real_time: simulated seconds in a second; None: as many as can be had.
 
     """
 
     stop_time: float | None = None
     step: float | None = None
-    order: str = ORDERS[0]
+    order: Order | None = None
     parameters: Mapping[PortName, object] = field(default_factory=dict)
     isolation: Isolation | None = None
     kind: str = PYTHON
     loop: str = LOOPS[0]
+    strict: bool = False
+    steps: Mapping[str, float] = field(default_factory=dict)
     real_time: float | None = None
 
 
@@ -62,18 +71,25 @@ class Prepared:
     real_time: float | None = None
 
 
-def load(name: str | Path, kind: str = PYTHON) -> System:
+def load(
+    name: str | Path, kind: str = PYTHON, *, variant: str | None = None, strict: bool = False
+) -> System:
     """The system of a scenario, or of an SSP, with its experiment.
+
+    What is not as it should be and does no harm is a warning.
 
     Args:
         name: of a scenario of the bundle, or path of a .toml or .ssp file.
         kind: of the bundle's FMUs, `python` or `native`.
+        variant: which of the descriptions in an SSP; None: the default.
+        strict: refuse what otherwise is a warning.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.
 
     """
-    scenario, system = loaded(str(name), kind)
+    with warned(strict) as findings:
+        scenario, system = loaded(str(name), kind, variant=variant, findings=findings)
     return replace(
         system,
         name=scenario.name,
@@ -82,13 +98,30 @@ def load(name: str | Path, kind: str = PYTHON) -> System:
     )
 
 
-def loaded(name: str, kind: str = PYTHON, fmi: str = FMI[0]) -> tuple[Scenario, System]:
+@contextmanager
+def warned(strict: bool = False) -> Iterator[Findings]:
+    """Findings whose notes become warnings, as Python has them."""
+    findings = Findings(strict)
+    yield findings
+    for note in findings.notes:
+        warnings.warn(note, stacklevel=4)
+
+
+def loaded(
+    name: str,
+    kind: str = PYTHON,
+    fmi: str = FMI[0],
+    variant: str | None = None,
+    findings: Findings | None = None,
+) -> tuple[Scenario, System]:
     """A scenario and its system.
 
     Args:
         name: of a scenario of the bundle, or path of a .toml or .ssp file.
         kind: of the bundle's FMUs, `python` or `native`; FMUs that a file names are as they are.
         fmi: their version of FMI. The master can step those of the first.
+        variant: which of the descriptions in an SSP; None: the default.
+        findings: takes what is wrong with it; None: nobody asks for what does no harm.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.
@@ -96,7 +129,10 @@ def loaded(name: str, kind: str = PYTHON, fmi: str = FMI[0]) -> tuple[Scenario, 
     """
     if name.endswith(".ssp"):
         check_brings_its_own(name, kind, fmi)
-        return Scenario(Path(name).stem, title=Path(name).name), read_ssp(Path(name))
+        system = read_ssp(Path(name), variant, findings)
+        return Scenario(Path(name).stem, title=Path(name).name), system
+    if variant is not None:
+        raise InputError(f"{name}: has no variants; an SSP may have")
     scenario = read_scenario(name)
     check_figure(scenario.figure)
     versions = RUNNABLE if fmi == FMI[0] else WRITABLE
@@ -126,10 +162,20 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     stop_time = _first_given(request.stop_time, scenario.stop_time, system.stop_time)
     if stop_time is None:
         raise InputError(f"{scenario.name}: names no stop time; give one with --stop-time")
+    system = replace(system, steps={**system.steps, **request.steps})
     step = _first_given(request.step, scenario.step, system.step)
     if step is None:
-        step = DEFAULT_STEP
-    experiment = Experiment(stop_time, step, request.order)
+        system = with_common_step(system)
+        step = _first_given(system.step, DEFAULT_STEP)
+        assert step is not None
+    order = request.order or scenario.order or ORDERS[0]
+    experiment = Experiment(stop_time, step, order, system.start_time or 0.0)
+    paces(system, step)
+    stages(system, order)
+    findings = Findings(request.strict)
+    for delay in delays(system, order):
+        findings.note(delay)
+    findings.refuse()
     loop = chosen(request.loop, experiment, request.isolation)
     if request.real_time is not None:
         check_factor(request.real_time)
@@ -154,8 +200,15 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         for target, value in {**scenario.parameters, **request.parameters}.items()
         if system.has(target)
     }
-    same = replace(companion, stop_time=scenario.stop_time, step=scenario.step)
-    return [prepared, prepare(same, system, replace(request, parameters=shared))]
+    steps = {
+        name: step
+        for name, step in {**scenario.steps, **request.steps}.items()
+        if name in system.components
+    }
+    same = replace(
+        companion, stop_time=scenario.stop_time, step=scenario.step, order=scenario.order
+    )
+    return [prepared, prepare(same, system, replace(request, parameters=shared, steps=steps))]
 
 
 def _first_given(*values: float | None) -> float | None:

@@ -75,6 +75,8 @@ def write_record(
             "stop_time": experiment.stop_time,
             "step": experiment.step,
             "order": experiment.order,
+            "start_time": experiment.start_time,
+            "steps": dict(prepared.system.steps),
         },
         "loop": header.loop,
         **(remarks or {}),
@@ -119,7 +121,12 @@ def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
     experiment = record["experiment"]
     return Header(
         columns,
-        Experiment(experiment["stop_time"], experiment["step"], experiment["order"]),
+        Experiment(
+            experiment["stop_time"],
+            experiment["step"],
+            experiment["order"],
+            experiment.get("start_time", 0.0),
+        ),
         {port_name(name): value for name, value in record["parameters"].items()},
         record.get("loop", "python"),
     )

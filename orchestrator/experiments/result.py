@@ -23,12 +23,13 @@ from orchestrator.experiments.preparation import (
     check_brings_its_own,
     loaded,
     prepare,
+    warned,
 )
 from orchestrator.experiments.record import Clock, write_record
 from orchestrator.experiments.run import metrics_json, write_metrics
 from orchestrator.experiments.scenario import Scenario
 from orchestrator.master.checkpoint import Checkpoints
-from orchestrator.master.experiment import ORDERS
+from orchestrator.master.experiment import Order, written_order
 from orchestrator.master.files import FORMATS
 from orchestrator.master.isolated import isolation_of
 from orchestrator.master.loop import LOOPS
@@ -97,10 +98,10 @@ class Result(Table):
     def __repr__(self) -> str:
         """One line: what was run, and how far it came."""
         end = f", {self.failure}" if self.failure else ""
-        last = self.time[-1] if len(self) else 0.0
+        first, last = (self.time[0], self.time[-1]) if len(self) else (0.0, 0.0)
         return (
             f"<Result {self._prepared.scenario.name}: {len(self)} rows of {len(self.columns)} "
-            f"columns, 0 to {last:g} s, {self.header.experiment.order}{end}>"
+            f"columns, {first:g} to {last:g} s, {written_order(self.header.experiment.order)}{end}>"
         )
 
     @cached_property
@@ -179,12 +180,15 @@ def simulate(
     *,
     stop_time: float | None = None,
     step: float | None = None,
-    order: str = ORDERS[0],
+    order: Order | None = None,
     kind: str = PYTHON,
     progress: bool = False,
     isolate: bool = False,
     step_timeout: float | None = None,
     loop: str = LOOPS[0],
+    variant: str | None = None,
+    strict: bool = False,
+    steps: Mapping[str, float] | None = None,
     checkpoint: str | Path | None = None,
     checkpoint_every: float | None = None,
     resume: bool = False,
@@ -199,8 +203,11 @@ def simulate(
         parameters: values that win over the scenario's, by `component.parameter`: numbers, truth
             values, names, or text as it stands on the command line.
         stop_time: end of the run [s]; None: the scenario's own.
-        step: communication step [s]; None: the scenario's own, else 0.02.
-        order: `gauss-seidel`, as the paper's scheme has it, or `jacobi`, as most tools step.
+        step: communication step [s]; None: the scenario's own, else the longest that fits into
+            the steps that the FMUs were made for, else 0.02.
+        order: `gauss-seidel`, as the paper's scheme has it, `jacobi`, as most tools step, or the
+            names of all components, one stepped after the other; None: the scenario's own, else
+            `gauss-seidel`.
         kind: of the bundle's FMUs, `python` or `native`: translated to C, with the same numbers.
         progress: show a bar on runs that take longer than some seconds.
         isolate: run each FMU in a process of its own, whose end, whatever it does, is no more than
@@ -208,6 +215,10 @@ def simulate(
         step_timeout: how long an isolated FMU may take for one call [s]; None: 60.
         loop: what makes the steps: `python`, `compiled`, or `auto`, the compiled loop where it is
             to be had; the rows are the same.
+        variant: which of the descriptions in an SSP; None: the default.
+        strict: refuse what otherwise is a warning.
+        steps: of components that take longer ones of their own [s], multiples of the communication
+            step; they win over the scenario's.
         checkpoint: folder for what it takes to go on after the process has ended, whatever ended
             it; removed when the run has come to its end.
         checkpoint_every: how often that is written, in simulated seconds; None: as often as
@@ -226,16 +237,19 @@ def simulate(
     """
     if isinstance(system, System):
         check_brings_its_own(str(system), kind)
+        if variant is not None:
+            raise InputError(f"{system}: has no variants; give it to load")
         scenario = Scenario(system.name)
     else:
-        scenario, system = loaded(str(system), kind)
+        with warned(strict) as findings:
+            scenario, system = loaded(str(system), kind, variant=variant, findings=findings)
     if not isinstance(parameters, Mapping | None):
         raise InputError(f"parameters: a mapping by component.parameter, not {parameters!r}")
     changes: dict[PortName, object] = {
         port_name(str(name)): value for name, value in (parameters or {}).items()
     }
     isolation = isolation_of(isolate, step_timeout)
-    request = Request(stop_time, step, order, changes, isolation, kind, loop)
+    request = Request(stop_time, step, order, changes, isolation, kind, loop, strict, steps or {})
     prepared = prepare(scenario, system, request)
     result = Result(prepared)
     observers: list[Observer] = [result, *([Progress(scenario.name)] * progress)]

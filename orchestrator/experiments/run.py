@@ -32,8 +32,8 @@ from orchestrator.master.checkpoint import Checkpoints
 from orchestrator.master.files import FORMATS
 from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.observer import Ending, Observer
-from orchestrator.master.pace import Pace
 from orchestrator.master.progress import Progress
+from orchestrator.master.real_time import RealTime
 from orchestrator.master.selection import Selection, check_interval, matches, matching
 from orchestrator.master.simulation import simulate
 from orchestrator.master.transfer import KINDS
@@ -99,21 +99,21 @@ class _Done:
     metrics: dict[str, Any]
     seen: VisibleRows
     ending: Ending
-    pace: Pace | None
+    real_time: RealTime | None
     resumed_at: float | None
 
     @property
     def remarks(self) -> dict[str, object]:
         """What else the record says."""
         return {
-            **({} if self.pace is None else {"real_time": self.pace.record()}),
+            **({} if self.real_time is None else {"real_time": self.real_time.record()}),
             **({} if self.resumed_at is None else {"resumed_at": self.resumed_at}),
         }
 
     @property
     def notes(self) -> list[str]:
         """What else the user is told, in lines."""
-        return [] if self.pace is None else [str(self.pace)]
+        return [] if self.real_time is None else [str(self.real_time)]
 
 
 def run_into(
@@ -236,9 +236,9 @@ class _Running:
             self.observers.append(checkpoints)
             self.attendants.append(checkpoints)
             self._resumed_at = checkpoints.time
-        self._pace = None if prepared.real_time is None else Pace(prepared.real_time)
-        if self._pace is not None:
-            self.attendants.append(self._pace)
+        self._real_time = None if prepared.real_time is None else RealTime(prepared.real_time)
+        if self._real_time is not None:
+            self.attendants.append(self._real_time)
 
     def ended(self, ending: Ending) -> _Done:
         """When its observers have been told the end."""
@@ -259,7 +259,7 @@ class _Running:
             metrics,
             self._seen,
             ending,
-            self._pace,
+            self._real_time,
             self._resumed_at,
         )
 

@@ -57,7 +57,7 @@ class Run:
 
 
 class Attendant(Protocol):
-    """Somebody who acts on a run between two of its steps: an event, a checkpoint, a pace."""
+    """Somebody who acts on a run between two of its steps: an event, a checkpoint, a clock."""
 
     def attend(self, run: Run) -> int:
         """Act after :attr:`Run.made` steps, for the first time before any.

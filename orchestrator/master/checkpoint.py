@@ -42,6 +42,7 @@ class _Stored(NamedTuple):
         time, made: how far the run had come [s], and in how many steps.
         every: for how many seconds a checkpoint was written [s].
         of: the run.
+        row: all values, hidden ones too.
         states: of the FMUs, as base64.
         lasting: what else there was to remember.
 
@@ -51,6 +52,7 @@ class _Stored(NamedTuple):
     made: int
     every: float
     of: dict[str, str]
+    row: list[float]
     states: dict[str, str]
     lasting: list[Any]
 
@@ -156,6 +158,7 @@ class Checkpoints:
             run.made,
             self._every,
             dict(self._identity),
+            run.row.values.tolist(),
             {
                 name: b64encode(instance.state()).decode()
                 for name, instance in run.instances.items()
@@ -179,7 +182,7 @@ class Checkpoints:
             if run.interrupts:
                 raise KeyboardInterrupt
             first = 0
-        run.row.values[:] = rows[-1, 1:]
+        run.row.values[:] = found.row
         for name, instance in run.instances.items():
             instance.restore(b64decode(found.states[name]))
         for one, state in zip(self._all_lasting(run), found.lasting, strict=True):

@@ -136,14 +136,17 @@ class IsolatedInstance:
         self._doing = "instantiate"
         self._receive()
 
-    def tie(self, values: np.ndarray, _: Sequence[Part]) -> None:
+    def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
         """Say where its values are."""
         inputs, outputs = len(self._channel.outgoing) - 2, len(self._channel.incoming)
-        self._inputs, self._outputs = values[:inputs], values[inputs : inputs + outputs]
+        first = next((part.place.start for part in parts if part.causality == "output"), inputs)
+        self._inputs, self._outputs = values[:inputs], values[first : first + outputs]
 
-    def enter_initialization(self, values: Mapping[str, Value], stop_time: float) -> None:
+    def enter_initialization(
+        self, values: Mapping[str, Value], stop_time: float, start_time: float = 0.0
+    ) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
-        self._ask("enter_initialization", values, stop_time)
+        self._ask("enter_initialization", values, stop_time, start_time)
 
     def exit_initialization(self) -> None:
         """Get ready for the first step."""
@@ -155,12 +158,15 @@ class IsolatedInstance:
         self._ask("exchange")
         self._outputs[:] = self._channel.incoming
 
-    def parameters(self) -> dict[str, Any]:
-        """Values of all parameters, as the FMU reports them."""
-        values = self._ask("parameters")
-        if not isinstance(values, dict):
+    def read(self, ports: Sequence[str]) -> dict[str, Value]:
+        """Values of some variables, as the FMU holds them."""
+        if not ports:
+            return {}
+        values = self._ask("read", list(ports))
+        answers = isinstance(values, dict) and values.keys() == set(ports)
+        if not (answers and all(isinstance(value, Value) for value in values.values())):
             raise self._nonsense()
-        return values
+        return dict(values)
 
     def state(self) -> bytes:
         """The FMU's whole state between two steps."""

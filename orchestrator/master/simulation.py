@@ -8,7 +8,7 @@ from time import monotonic
 
 import numpy as np
 
-from orchestrator.errors import InputError, StartError, reason
+from orchestrator.errors import InputError, StartError, reason, shortened
 from orchestrator.master.attendant import Attendance, Attendant, Run
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.instance import ComponentFailed, Ended, Instance
@@ -18,11 +18,16 @@ from orchestrator.master.loaded import all_loaded
 from orchestrator.master.log import Log
 from orchestrator.master.loop import PYTHON_LOOP, Loop
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
+from orchestrator.master.paces import paces
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import schedule, stages
-from orchestrator.master.signals import Signals
+from orchestrator.master.schedule import delays, schedule, stages
+from orchestrator.master.signals import Gathering, Signals
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+from orchestrator.system.values import literal, same
+
+#: In a ring initial values are exchanged so often, until they rest.
+_MOST_ROUNDS = 1000
 
 
 def simulate(
@@ -33,7 +38,7 @@ def simulate(
     loop: Loop = PYTHON_LOOP,
     attendants: Sequence[Attendant] = (),
 ) -> Ending:
-    """Run a system from t = 0.
+    """Run a system.
 
     Args:
         system: what to run.
@@ -53,7 +58,10 @@ def simulate(
     """
     system.check()
     plan = stages(system, experiment.order)
+    slow = {name for name, n in paces(system, experiment.step).items() if n > 1}
     log = Log()
+    for delay in delays(system, experiment.order):
+        log.remark(delay)
     with held_interrupts() as interrupts, ExitStack() as stack:
         with _explained():
             components = system.components
@@ -62,15 +70,16 @@ def simulate(
                 if isolation
                 else all_loaded(components, log)
             )
-            row = Row(system, instances)
+            row = Row(system, instances, slow)
             _initialise(system, instances, row, experiment, log)
             names = tuple(map(str, row.columns))
-            header = Header(names, experiment, _parameters(instances), loop.name)
-        scheduled = schedule(system, plan, instances, row)
+            parameters = _parameters(system, instances, log)
+            header = Header(names, experiment, parameters, loop.name)
+        scheduled = schedule(system, experiment, plan, instances, row)
         with _told(header, observers) as tell:
-            blocks = Blocks(len(row.values), observers)
+            blocks = Blocks(len(row.shown), observers)
             interrupts.hand_over = blocks.hand_over
-            blocks.append(0.0, row.values)
+            blocks.append(experiment.start_time, row.shown)
             signals = Signals(row, [stage.gather for stage in scheduled], system.connections)
             run = Run(
                 system, experiment, instances, row, scheduled, signals, blocks, log, interrupts
@@ -121,39 +130,62 @@ def _initialise(
 
     """
     for name, instance in instances.items():
-        instance.enter_initialization(system.parameters_of(name), experiment.stop_time)
+        instance.enter_initialization(
+            system.parameters_of(name), experiment.stop_time, experiment.start_time
+        )
+        row.enter(name, instance.read(system.open_inputs(name)))
     values = row.values
-    targets, sources = row.places(system.connections)
+    gather = Gathering.along(row, system.connections)
     # Through a chain of all, once more for what its end feeds, and once to see it at rest.
-    for _ in range(len(instances) + 2):
+    for _ in range(max(len(instances) + 2, _MOST_ROUNDS)):
         before = values.copy()
-        values[targets] = values[sources]
-        _exchange(instances, row)
+        gather(values)
+        _exchange(instances, row, experiment)
         if np.array_equal(before, values):
             break
     else:
-        raise InputError("initial values do not come to rest: an algebraic loop")
+        if restless := row.moving(before):
+            raise InputError(
+                f"initial values do not come to rest: {shortened(', '.join(map(str, restless)))} "
+                "in an algebraic loop"
+            )
     for instance in instances.values():
         instance.exit_initialization()
-    values[targets] = values[sources]
-    _exchange(instances, row)
+    gather(values)
+    _exchange(instances, row, experiment)
     if log.refusals:
         raise InputError("; ".join(log.refusals))
 
 
-def _exchange(instances: Mapping[str, Instance], row: Row) -> None:
+def _exchange(instances: Mapping[str, Instance], row: Row, experiment: Experiment) -> None:
     for instance in instances.values():
         instance.exchange()
+    row.show()
     if not_finite := row.not_finite(instances):
-        raise StartError(f"stopped at t = 0 s: {not_finite}")
+        raise StartError(f"stopped at t = {experiment.start_time:g} s: {not_finite}")
 
 
-def _parameters(instances: Mapping[str, Instance]) -> dict[PortName, object]:
-    return {
-        PortName(name, parameter): value
-        for name, instance in instances.items()
-        for parameter, value in instance.parameters().items()
-    }
+def _parameters(
+    system: System, instances: Mapping[str, Instance], log: Log
+) -> dict[PortName, object]:
+    """Values of all parameters as the FMUs hold them; where one is not what was set, the log says.
+
+    Some FMUs overwrite values without a word.
+    """
+    parameters: dict[PortName, object] = {}
+    for name, instance in instances.items():
+        component, wanted = system.components[name], system.parameters_of(name)
+        own = [variable.name for variable in component.having("parameter")]
+        lasting = [port for port in wanted if component.variables[port].initial == "exact"]
+        held = instance.read(list(dict.fromkeys((*own, *lasting))))
+        for port in lasting:
+            if not same(wanted[port], held[port]):
+                log.remark(
+                    f"{name}.{port} was set to {literal(wanted[port])}, and the FMU holds "
+                    f"{literal(held[port])}"
+                )
+        parameters |= {PortName(name, port): held[port] for port in own}
+    return parameters
 
 
 def _terminate(instances: Mapping[str, Instance]) -> None:

@@ -15,7 +15,7 @@ from orchestrator.experiments.preparation import (
     prepare,
     with_companion,
 )
-from orchestrator.master.experiment import ORDERS
+from orchestrator.master.experiment import ORDERS, Order, written_order
 from orchestrator.system.names import port_name
 from orchestrator.system.values import Value, literal
 
@@ -35,7 +35,7 @@ class Run:
 
     scenario: str
     parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
-    order: str = ORDERS[0]
+    order: Order = ORDERS[0]
     stop_time: float | None = None
     step: float | None = None
     kind: str = PYTHON
@@ -46,7 +46,7 @@ class Run:
         options = [
             *(("--stop-time", _text(self.stop_time)) if self.stop_time is not None else ()),
             *(("--step", _text(self.step)) if self.step is not None else ()),
-            *(("--order", self.order) if self.order != ORDERS[0] else ()),
+            *(("--order", written_order(self.order)) if self.order != ORDERS[0] else ()),
             *(("--kind", self.kind) if self.kind != PYTHON else ()),
         ]
         for name, value in self.parameters.items():

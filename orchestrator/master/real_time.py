@@ -70,7 +70,7 @@ def check_factor(factor: float) -> None:
         raise InputError(f"real time times {factor:g}: the factor must be positive and finite")
 
 
-class Pace:
+class RealTime:
     """An attendant that makes a run wait for a clock, and measures by how much it is late.
 
     A run that is late makes up for it as fast as it can: times are those of one clock, from the

@@ -1,0 +1,169 @@
+"""An SSP archive while it is read: its files, and what is found wrong with it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+from xml.etree.ElementTree import Element
+
+from orchestrator.errors import InputError, did_you_mean, reason
+from orchestrator.findings import Findings
+from orchestrator.system.ssp import STRUCTURE
+from orchestrator.system.ssp.document import read_document
+from orchestrator.system.transformation import Linear
+from orchestrator.system.units import UndefinedUnit, Unit, conversion
+from orchestrator.system.unpacking import unpacked
+from orchestrator.system.values import real
+
+_SUFFIX = Path(STRUCTURE).suffix
+
+#: The version whose words are read; later ones have more of them, of which each is refused.
+_VERSION = "1.0"
+
+#: Of many names, this many are said.
+_MOST_SAID = 5
+
+
+class Archive:
+    """An archive, unpacked, and the findings about it.
+
+    Attributes:
+        path: of the archive.
+        folder: into which it is unpacked.
+        findings: what is wrong with it.
+
+    """
+
+    def __init__(self, path: Path, findings: Findings) -> None:
+        """Unpack it.
+
+        Raises:
+            InputError: it cannot be unpacked.
+
+        """
+        self.path, self.findings = path, findings
+        self.folder = unpacked(path)
+
+    def problem(self, text: object) -> None:
+        """Take note of what makes a run meaningless, or impossible."""
+        self.findings.problem(f"{self.path}: {text}")
+
+    def note(self, text: object) -> None:
+        """Take note of what changes no number."""
+        self.findings.note(f"{self.path}: {text}")
+
+    def structure(self, variant: str | None) -> Element:
+        """The description of the system.
+
+        Args:
+            variant: name of its file, with or without its ending; None: the default.
+
+        Raises:
+            InputError: there is none, or it cannot be read.
+
+        """
+        files = {path.stem: path for path in sorted(self.folder.glob(f"*{_SUFFIX}"))}
+        name = Path(STRUCTURE).stem if variant is None else variant.removesuffix(_SUFFIX)
+        if name not in files:
+            known = f"; it has {', '.join(files)}" if files else ""
+            raise InputError(
+                f"{self.path}: not a readable SSP: there is no {name}{_SUFFIX} in it{known}"
+                f"{did_you_mean(name, files)}"
+            )
+        return self.read(files[name])
+
+    def read(self, path: Path) -> Element:
+        """The root element of a file of the archive.
+
+        Raises:
+            InputError: it cannot be read.
+
+        """
+        name = path.relative_to(self.folder) if path.is_relative_to(self.folder) else path.name
+        try:
+            root = read_document(path.read_bytes(), lambda text: self.note(f"{name}: {text}"))
+        except Exception as error:
+            raise InputError(f"{self.path}: not a readable SSP: {name}: {reason(error)}") from error
+        version = root.get("version")
+        if version != _VERSION:
+            stated = "no version" if version is None else f"version {version!r}"
+            self.note(f"{name}: names {stated} of SSP; it is read as {_VERSION}")
+        return root
+
+    def file(self, source: str, needer: str, base: Path | None = None) -> Path | None:
+        """A file that the description names; None, with a problem, if the archive has none.
+
+        Args:
+            source: its address, a relative URI.
+            needer: what needs it, for the message.
+            base: the folder to which the address is relative; None: that of the description.
+
+        """
+        base = self.folder if base is None else base
+        if "://" in source:
+            self.problem(f"{needer}: {source!r} is elsewhere; a file in the archive is supported")
+            return None
+        decoded = unquote(urlsplit(source).path)
+        for name in dict.fromkeys((decoded, source, source.replace("\\", "/"))):
+            path = Path(os.path.normpath(base / name))
+            if not path.is_relative_to(base):
+                self.problem(f"{needer}: {source!r} lies outside of the archive")
+                return None
+            if path.is_file():
+                if name != decoded:
+                    self.note(f"{needer}: {source!r} is no URI, in which / separates and % encodes")
+                return path
+        self.problem(f"holds no {source!r} for {needer}")
+        return None
+
+    def conversion(self, source: Unit | None, target: Unit | None) -> Linear | None:
+        """From one unit to another, as far as they are defined; None: the value stays as it is.
+
+        Raises:
+            InputError: they measure different things.
+
+        """
+        try:
+            return conversion(source, target)
+        except UndefinedUnit as error:
+            self.note(f"{error}; values are taken as they are")
+            # Said for those who would ask why the units at the ends differ.
+            return Linear()
+
+    def required(self, element: Element, name: str, owner: str) -> str:
+        """An attribute that an element must have; empty, with a problem, where it has not.
+
+        Args:
+            element: with the attribute.
+            name: of the attribute.
+            owner: of the element, for the message.
+
+        """
+        if name not in element.attrib:
+            self.problem(f"{owner}: a <{element.tag}> without {name}")
+        return element.get(name, "")
+
+    def number(self, element: Element | None, name: str, otherwise: float | None) -> float | None:
+        """An attribute that is a number.
+
+        Args:
+            element: with the attribute; None: there is none.
+            name: of the attribute.
+            otherwise: its value where it is not stated, or, with a problem, where it is no number.
+
+        """
+        text = None if element is None else element.get(name)
+        try:
+            return otherwise if text is None else real(text)
+        except ValueError:
+            self.problem(f"{name} {text!r} is no number")
+            return otherwise
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names with commas between them; of many the first."""
+    all_names = list(names)
+    more = len(all_names) - _MOST_SAID
+    return ", ".join(all_names[:_MOST_SAID]) + (f" and {more} more" if more > 0 else "")
