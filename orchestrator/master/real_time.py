@@ -67,7 +67,7 @@ def check_factor(factor: float) -> None:
 
     """
     if not (isfinite(factor) and factor > 0.0):
-        raise InputError(f"real time times {factor:g}: the factor must be positive and finite")
+        raise InputError(f"real time x {factor:g}: the factor must be positive and finite")
 
 
 class RealTime:
@@ -127,6 +127,6 @@ class RealTime:
             f"{1e3 * seconds:.3g} ms" for seconds in (late.mean, late.percentile, late.worst)
         )
         return (
-            f"real time times {self.factor:g}: late by {mean} on average, by no more than "
-            f"{percentile} in {100 * _SHARE:g} % of the steps, by {worst} at worst"
+            f"real time x {self.factor:g}: late by {mean} on average, {percentile} at the 99th "
+            f"percentile, {worst} at worst"
         )

@@ -189,8 +189,8 @@ def test_what_makes_no_sense_is_refused(capsys):
         (["--resume"], "there is nothing to resume in r/checkpoint"),
         (["--checkpoint-every", "0"], "a checkpoint every 0 s: must be positive and finite"),
         (["--checkpoint-every", "nan"], "a checkpoint every nan s"),
-        (["--real-time", "0"], "real time times 0: the factor must be positive and finite"),
-        (["--real-time", "inf"], "real time times inf"),
+        (["--real-time", "0"], "real time x 0: the factor must be positive and finite"),
+        (["--real-time", "inf"], "real time x inf"),
     ):
         assert run("fig4", *options, out="r") == 2
         [line] = capsys.readouterr().err.splitlines()
