@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from copy import copy
 from functools import partial
 from itertools import count
 from pathlib import Path
-from shutil import copytree
-from tempfile import mkdtemp
-from threading import Lock
-from typing import Any
+from time import sleep
+from typing import Any, TypeAlias
 
 import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
-    FMU2Slave,
     fmi2Boolean,
     fmi2CallbackAllocateMemoryTYPE,
     fmi2CallbackFreeMemoryTYPE,
@@ -26,80 +23,44 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
     fmi2Component,
     fmi2Discard,
+    fmi2DoStepStatus,
+    fmi2Error,
     fmi2Fatal,
+    fmi2LastSuccessfulTime,
+    fmi2Pending,
     fmi2Real,
     fmi2Status,
+    fmi2Terminated,
     fmi2Warning,
 )
 from fmpy.logging import addLoggerProxy
-from fmpy.model_description import ModelDescription, ModelVariable
+from fmpy.model_description import ModelVariable
 
 from orchestrator.errors import InputError, reason
 from orchestrator.master import layout
-from orchestrator.master.instance import ComponentFailed, Instance, Part
+from orchestrator.master.binary import Library, library_of, named
+from orchestrator.master.instance import DO_STEP, ComponentFailed, Ended, Instance, Part
 from orchestrator.master.log import Listener
-from orchestrator.master.transfer import Block
+from orchestrator.master.texts import Texts
+from orchestrator.master.transfer import Block, text_of
 from orchestrator.system.component import Component
-from orchestrator.system.unpacking import check_place, unpacked
+from orchestrator.system.unpacking import unpacked
 from orchestrator.system.values import Value
 
+_DoStep: TypeAlias = Callable[[float, float, int], int]
 
-class Library:
-    """A loaded FMU, which serves all its instances in this process.
+#: FMI's doStep, as the compiled loop calls it.
+_DO_STEP = (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean)
+_CALLBACK = ctypes.CFUNCTYPE(fmi2Status, *_DO_STEP)
 
-    Attributes:
-        fmu: fmpy's view of it.
-        corrupted: whether one of them has ended with fmi2Fatal: FMI then forbids every further
-            call, also for the others, even to free them.
-
-    """
-
-    def __init__(self, archive: Path, description: ModelDescription, folder: Path) -> None:
-        """Load what has been unpacked into a folder.
-
-        Raises:
-            InputError: it cannot be loaded.
-
-        """
-        check_place(folder)
-        try:
-            self.fmu = FMU2Slave(
-                guid=description.guid,
-                modelIdentifier=description.coSimulation.modelIdentifier,
-                unzipDirectory=str(folder),
-            )
-        except Exception as error:
-            raise InputError(f"{archive}: cannot be loaded: {reason(error)}") from error
-        self.corrupted = False
-
-
-#: Libraries by the folders into which their FMUs are unpacked, for runs in several threads.
-_libraries: dict[Path, Library] = {}
-_LOCK = Lock()
-
-
-def _library(component: Component, folder: Path) -> Library:
-    """The library of an unpacked FMU, loaded once a process, or a copy of a corrupted one."""
-    with _LOCK:
-        found = _libraries.get(folder)
-        if found is None:
-            found = Library(component.fmu, component.description, folder)
-        elif found.corrupted:
-            # It stays loaded, with all that it has in memory; under another name it is a new one.
-            found = Library(component.fmu, component.description, _copied(folder))
-        _libraries[folder] = found
-        return found
-
-
-def _copied(folder: Path) -> Path:
-    try:
-        return Path(copytree(folder, mkdtemp(dir=folder.parent), dirs_exist_ok=True))
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be copied: {reason(error)}") from error
+#: How often is looked whether a step has ended that goes on after its call [s].
+_GLANCE = 1e-3
 
 
 class LoadedInstance:
     """An instance whose FMU is called directly: see :class:`.instance.Instance`."""
+
+    is_here = True
 
     def __init__(self, component: Component, library: Library, listener: Listener) -> None:
         """Instantiate an FMU.
@@ -128,9 +89,30 @@ class LoadedInstance:
             self._fmu.instantiate(callbacks=_callbacks(self._environment), loggingOn=True)
         except Exception as error:
             del _instances[self._environment]
-            why = self._complaint or reason(error)
-            raise InputError(f"{component.fmu}: {why}") from error
-        self.do_step = self.function("DoStep", (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean))
+            why = self._complaint.removeprefix(f"{self.name}: ") or reason(error)
+            needs = component.description.coSimulation.needsExecutionTool
+            tool = "; it needs the tool that it was made with" * needs
+            text = f"{named(component)} cannot be instantiated: {why}{tool}"
+            raise InputError(text) from error
+        self.do_step = self.function("DoStep", _DO_STEP)
+        self._called_back: Any = None
+        if component.description.coSimulation.canRunAsynchronuously:
+            self.do_step = do_step = self._awaited(self.do_step)
+            self._called_back = _CALLBACK(lambda _, *step: do_step(*step))
+
+    def _awaited(self, do_step: _DoStep) -> _DoStep:
+        """Steps that the FMU may go on with after the call, as calls that end when they do."""
+        ask = self.function("GetStatus", (fmi2Component, ctypes.c_int, ctypes.POINTER(fmi2Status)))
+
+        def awaited(t: float, h: float, no_rollback: int) -> int:
+            status = fmi2Status(do_step(t, h, no_rollback))
+            while status.value == fmi2Pending:
+                sleep(_GLANCE)
+                if ask(fmi2DoStepStatus, ctypes.byref(status)) > fmi2Warning:
+                    return int(fmi2Error)
+            return int(status.value)
+
+        return awaited
 
     def function(self, name: str, types: Sequence[Any] | None = None) -> Callable[..., Any]:
         """One of the FMU's functions, for calls of every step.
@@ -147,10 +129,10 @@ class LoadedInstance:
         called.argtypes, called.restype = types, fmi2Status
         return partial(called, fmi2Component(self._fmu.component))
 
-    def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
+    def tie(self, values: np.ndarray, parts: Sequence[Part], texts: Texts) -> None:
         """Say where its values are."""
         for part in parts:
-            block = Block(*part[:3], values[part.place])
+            block = Block(*part[:3], values[part.place], texts)
             function = self.function(block.function)
             if part.causality == "input":
                 self._inputs.append(block)
@@ -167,7 +149,7 @@ class LoadedInstance:
         )
         return layout.Member(
             self._fmu.component,
-            self._address("DoStep"),
+            _address(self._called_back) if self._called_back else self._address("DoStep"),
             (layout.Move * len(inputs))(*inputs),
             (layout.Move * len(outputs))(*outputs),
             len(inputs),
@@ -176,7 +158,7 @@ class LoadedInstance:
 
     def _address(self, name: str) -> int | None:
         """Of one of the FMU's functions, without fmi2."""
-        return ctypes.cast(self._fmu.dll[f"fmi2{name}"], ctypes.c_void_p).value
+        return _address(self._fmu.dll[f"fmi2{name}"])
 
     def enter_initialization(
         self, values: Mapping[str, Value], stop_time: float, start_time: float = 0.0
@@ -259,10 +241,9 @@ class LoadedInstance:
     def _get(self, variable: ModelVariable) -> Value:
         value: Value | bytes | None
         (value,) = self._call(f"get{_fmi_type(variable)}", [variable.valueReference])
-        if isinstance(value, bytes):
-            return value.decode(errors="replace")
-        # Some have no text where an empty one is meant.
-        return "" if value is None else bool(value) if variable.type == "Boolean" else value
+        if value is None or isinstance(value, bytes):
+            return text_of(value)
+        return bool(value) if variable.type == "Boolean" else value
 
     def _call(self, method: str, *arguments: Any, **named: Any) -> Any:
         """One of fmpy's methods, which are slow and convenient."""
@@ -271,8 +252,18 @@ class LoadedInstance:
         except FMICallException as error:
             raise self._failed(error) from error
 
-    def failed(self, status: int, function: str) -> ComponentFailed:
+    def failed(self, status: int, function: str) -> ComponentFailed | Ended:
         """What to raise after a call that has ended with a status."""
+        if (function, status) == (DO_STEP, fmi2Discard):
+            with suppress(FMICallException):
+                if self._fmu.getBooleanStatus(fmi2Terminated):
+                    time = self._fmu.getRealStatus(fmi2LastSuccessfulTime)
+                    return Ended(f"{self.name} has ended the simulation, at {time:.12g} s")
+        if status == fmi2Pending:
+            return ComponentFailed(
+                f"{self.name}: its step goes on after {function}, and its description does not "
+                "say so (canRunAsynchronuously)"
+            )
         return self._failed(FMICallException(function=function, status=status))
 
     def _failed(self, error: FMICallException) -> ComponentFailed:
@@ -280,6 +271,10 @@ class LoadedInstance:
         if fatal:
             self._library.corrupted = True
         return ComponentFailed(self._complaint or f"{self.name}: {error}", fatal)
+
+
+def _address(function: Any) -> int | None:
+    return ctypes.cast(function, ctypes.c_void_p).value
 
 
 def _fmi_type(variable: ModelVariable) -> str:
@@ -302,11 +297,14 @@ def loaded(
 
     """
     folder = unpacked(component.fmu) if folder is None else folder
-    instance = LoadedInstance(component, _library(component, folder), listener)
+    library = library_of(component, folder)
+    instance = LoadedInstance(component, library, listener)
     try:
         yield instance
     finally:
         instance.free()
+        if component.is_once_per_process:
+            library.forget(folder)
 
 
 @contextmanager
@@ -328,11 +326,17 @@ _environments = count(1)
 
 @fmi2CallbackLoggerTYPE  # type: ignore[untyped-decorator]
 def _log(
-    environment: int | None, _: bytes, status: int, _category: bytes, message: bytes | None
+    environment: int | None, name: bytes, status: int, _: bytes, message: bytes | None
 ) -> None:
-    instance = _instances.get(environment or 0)
+    instance = _instances.get(environment or 0) or _bearing(name)
     if instance is not None:
         instance.hear(status, (message or b"").decode(errors="replace"))
+
+
+def _bearing(name: bytes | None) -> LoadedInstance | None:
+    """The instance with a name: some FMUs do not hand the environment back."""
+    text = (name or b"").decode(errors="replace")
+    return next((found for found in _instances.values() if found.name == text), None)
 
 
 def _shared_callbacks() -> fmi2CallbackFunctions:

@@ -25,7 +25,7 @@ from fmpy.fmi2 import fmi2Warning
 
 from orchestrator.errors import InputError, shortened
 from orchestrator.master.experiment import JACOBI, Experiment, Order
-from orchestrator.master.instance import Instance
+from orchestrator.master.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
 from orchestrator.master.paces import paces
 from orchestrator.master.row import Row
 from orchestrator.master.signals import Gathering
@@ -33,9 +33,6 @@ from orchestrator.system.component import Component
 from orchestrator.system.graph import delayed, derived_order, has_feedthrough, in_stages
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-
-#: What a component is asked for in every step, one after the other.
-CALLS = SET_INPUTS, DO_STEP, GET_OUTPUTS = "setting inputs", "fmi2DoStep", "getting outputs"
 
 
 class Member(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from time import monotonic
 
 import numpy as np
@@ -13,12 +14,12 @@ from orchestrator.master.attendant import Attendance, Attendant, Run
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.instance import ComponentFailed, Ended, Instance
 from orchestrator.master.interrupts import held_interrupts
-from orchestrator.master.isolated import Isolation, isolated
-from orchestrator.master.loaded import all_loaded
+from orchestrator.master.isolated import Isolation
 from orchestrator.master.log import Log
 from orchestrator.master.loop import PYTHON_LOOP, Loop
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.paces import paces
+from orchestrator.master.placing import placed
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import delays, schedule, stages
 from orchestrator.master.signals import Gathering, Signals
@@ -62,19 +63,17 @@ def simulate(
     log = Log()
     for delay in delays(system, experiment.order):
         log.remark(delay)
+    experiment = _whole_steps(system, experiment, log)
     with held_interrupts() as interrupts, ExitStack() as stack:
         with _explained():
-            components = system.components
-            instances = stack.enter_context(
-                isolated(components, log, isolation, interrupts)
-                if isolation
-                else all_loaded(components, log)
-            )
+            instances = stack.enter_context(placed(system.components, log, isolation, interrupts))
+            loop = _possible_loop(loop, instances, log)
             row = Row(system, instances, slow)
             _initialise(system, instances, row, experiment, log)
             names = tuple(map(str, row.columns))
             parameters = _parameters(system, instances, log)
-            header = Header(names, experiment, parameters, loop.name)
+            texts = dict.fromkeys(map(str, row.text_ports), row.texts)
+            header = Header(names, experiment, parameters, loop.name, texts)
         scheduled = schedule(system, experiment, plan, instances, row)
         with _told(header, observers) as tell:
             blocks = Blocks(len(row.shown), observers)
@@ -115,6 +114,36 @@ def completed(system: System, experiment: Experiment, observers: Sequence[Observ
         raise InputError(f"{system.name} {ending.failure}")
 
 
+def _whole_steps(system: System, experiment: Experiment, log: Log) -> Experiment:
+    """An experiment without its last, shorter step where an FMU takes none of another length.
+
+    Raises:
+        InputError: no step is left.
+
+    """
+    rigid = [name for name, component in system.components.items() if not component.takes_any_step]
+    if not (rigid and experiment.has_short_step):
+        return experiment
+    why = f"{', '.join(rigid)}: takes steps of one length alone, so"
+    if experiment.full_steps == 0:
+        raise InputError(f"{why} the stop time must be at least one step, {experiment.step:g} s")
+    end = experiment.time(experiment.full_steps)
+    log.remark(f"{why} the run ends with the last whole step, at t = {end:.12g} s")
+    return replace(experiment, stop_time=end)
+
+
+def _possible_loop(loop: Loop, instances: Mapping[str, Instance], log: Log) -> Loop:
+    """The loop, or the one in Python where the other has nothing to call."""
+    apart = [name for name, instance in instances.items() if not instance.is_here]
+    if not apart or loop == PYTHON_LOOP:
+        return loop
+    log.remark(
+        f"{', '.join(apart)}: runs in a process of its own, for the FMU allows one instance a "
+        "process; steps are made in Python"
+    )
+    return PYTHON_LOOP
+
+
 def _initialise(
     system: System,
     instances: Mapping[str, Instance],
@@ -133,7 +162,8 @@ def _initialise(
         instance.enter_initialization(
             system.parameters_of(name), experiment.stop_time, experiment.start_time
         )
-        row.enter(name, instance.read(system.open_inputs(name)))
+        held = instance.read(system.open_inputs(name))
+        row.enter({PortName(name, port): value for port, value in held.items()})
     values = row.values
     gather = Gathering.along(row, system.connections)
     # Through a chain of all, once more for what its end feeds, and once to see it at rest.

@@ -7,7 +7,8 @@ from ctypes import CDLL, POINTER, c_double, c_int, c_size_t
 
 from orchestrator.master import layout
 from orchestrator.master.attendant import Run
-from orchestrator.master.schedule import CALLS, Stage
+from orchestrator.master.instance import CALLS
+from orchestrator.master.schedule import Stage
 
 #: Longest time until Python looks whether somebody wants the run to stop [s].
 _GLANCE = 0.02
