@@ -11,7 +11,7 @@ import numpy as np
 from orchestrator.errors import InputError, did_you_mean
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observer import Ending, Header
-from orchestrator.system.names import PortName, port_name
+from orchestrator.system.names import PortName
 
 #: More rows than this are not kept in memory.
 MOST_ROWS = 10_000_000
@@ -126,8 +126,9 @@ class Table:
 
     def missing(self, columns: Iterable[str], parameters: Iterable[str] = ()) -> list[str]:
         """Those of some columns and parameters, `component.name`, that are not there."""
+        known = {*map(str, self.parameters)}
         return [column for column in columns if column not in self] + [
-            name for name in parameters if port_name(name) not in self.parameters
+            name for name in parameters if name not in known
         ]
 
     @cached_property

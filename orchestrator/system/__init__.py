@@ -7,6 +7,7 @@ module                  what it holds
 :mod:`.values`          values in the types of FMI's variables, from text and to text
 :mod:`.component`       an FMU and what its description says about it
 :mod:`.transformation`  what happens to a value on its way through a connection
+:mod:`.units`           units by their definitions, and from one to another
 :mod:`.structure`       components, connections and parameters: a system
 :mod:`.graph`           what depends on what: feedthrough, and what reaches a component
 :mod:`.leftovers`       what only one process may have, and what it leaves when it is killed

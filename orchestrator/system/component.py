@@ -67,6 +67,18 @@ class Component:
             return None
         return typed(f"{self.name}.{name}", variable, variable.start)
 
+    def is_settable(self, name: str) -> bool:
+        """Whether a variable takes a value before the first step (FMI 2.0.4, section 2.2.7).
+
+        Raises:
+            InputError: there is no such variable.
+
+        """
+        variable = self.variable(name)
+        return variable.causality == "input" or (
+            variable.variability != "constant" and variable.initial in ("exact", "approx")
+        )
+
     def has_feedthrough(self, output: str) -> bool:
         """Whether an output depends on an input of the same instant.
 
