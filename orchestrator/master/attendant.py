@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from orchestrator.master.experiment import MOST_STEPS, Experiment
 from orchestrator.master.instance import Instance
-from orchestrator.master.observer import Blocks
+from orchestrator.master.observer import Blocks, Occurrence
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import Stage
 from orchestrator.master.signals import Signals
@@ -31,6 +31,7 @@ class Run:
         blocks: take the rows.
         made: how many steps have been made.
         due: after how many somebody acts on it: every loop looks up there.
+        happened: events, in their order.
 
     """
 
@@ -43,6 +44,7 @@ class Run:
     blocks: Blocks
     made: int = 0
     due: int = NEVER
+    happened: list[Occurrence] = field(default_factory=list)
 
     @property
     def time(self) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from time import monotonic
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -40,6 +40,26 @@ class Header:
     loop: str = field(default="python", compare=False)
 
 
+class Occurrence(NamedTuple):
+    """Something that has happened during a run.
+
+    Attributes:
+        time: at which it did [s].
+        text: what it was.
+        label: a word for it; empty: it is none that a figure names.
+
+    """
+
+    time: float
+    text: str
+    label: str = ""
+
+    def __str__(self) -> str:
+        """In one line."""
+        label = f" ({self.label})" if self.label and self.label != self.text else ""
+        return f"t = {self.time:.12g} s: {self.text}{label}"
+
+
 @dataclass(frozen=True)
 class Ending:
     """How a run has ended.
@@ -49,6 +69,7 @@ class Ending:
         remark: why it ended early though it has not failed, or None.
         messages: what the FMUs logged with status warning or worse.
         signals: to stop that have come meanwhile.
+        events: that have happened, in their order.
 
     """
 
@@ -56,6 +77,7 @@ class Ending:
     remark: str | None = None
     messages: tuple[str, ...] = ()
     signals: tuple[int, ...] = ()
+    events: tuple[Occurrence, ...] = ()
 
 
 class NotKept(Exception):

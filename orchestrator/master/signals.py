@@ -38,6 +38,11 @@ class Gathering:
         else:
             values[self.targets] = self.factors * values[self.sources] + self.offsets
 
+    def move(self, values: np.ndarray, place: int) -> None:
+        """Move one of the values."""
+        source = values[self.sources[place]]
+        values[self.targets[place]] = self.factors[place] * source + self.offsets[place]
+
     def set(self, place: int, factor: float, offset: float) -> None:
         """Say what is done to one of the values."""
         self.factors[place], self.offsets[place] = factor, offset
@@ -72,7 +77,9 @@ class Signals:
         self._targets: dict[PortName, list[PortName]] = {}
         for connection in connections:
             self._targets.setdefault(connection.source, []).append(connection.target)
+        # Of inputs that nothing feeds: what they had, and what is done to it.
         self._before: dict[int, float] = {}
+        self._altered: dict[int, tuple[float, float]] = {}
 
     def inputs(self, port: PortName) -> list[PortName]:
         """The inputs that a signal reaches: those that an output feeds, or an input alone."""
@@ -99,6 +106,27 @@ class Signals:
         elif column in self._before:
             self._row.values[column] = self._before.pop(column)
 
+    def supply(self, target: PortName, value: float) -> None:
+        """Let an input that nothing feeds have a value, which is altered as one that is fed is."""
+        column = self._row.columns[target]
+        if column in self._before:
+            self._before[column] = value
+            factor, offset = self._altered[column]
+            value = factor * value + offset
+        self._row.values[column] = value
+
+    def supplied(self, target: PortName) -> float:
+        """The value that an input has that nothing feeds, before it is altered."""
+        column = self._row.columns[target]
+        return self._before.get(column, float(self._row.values[column]))
+
+    def refresh(self, component: str) -> None:
+        """Let the inputs of a component take at once what feeds them."""
+        for target, column in self._row.columns.items():
+            if target.component == component and column in self._fed:
+                gathering, place = self._fed[column]
+                gathering.move(self._row.values, place)
+
     def _alter(self, target: PortName, factor: float, offset: float) -> None:
         column, values = self._row.columns[target], self._row.values
         if column in self._fed:
@@ -106,4 +134,5 @@ class Signals:
             gathering.set(place, factor, offset)
         else:
             before = self._before.setdefault(column, float(values[column]))
+            self._altered[column] = factor, offset
             values[column] = factor * before + offset

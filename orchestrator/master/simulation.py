@@ -84,7 +84,9 @@ def simulate(
                 failure, remark = None, str(end)
             if failure is None:
                 _terminate(instances)
-            ending = Ending(failure, remark, log.messages, tuple(interrupts.signals))
+            ending = Ending(
+                failure, remark, log.messages, tuple(interrupts.signals), tuple(run.happened)
+            )
             tell(ending)
         return ending
 
