@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -71,8 +71,14 @@ class Instance(Protocol):
     def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
         """Say where its values are: a view of the row, with the inputs first, and its parts."""
 
-    def enter_initialization(self, values: Mapping[str, Value], stop_time: float) -> None:
-        """Set start values and parameters, set up the experiment, and enter that mode."""
+    def enter_initialization(
+        self, values: Mapping[str, Value], stop_time: float, start_time: float = 0.0
+    ) -> None:
+        """Set start values and parameters, set up the experiment, and enter that mode.
+
+        What may be set in that mode is set there once more: some FMUs take on their own values
+        when they enter it.
+        """
 
     def exit_initialization(self) -> None:
         """Get ready for the first step."""
@@ -80,8 +86,19 @@ class Instance(Protocol):
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
 
-    def parameters(self) -> dict[str, Any]:
-        """Values of all parameters, as the FMU reports them."""
+    def read(self, ports: Sequence[str]) -> dict[str, Value]:
+        """Values of some variables, as the FMU holds them."""
+
+    def state(self) -> bytes:
+        """The FMU's whole state between two steps, from which another instance can go on.
+
+        Raises:
+            ComponentFailed: it cannot be had; see :attr:`.component.Component.gives_state`.
+
+        """
+
+    def restore(self, state: bytes) -> None:
+        """Take on a state; what the row holds of this instance is left as it is."""
 
     def terminate(self) -> None:
         """Let the FMU end what it has begun."""

@@ -141,9 +141,11 @@ class IsolatedInstance:
         inputs, outputs = len(self._channel.outgoing) - 2, len(self._channel.incoming)
         self._inputs, self._outputs = values[:inputs], values[inputs : inputs + outputs]
 
-    def enter_initialization(self, values: Mapping[str, Value], stop_time: float) -> None:
+    def enter_initialization(
+        self, values: Mapping[str, Value], stop_time: float, start_time: float = 0.0
+    ) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
-        self._ask("enter_initialization", values, stop_time)
+        self._ask("enter_initialization", values, stop_time, start_time)
 
     def exit_initialization(self) -> None:
         """Get ready for the first step."""
@@ -155,12 +157,26 @@ class IsolatedInstance:
         self._ask("exchange")
         self._outputs[:] = self._channel.incoming
 
-    def parameters(self) -> dict[str, Any]:
-        """Values of all parameters, as the FMU reports them."""
-        values = self._ask("parameters")
-        if not isinstance(values, dict):
+    def read(self, ports: Sequence[str]) -> dict[str, Value]:
+        """Values of some variables, as the FMU holds them."""
+        if not ports:
+            return {}
+        values = self._ask("read", list(ports))
+        answers = isinstance(values, dict) and values.keys() == set(ports)
+        if not (answers and all(isinstance(value, Value) for value in values.values())):
             raise self._nonsense()
-        return values
+        return dict(values)
+
+    def state(self) -> bytes:
+        """The FMU's whole state between two steps."""
+        state = self._ask("state")
+        if not isinstance(state, bytes):
+            raise self._nonsense()
+        return state
+
+    def restore(self, state: bytes) -> None:
+        """Take on a state."""
+        self._ask("restore", state)
 
     def pointers(self) -> layout.Member:
         """There are none: its calls are messages to another process."""

@@ -114,6 +114,7 @@ class LoadedInstance:
         self._inputs: list[Block] = []
         self._outputs: list[Block] = []
         self._variables = component.variables
+        self._gives_state = component.gives_state
         self._library = library
         self._listener = listener
         self._complaint = ""
@@ -177,13 +178,16 @@ class LoadedInstance:
         """Of one of the FMU's functions, without fmi2."""
         return ctypes.cast(self._fmu.dll[f"fmi2{name}"], ctypes.c_void_p).value
 
-    def enter_initialization(self, values: Mapping[str, Value], stop_time: float) -> None:
+    def enter_initialization(
+        self, values: Mapping[str, Value], stop_time: float, start_time: float = 0.0
+    ) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
-        for port, value in values.items():
-            variable = self._variables[port]
-            self._call(f"set{_fmi_type(variable)}", [variable.valueReference], [value])
-        self._call("setupExperiment", startTime=0.0, stopTime=stop_time)
+        self._set(values)
+        self._call("setupExperiment", startTime=start_time, stopTime=stop_time)
         self._call("enterInitializationMode")
+        # FMI has it that guesses are set before alone.
+        variables = self._variables
+        self._set({port: v for port, v in values.items() if variables[port].initial == "exact"})
 
     def exit_initialization(self) -> None:
         """Get ready for the first step."""
@@ -195,13 +199,36 @@ class LoadedInstance:
             if (status := call()) > fmi2Warning:
                 raise self.failed(status, "exchanging values")
 
-    def parameters(self) -> dict[str, Any]:
-        """Values of all parameters, as the FMU reports them."""
-        return {
-            name: self._get(variable)
-            for name, variable in self._variables.items()
-            if variable.causality == "parameter"
-        }
+    def read(self, ports: Sequence[str]) -> dict[str, Value]:
+        """Values of some variables, as the FMU holds them."""
+        return {port: self._get(self._variables[port]) for port in ports}
+
+    def state(self) -> bytes:
+        """The FMU's whole state between two steps."""
+        with self._held("getFMUstate") as state:
+            serialised: bytes = self._call("serializeFMUstate", state)
+        return serialised
+
+    def restore(self, state: bytes) -> None:
+        """Take on a state."""
+        self._complaint, self._worst = "", 0
+        with self._held("deSerializeFMUstate", state) as read:
+            self._call("setFMUstate", read)
+        # Some say in a message alone that it is none of theirs.
+        if self._worst >= fmi2Discard:
+            raise ComponentFailed(self._complaint)
+
+    @contextmanager
+    def _held(self, method: str, *arguments: Any) -> Iterator[Any]:
+        """A state that one of fmpy's methods gives, in the FMU's memory, freed at the end."""
+        if not self._gives_state:
+            raise ComponentFailed(f"{self.name}: its FMU does not give its state away")
+        state = self._call(method, *arguments)
+        try:
+            yield state
+        finally:
+            if not self._library.corrupted:
+                self._call("freeFMUstate", state)
 
     def terminate(self) -> None:
         """Let the FMU end what it has begun."""
@@ -224,11 +251,18 @@ class LoadedInstance:
             self._complaint, self._worst = text, status
         self._listener.take(status, text)
 
-    def _get(self, variable: ModelVariable) -> Any:
-        value = self._call(f"get{_fmi_type(variable)}", [variable.valueReference])[0]
-        if variable.type == "Boolean":
-            return bool(value)
-        return value.decode(errors="replace") if isinstance(value, bytes) else value
+    def _set(self, values: Mapping[str, Value]) -> None:
+        for port, value in values.items():
+            variable = self._variables[port]
+            self._call(f"set{_fmi_type(variable)}", [variable.valueReference], [value])
+
+    def _get(self, variable: ModelVariable) -> Value:
+        value: Value | bytes | None
+        (value,) = self._call(f"get{_fmi_type(variable)}", [variable.valueReference])
+        if isinstance(value, bytes):
+            return value.decode(errors="replace")
+        # Some have no text where an empty one is meant.
+        return "" if value is None else bool(value) if variable.type == "Boolean" else value
 
     def _call(self, method: str, *arguments: Any, **named: Any) -> Any:
         """One of fmpy's methods, which are slow and convenient."""

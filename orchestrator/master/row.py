@@ -13,6 +13,7 @@ from orchestrator.master.transfer import KINDS
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
+from orchestrator.system.values import Value
 
 
 class Row:
@@ -58,6 +59,13 @@ class Row:
         for target, value in system.parameters.items():
             if target in self.columns:
                 self.values[self.columns[target]] = float(value)
+
+    def enter(self, component: str, values: Mapping[str, Value]) -> None:
+        """Take values of a component's ports, but for those that are no finite numbers."""
+        for port, value in values.items():
+            column = self.columns.get(PortName(component, port))
+            if column is not None and isinstance(value, int | float) and isfinite(value):
+                self.values[column] = value
 
     def not_finite(self, components: Iterable[str]) -> str | None:
         """The first output that is no number or infinite, in words; None: all are finite.

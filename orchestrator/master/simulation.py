@@ -23,6 +23,7 @@ from orchestrator.master.schedule import schedule, stages
 from orchestrator.master.signals import Signals
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+from orchestrator.system.values import literal, same
 
 
 def simulate(
@@ -65,7 +66,8 @@ def simulate(
             row = Row(system, instances)
             _initialise(system, instances, row, experiment, log)
             names = tuple(map(str, row.columns))
-            header = Header(names, experiment, _parameters(instances), loop.name)
+            parameters = _parameters(system, instances, log)
+            header = Header(names, experiment, parameters, loop.name)
         scheduled = schedule(system, plan, instances, row)
         with _told(header, observers) as tell:
             blocks = Blocks(len(row.values), observers)
@@ -122,6 +124,7 @@ def _initialise(
     """
     for name, instance in instances.items():
         instance.enter_initialization(system.parameters_of(name), experiment.stop_time)
+        row.enter(name, instance.read(system.open_inputs(name)))
     values = row.values
     targets, sources = row.places(system.connections)
     # Through a chain of all, once more for what its end feeds, and once to see it at rest.
@@ -148,12 +151,27 @@ def _exchange(instances: Mapping[str, Instance], row: Row) -> None:
         raise StartError(f"stopped at t = 0 s: {not_finite}")
 
 
-def _parameters(instances: Mapping[str, Instance]) -> dict[PortName, object]:
-    return {
-        PortName(name, parameter): value
-        for name, instance in instances.items()
-        for parameter, value in instance.parameters().items()
-    }
+def _parameters(
+    system: System, instances: Mapping[str, Instance], log: Log
+) -> dict[PortName, object]:
+    """Values of all parameters as the FMUs hold them; where one is not what was set, the log says.
+
+    Some FMUs overwrite values without a word.
+    """
+    parameters: dict[PortName, object] = {}
+    for name, instance in instances.items():
+        component, wanted = system.components[name], system.parameters_of(name)
+        own = [variable.name for variable in component.having("parameter")]
+        lasting = [port for port in wanted if component.variables[port].initial == "exact"]
+        held = instance.read(list(dict.fromkeys((*own, *lasting))))
+        for port in lasting:
+            if not same(wanted[port], held[port]):
+                log.remark(
+                    f"{name}.{port} was set to {literal(wanted[port])}, and the FMU holds "
+                    f"{literal(held[port])}"
+                )
+        parameters |= {PortName(name, port): held[port] for port in own}
+    return parameters
 
 
 def _terminate(instances: Mapping[str, Instance]) -> None:

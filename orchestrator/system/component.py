@@ -39,6 +39,12 @@ class Component:
         """The FMU's variables by name."""
         return {variable.name: variable for variable in self.description.modelVariables}
 
+    @property
+    def gives_state(self) -> bool:
+        """Whether its whole state can be had as bytes, and taken on from them."""
+        of = self.description.coSimulation
+        return bool(of.canGetAndSetFMUstate and of.canSerializeFMUstate)
+
     def variable(self, name: str) -> ModelVariable:
         """One variable of the FMU.
 

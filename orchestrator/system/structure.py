@@ -103,6 +103,15 @@ class System:
             if target.component == component
         }
 
+    def open_inputs(self, component: str) -> list[str]:
+        """Inputs of one component that nothing feeds, and for which no value is set."""
+        taken = {connection.target for connection in self.connections} | self.parameters.keys()
+        return [
+            variable.name
+            for variable in self.components[component].having("input")
+            if PortName(component, variable.name) not in taken
+        ]
+
     def value(self, name: PortName) -> Value | None:
         """The value of a parameter: the one that is set, or else the component's own.
 

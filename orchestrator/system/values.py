@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isclose, isfinite
 from typing import TypeAlias
 
 from fmpy.model_description import ModelVariable
@@ -17,6 +17,9 @@ _INTEGERS = -(2**31), 2**31 - 1
 
 #: What FMI 2.0 calls the types of FMI 3.0 that have a name there.
 _NAMES = {"Float64": "Real", "Int32": "Integer"}
+
+#: An FMU may keep a value in another unit, and round it by such a share.
+_ROUNDING = 1e-9
 
 BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 _KINDS = {
@@ -97,6 +100,13 @@ def type_of(variable: ModelVariable) -> str:
 def literal(value: Value) -> str:
     """A value as XML writes it."""
     return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def same(wanted: Value, held: Value) -> bool:
+    """Whether a value is the one that was set, but for rounding."""
+    if isinstance(wanted, float) and isinstance(held, float):
+        return isclose(wanted, held, rel_tol=_ROUNDING)
+    return wanted == held
 
 
 def unit_of(variable: ModelVariable) -> str | None:
