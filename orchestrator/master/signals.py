@@ -77,9 +77,8 @@ class Signals:
         self._targets: dict[PortName, list[PortName]] = {}
         for connection in connections:
             self._targets.setdefault(connection.source, []).append(connection.target)
-        # Of inputs that nothing feeds: what they had, and what is done to it.
-        self._before: dict[int, float] = {}
-        self._altered: dict[int, tuple[float, float]] = {}
+        # Of inputs that nothing feeds: what they would have, and what is done to it.
+        self._open: dict[int, tuple[float, float, float]] = {}
 
     def inputs(self, port: PortName) -> list[PortName]:
         """The inputs that a signal reaches: those that an output feeds, or an input alone."""
@@ -99,26 +98,27 @@ class Signals:
         self.override(target, float(self._row.values[self._row.columns[target]]))
 
     def release(self, target: PortName) -> None:
-        """Let an input take what feeds it, or what it had before."""
+        """Let an input take what feeds it, or what it would have."""
         column = self._row.columns[target]
         if column in self._fed:
             self._alter(target, *self._own[column])
-        elif column in self._before:
-            self._row.values[column] = self._before.pop(column)
+        elif column in self._open:
+            self._row.values[column], _, _ = self._open.pop(column)
 
     def supply(self, target: PortName, value: float) -> None:
         """Let an input that nothing feeds have a value, which is altered as one that is fed is."""
         column = self._row.columns[target]
-        if column in self._before:
-            self._before[column] = value
-            factor, offset = self._altered[column]
+        if column in self._open:
+            _, factor, offset = self._open[column]
+            self._open[column] = value, factor, offset
             value = factor * value + offset
         self._row.values[column] = value
 
     def supplied(self, target: PortName) -> float:
-        """The value that an input has that nothing feeds, before it is altered."""
+        """What an input has that nothing feeds, before it is altered."""
         column = self._row.columns[target]
-        return self._before.get(column, float(self._row.values[column]))
+        value, *_ = self._open.get(column, (float(self._row.values[column]),))
+        return value
 
     def refresh(self, component: str) -> None:
         """Let the inputs of a component take at once what feeds them."""
@@ -133,6 +133,6 @@ class Signals:
             gathering, place = self._fed[column]
             gathering.set(place, factor, offset)
         else:
-            before = self._before.setdefault(column, float(values[column]))
-            self._altered[column] = factor, offset
-            values[column] = factor * before + offset
+            value = self.supplied(target)
+            self._open[column] = value, factor, offset
+            values[column] = factor * value + offset
