@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, TypeVar
 
 from auv_fmu.euler import STEP
 from orchestrator.analysis.figures import check_figure
 from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import FMI, PYTHON, current_fmus
+from orchestrator.experiments.events import check_events, read_events, shared_events
+from orchestrator.experiments.inputs import Inputs, read_inputs
 from orchestrator.experiments.scenario import Scenario, read_scenario
 from orchestrator.experiments.wiring import closed_loop
+from orchestrator.master.attendant import Attendant
+from orchestrator.master.events import Event, Events
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.isolated import Isolation
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
+from orchestrator.master.observer import Ending
+from orchestrator.master.playback import Course, Playback
 from orchestrator.system.component import RUNNABLE, WRITABLE
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.reading import read_ssp
 from orchestrator.system.structure import System
+
+T = TypeVar("T")
 
 #: Communication step of the paper [s], for systems that name none.
 DEFAULT_STEP = STEP
@@ -35,6 +44,8 @@ class Request:
         kind: of the bundle's FMUs, one of :data:`orchestrator.experiments.bundle.KINDS`.
         isolation: of the FMUs in processes of their own; None: they run in this one.
         loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
+        events: in the place of the scenario's, as a scenario file writes them; None: its own.
+        inputs: in the place of the scenario's.
 
     """
 
@@ -45,17 +56,37 @@ class Request:
     isolation: Isolation | None = None
     kind: str = PYTHON
     loop: str = LOOPS[0]
+    events: Sequence[Mapping[str, Any]] | None = None
+    inputs: Inputs | None = None
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A system that is ready to be run, the scenario that it comes from, and how it is stepped."""
+    """A system that is ready to be run, the scenario that it comes from, and how it is stepped.
+
+    Attributes:
+        events: that happen to it.
+        course: of inputs over time; None: they keep their values.
+
+    """
 
     scenario: Scenario
     system: System
     experiment: Experiment
     isolation: Isolation | None = None
     loop: Loop = PYTHON_LOOP
+    events: tuple[Event, ...] = ()
+    course: Course | None = None
+
+    def attendants(self) -> list[Attendant]:
+        """Who acts on one run of it between its steps."""
+        playing: list[Attendant] = [] if self.course is None else [Playback(self.course)]
+        return playing + ([Events(self.events)] if self.events else [])
+
+    def missed(self, ending: Ending) -> list[Event]:
+        """The events that have not happened in a run of it."""
+        happened = {occurrence.event for occurrence in ending.events}
+        return [event for i, event in enumerate(self.events) if i not in happened]
 
 
 def load(name: str | Path, kind: str = PYTHON) -> System:
@@ -118,7 +149,14 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
 
     """
     system = system.with_parameters(request.parameters)
+    course, inputs = None, _first_given(request.inputs, scenario.inputs)
+    if inputs is not None:
+        system, course = read_inputs(inputs, system)
     system.check()
+    events = scenario.events
+    if request.events is not None:
+        events = request.events
+        check_events("events", events)
     stop_time = _first_given(request.stop_time, scenario.stop_time, system.stop_time)
     if stop_time is None:
         raise InputError(f"{scenario.name}: names no stop time; give one with --stop-time")
@@ -127,7 +165,8 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
         step = DEFAULT_STEP
     experiment = Experiment(stop_time, step, request.order)
     loop = chosen(request.loop, experiment, request.isolation)
-    return Prepared(scenario, system, experiment, request.isolation, loop)
+    happening = read_events(scenario.name, events, system)
+    return Prepared(scenario, system, experiment, request.isolation, loop, happening, course)
 
 
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
@@ -148,9 +187,18 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         for target, value in {**scenario.parameters, **request.parameters}.items()
         if system.has(target)
     }
-    same = replace(companion, stop_time=scenario.stop_time, step=scenario.step)
-    return [prepared, prepare(same, system, replace(request, parameters=shared))]
+    events = request.events
+    if events is None:
+        events = companion.events or scenario.events
+    same = replace(
+        companion,
+        stop_time=scenario.stop_time,
+        step=scenario.step,
+        events=shared_events(events, system),
+        inputs=companion.inputs or scenario.inputs,
+    )
+    return [prepared, prepare(same, system, replace(request, parameters=shared, events=None))]
 
 
-def _first_given(*values: float | None) -> float | None:
+def _first_given(*values: T | None) -> T | None:
     return next((value for value in values if value is not None), None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,6 +15,7 @@ from orchestrator.analysis.plot import plot
 from orchestrator.errors import InputError, did_you_mean
 from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.folder import replaced
+from orchestrator.experiments.inputs import inputs_of
 from orchestrator.experiments.preparation import (
     Prepared,
     Request,
@@ -29,7 +30,7 @@ from orchestrator.master.experiment import ORDERS
 from orchestrator.master.files import FORMATS
 from orchestrator.master.isolated import isolation_of
 from orchestrator.master.loop import LOOPS
-from orchestrator.master.observer import Observer
+from orchestrator.master.observer import Observer, Occurrence
 from orchestrator.master.progress import Progress
 from orchestrator.master.simulation import simulate as run
 from orchestrator.master.table import Table
@@ -105,6 +106,11 @@ class Result(Table):
         """What was run."""
         return self._prepared.system
 
+    @property
+    def events(self) -> tuple[Occurrence, ...]:
+        """What has happened during the run: each has a time [s], a text and a label."""
+        return self.ending.events
+
     def metrics(self) -> dict[str, Any]:
         """What the command line writes into metrics.json."""
         return metrics_json(metrics_of(self), self._prepared)
@@ -177,6 +183,8 @@ def simulate(
     isolate: bool = False,
     step_timeout: float | None = None,
     loop: str = LOOPS[0],
+    events: Sequence[Mapping[str, Any]] | None = None,
+    inputs: str | Path | None = None,
 ) -> Result:
     """Run a scenario, an SSP or a system.
 
@@ -197,6 +205,10 @@ def simulate(
         step_timeout: how long an isolated FMU may take for one call [s]; None: 60.
         loop: what makes the steps: `python`, `compiled`, or `auto`, the compiled loop where it is
             to be had; the rows are the same.
+        events: what happens during the run, in the place of the scenario's own: tables as a
+            scenario file has them, such as `{"at": 20.0, "lose": "controller.tau.r"}`.
+        inputs: a table of inputs over time, in the place of the scenario's own: a .csv or .parquet
+            file.
 
     Returns:
         The rows that were computed: all of them, or those before a failure, which
@@ -218,11 +230,20 @@ def simulate(
         port_name(str(name)): value for name, value in (parameters or {}).items()
     }
     isolation = isolation_of(isolate, step_timeout)
-    request = Request(stop_time, step, order, changes, isolation, kind, loop)
+    request = Request(
+        stop_time, step, order, changes, isolation, kind, loop, events, inputs_of(inputs)
+    )
     prepared = prepare(scenario, system, request)
     result = Result(prepared)
     observers: list[Observer] = [result, *([Progress(scenario.name)] * progress)]
-    ending = run(prepared.system, prepared.experiment, observers, prepared.isolation, prepared.loop)
+    ending = run(
+        prepared.system,
+        prepared.experiment,
+        observers,
+        prepared.isolation,
+        prepared.loop,
+        prepared.attendants(),
+    )
     for number in ending.signals:
         # Held back while the FMUs computed; now it does what it does elsewhere.
         signal.raise_signal(number)

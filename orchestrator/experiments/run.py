@@ -138,6 +138,7 @@ def run_into(
                         run.observers,
                         prepared.isolation,
                         prepared.loop,
+                        prepared.attendants(),
                     )
                 done.append(run.ended(ending))
                 for caution in cautions_after(done[-1].seen):

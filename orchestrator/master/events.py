@@ -29,7 +29,7 @@ COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
     ">": operator.gt,
 }
 
-#: More events than this are counted and not listed: a condition may chatter for ever.
+#: How often the same event is listed: a condition may chatter for ever.
 _MOST_LISTED = 1000
 
 
@@ -291,12 +291,14 @@ class _Course:
         happened: whether it has.
         was_true: whether its condition was when it was last looked at.
         end: after how many steps it ends.
+        listed: how often something about it was.
 
     """
 
     happened: bool = False
     was_true: bool = True
     end: int = NEVER
+    listed: int = 0
 
 
 class Events:
@@ -322,14 +324,6 @@ class Events:
             if self._begins(run, number):
                 self._begin(run, number)
         return min((self._next(run, number) for number in range(len(self._events))), default=NEVER)
-
-    def missed(self) -> list[Event]:
-        """Those that have not happened."""
-        return [
-            event
-            for event, course in zip(self._events, self._courses, strict=True)
-            if not course.happened
-        ]
 
     def state(self) -> Any:
         """How far they have come, as JSON has it."""
@@ -358,7 +352,7 @@ class Events:
     def _begin(self, run: Run, number: int) -> None:
         event, course = self._events[number], self._courses[number]
         course.happened = True
-        self._say(run, event.text, event.label)
+        self._say(run, number, event.text, event.label)
         event.action.act(run, number, self._layers)
         if event.lasts is not None:
             course.end = max(run.experiment.reaching(run.time + event.lasts), run.made + 1)
@@ -366,13 +360,15 @@ class Events:
     def _end(self, run: Run, number: int) -> None:
         self._courses[number].end = NEVER
         self._layers.take(run, number)
-        self._say(run, f"{self._events[number].text}, ended")
+        self._say(run, number, f"{self._events[number].text}, ended")
 
-    def _say(self, run: Run, text: str, label: str = "") -> None:
-        if len(self._happened) == _MOST_LISTED:
-            text, label = "more has happened than is listed", ""
-        if len(self._happened) <= _MOST_LISTED:
-            self._happened.append(Occurrence(run.time, text, label))
+    def _say(self, run: Run, number: int, text: str, label: str = "") -> None:
+        course = self._courses[number]
+        course.listed += 1
+        if course.listed == _MOST_LISTED:
+            text += "; when it happens again is not listed"
+        if course.listed <= _MOST_LISTED:
+            self._happened.append(Occurrence(run.time, text, label, number))
 
     def _next(self, run: Run, number: int) -> int:
         """After how many steps something is to be done about an event."""

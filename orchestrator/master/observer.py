@@ -46,13 +46,15 @@ class Occurrence(NamedTuple):
     Attributes:
         time: at which it did [s].
         text: what it was.
-        label: a word for it; empty: it is none that a figure names.
+        label: its name in a figure; empty: it has none, as the end of something.
+        event: its number among those that may happen.
 
     """
 
     time: float
     text: str
     label: str = ""
+    event: int = 0
 
     def __str__(self) -> str:
         """In one line."""
