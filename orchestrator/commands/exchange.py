@@ -17,13 +17,14 @@ from orchestrator.commands.options import (
     add_set,
     add_system,
     assignments,
+    read,
 )
 from orchestrator.commands.streams import show
 from orchestrator.errors import InputError
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.exchange.verify import verify
 from orchestrator.experiments.folder import replaced
-from orchestrator.experiments.preparation import DEFAULT_STEP, Request, load, loaded, prepare
+from orchestrator.experiments.preparation import DEFAULT_STEP, Request, load, prepare
 from orchestrator.system.container import write_container
 from orchestrator.system.osp import write_osp
 from orchestrator.system.ssp.writing import write_ssp
@@ -90,8 +91,8 @@ def _add_scenario(parser: argparse.ArgumentParser) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    request = Request(step=options.step, parameters=assignments(options))
-    prepared = prepare(*loaded(options.scenario, options.kind, options.fmi), request)
+    request = Request(step=options.step, parameters=assignments(options), strict=options.strict)
+    prepared = prepare(*read(options, options.fmi), request)
     experiment = prepared.experiment
     system = replace(
         prepared.system,

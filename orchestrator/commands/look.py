@@ -14,11 +14,19 @@ from orchestrator.analysis.plot import plot, wanted
 from orchestrator.analysis.signals import CONTROL_POINT
 from orchestrator.analysis.view import page
 from orchestrator.analysis.visible import VisibleRows
-from orchestrator.commands.options import OK, add_experiment, add_set, add_system, request, status
+from orchestrator.commands.options import (
+    OK,
+    add_experiment,
+    add_set,
+    add_system,
+    read,
+    request,
+    status,
+)
 from orchestrator.commands.streams import show
 from orchestrator.errors import InputError, reason
 from orchestrator.experiments.folder import whole
-from orchestrator.experiments.preparation import loaded, prepare
+from orchestrator.experiments.preparation import prepare
 from orchestrator.experiments.record import add_to_record
 from orchestrator.experiments.stored import read_record, read_result, table_in
 from orchestrator.master.observer import Observer
@@ -105,7 +113,7 @@ def _view(options: argparse.Namespace) -> int:
 
 
 def _animate(options: argparse.Namespace) -> int:
-    scenario, system = loaded(options.scenario, options.kind)
+    scenario, system = read(options)
     out = options.out or Path("results", f"{scenario.name}.gif")
     check_film(out, options.fps)
     prepared = prepare(scenario, system, request(options))

@@ -19,11 +19,12 @@ from orchestrator.commands.options import (
     add_out,
     add_set,
     add_system,
+    read,
     request,
     status,
 )
 from orchestrator.commands.streams import say, show
-from orchestrator.experiments.preparation import loaded, prepare, with_companion
+from orchestrator.experiments.preparation import prepare, with_companion
 from orchestrator.experiments.run import Files, run_into
 from orchestrator.master.files import FORMATS
 from orchestrator.master.interrupts import Interrupts, held_interrupts
@@ -74,7 +75,7 @@ def add_to(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     isolation = isolation_of(options.isolate, options.step_timeout)
     wanted = replace(request(options), isolation=isolation, loop=options.loop)
-    runs = with_companion(prepare(*loaded(options.scenario, options.kind), wanted), wanted)
+    runs = with_companion(prepare(*read(options), wanted), wanted)
     folder = options.out or Path("results", runs[0].scenario.name)
     files = Files(options.interval, options.columns, options.format, options.figures)
     # Until all is said: who stops a run several times wants to know, too, where its rows are.

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,6 +17,7 @@ from orchestrator.experiments.events import check_events, read_events, shared_ev
 from orchestrator.experiments.inputs import Inputs, read_inputs
 from orchestrator.experiments.scenario import Scenario, read_scenario
 from orchestrator.experiments.wiring import closed_loop
+from orchestrator.findings import Findings
 from orchestrator.master.attendant import Attendant
 from orchestrator.master.events import Event, Events
 from orchestrator.master.experiment import ORDERS, Experiment
@@ -44,6 +47,7 @@ class Request:
         kind: of the bundle's FMUs, one of :data:`orchestrator.experiments.bundle.KINDS`.
         isolation: of the FMUs in processes of their own; None: they run in this one.
         loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
+        strict: whether what is not as it should be is refused, even if it is harmless.
         events: in the place of the scenario's, as a scenario file writes them; None: its own.
         inputs: in the place of the scenario's.
 
@@ -56,6 +60,7 @@ class Request:
     isolation: Isolation | None = None
     kind: str = PYTHON
     loop: str = LOOPS[0]
+    strict: bool = False
     events: Sequence[Mapping[str, Any]] | None = None
     inputs: Inputs | None = None
 
@@ -89,18 +94,25 @@ class Prepared:
         return [event for i, event in enumerate(self.events) if i not in happened]
 
 
-def load(name: str | Path, kind: str = PYTHON) -> System:
+def load(
+    name: str | Path, kind: str = PYTHON, *, variant: str | None = None, strict: bool = False
+) -> System:
     """The system of a scenario, or of an SSP, with its experiment.
+
+    What is not as it should be and does no harm is a warning.
 
     Args:
         name: of a scenario of the bundle, or path of a .toml or .ssp file.
         kind: of the bundle's FMUs, `python` or `native`.
+        variant: which of the descriptions in an SSP; None: the default.
+        strict: refuse what otherwise is a warning.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.
 
     """
-    scenario, system = loaded(str(name), kind)
+    with warned(strict) as findings:
+        scenario, system = loaded(str(name), kind, variant=variant, findings=findings)
     return replace(
         system,
         name=scenario.name,
@@ -109,13 +121,30 @@ def load(name: str | Path, kind: str = PYTHON) -> System:
     )
 
 
-def loaded(name: str, kind: str = PYTHON, fmi: str = FMI[0]) -> tuple[Scenario, System]:
+@contextmanager
+def warned(strict: bool = False) -> Iterator[Findings]:
+    """Findings whose notes become warnings, as Python has them."""
+    findings = Findings(strict)
+    yield findings
+    for note in findings.notes:
+        warnings.warn(note, stacklevel=4)
+
+
+def loaded(
+    name: str,
+    kind: str = PYTHON,
+    fmi: str = FMI[0],
+    variant: str | None = None,
+    findings: Findings | None = None,
+) -> tuple[Scenario, System]:
     """A scenario and its system.
 
     Args:
         name: of a scenario of the bundle, or path of a .toml or .ssp file.
         kind: of the bundle's FMUs, `python` or `native`; FMUs that a file names are as they are.
         fmi: their version of FMI. The master can step those of the first.
+        variant: which of the descriptions in an SSP; None: the default.
+        findings: takes what is wrong with it; None: nobody asks for what does no harm.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.
@@ -123,7 +152,10 @@ def loaded(name: str, kind: str = PYTHON, fmi: str = FMI[0]) -> tuple[Scenario, 
     """
     if name.endswith(".ssp"):
         check_brings_its_own(name, kind, fmi)
-        return Scenario(Path(name).stem, title=Path(name).name), read_ssp(Path(name))
+        system = read_ssp(Path(name), variant, findings)
+        return Scenario(Path(name).stem, title=Path(name).name), system
+    if variant is not None:
+        raise InputError(f"{name}: has no variants; an SSP may have")
     scenario = read_scenario(name)
     check_figure(scenario.figure)
     versions = RUNNABLE if fmi == FMI[0] else WRITABLE

@@ -22,6 +22,7 @@ from orchestrator.experiments.preparation import (
     check_brings_its_own,
     loaded,
     prepare,
+    warned,
 )
 from orchestrator.experiments.record import Clock, write_record
 from orchestrator.experiments.run import metrics_json, write_metrics
@@ -183,6 +184,8 @@ def simulate(
     isolate: bool = False,
     step_timeout: float | None = None,
     loop: str = LOOPS[0],
+    variant: str | None = None,
+    strict: bool = False,
     events: Sequence[Mapping[str, Any]] | None = None,
     inputs: str | Path | None = None,
 ) -> Result:
@@ -205,6 +208,8 @@ def simulate(
         step_timeout: how long an isolated FMU may take for one call [s]; None: 60.
         loop: what makes the steps: `python`, `compiled`, or `auto`, the compiled loop where it is
             to be had; the rows are the same.
+        variant: which of the descriptions in an SSP; None: the default.
+        strict: refuse what otherwise is a warning.
         events: what happens during the run, in the place of the scenario's own: tables as a
             scenario file has them, such as `{"at": 20.0, "lose": "controller.tau.r"}`.
         inputs: a table of inputs over time, in the place of the scenario's own: a .csv or .parquet
@@ -221,9 +226,12 @@ def simulate(
     """
     if isinstance(system, System):
         check_brings_its_own(str(system), kind)
+        if variant is not None:
+            raise InputError(f"{system}: has no variants; give it to load")
         scenario = Scenario(system.name)
     else:
-        scenario, system = loaded(str(system), kind)
+        with warned(strict) as findings:
+            scenario, system = loaded(str(system), kind, variant=variant, findings=findings)
     if not isinstance(parameters, Mapping | None):
         raise InputError(f"parameters: a mapping by component.parameter, not {parameters!r}")
     changes: dict[PortName, object] = {
@@ -231,7 +239,7 @@ def simulate(
     }
     isolation = isolation_of(isolate, step_timeout)
     request = Request(
-        stop_time, step, order, changes, isolation, kind, loop, events, inputs_of(inputs)
+        stop_time, step, order, changes, isolation, kind, loop, strict, events, inputs_of(inputs)
     )
     prepared = prepare(scenario, system, request)
     result = Result(prepared)

@@ -31,6 +31,10 @@ class Unit:
     offset: float = 0.0
 
 
+class UndefinedUnit(InputError):
+    """A value is to go from one unit to another, of which nothing defines one."""
+
+
 #: Units by their names.
 Units = Mapping[str, Unit]
 
@@ -71,14 +75,15 @@ def conversion(source: Unit | None, target: Unit | None) -> Linear | None:
     """From one unit to another; None: the value stays as it is.
 
     Raises:
-        InputError: they measure different things, or one of them is not defined.
+        InputError: they measure different things.
+        UndefinedUnit: one of them is not defined.
 
     """
     if source is None or target is None or source.name == target.name:
         return None
     for unit in (source, target):
         if unit.exponents is None:
-            raise InputError(
+            raise UndefinedUnit(
                 f"units differ, {source.name} and {target.name}, and nothing defines {unit.name}"
             )
     if source.exponents != target.exponents:

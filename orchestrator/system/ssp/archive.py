@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 from xml.etree.ElementTree import Element
@@ -11,10 +12,18 @@ from orchestrator.errors import InputError, did_you_mean, reason
 from orchestrator.findings import Findings
 from orchestrator.system.ssp import STRUCTURE
 from orchestrator.system.ssp.document import read_document
+from orchestrator.system.transformation import Linear
+from orchestrator.system.units import UndefinedUnit, Unit, conversion
 from orchestrator.system.unpacking import unpacked
 from orchestrator.system.values import real
 
 _SUFFIX = Path(STRUCTURE).suffix
+
+#: The version whose words are read; later ones have more of them, of which each is refused.
+_VERSION = "1.0"
+
+#: Of many names, this many are said.
+_MOST_SAID = 5
 
 
 class Archive:
@@ -78,12 +87,9 @@ class Archive:
         except Exception as error:
             raise InputError(f"{self.path}: not a readable SSP: {name}: {reason(error)}") from error
         version = root.get("version")
-        if version is None:
-            self.note(f"{name}: names no version; it is read as 1.0")
-        elif version not in ("1.0", "2.0"):
-            self.problem(f"{name}: of version {version!r} of SSP; 1.0 is supported")
-        elif version == "2.0":
-            self.note(f"{name}: of version 2.0 of SSP; it is read as 1.0, which has the same words")
+        if version != _VERSION:
+            stated = "no version" if version is None else f"version {version!r}"
+            self.note(f"{name}: names {stated} of SSP; it is read as {_VERSION}")
         return root
 
     def file(self, source: str, needer: str, base: Path | None = None) -> Path | None:
@@ -96,23 +102,48 @@ class Archive:
 
         """
         base = self.folder if base is None else base
-        written = source.replace("\\", "/")
-        decoded = unquote(urlsplit(written).path)
-        for name in (decoded, written):
+        if "://" in source:
+            self.problem(f"{needer}: {source!r} is elsewhere; a file in the archive is supported")
+            return None
+        decoded = unquote(urlsplit(source).path)
+        for name in dict.fromkeys((decoded, source, source.replace("\\", "/"))):
             path = Path(os.path.normpath(base / name))
-            # What leads out of the archive is not there for any other reader either.
-            if path.is_relative_to(base) and path.is_file():
-                if name != source:
-                    self._check_address(source, needer, name == decoded)
+            if not path.is_relative_to(base):
+                self.problem(f"{needer}: {source!r} lies outside of the archive")
+                return None
+            if path.is_file():
+                if name != decoded:
+                    self.note(f"{needer}: {source!r} is no URI, in which / separates and % encodes")
                 return path
         self.problem(f"holds no {source!r} for {needer}")
         return None
 
-    def _check_address(self, source: str, needer: str, is_decoded: bool) -> None:
-        if "\\" in source:
-            self.note(f"{needer}: {source!r} is no URI; write / for \\")
-        if not is_decoded:
-            self.note(f"{needer}: {source!r} is no URI; its special characters are not encoded")
+    def conversion(self, source: Unit | None, target: Unit | None) -> Linear | None:
+        """From one unit to another, as far as they are defined; None: the value stays as it is.
+
+        Raises:
+            InputError: they measure different things.
+
+        """
+        try:
+            return conversion(source, target)
+        except UndefinedUnit as error:
+            self.note(f"{error}; values are taken as they are")
+            # Said for those who would ask why the units at the ends differ.
+            return Linear()
+
+    def required(self, element: Element, name: str, owner: str) -> str:
+        """An attribute that an element must have; empty, with a problem, where it has not.
+
+        Args:
+            element: with the attribute.
+            name: of the attribute.
+            owner: of the element, for the message.
+
+        """
+        if name not in element.attrib:
+            self.problem(f"{owner}: a <{element.tag}> without {name}")
+        return element.get(name, "")
 
     def number(self, element: Element | None, name: str, otherwise: float | None) -> float | None:
         """An attribute that is a number.
@@ -129,3 +160,10 @@ class Archive:
         except ValueError:
             self.problem(f"{name} {text!r} is no number")
             return otherwise
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names with commas between them; of many the first."""
+    all_names = list(names)
+    more = len(all_names) - _MOST_SAID
+    return ", ".join(all_names[:_MOST_SAID]) + (f" and {more} more" if more > 0 else "")

@@ -9,7 +9,7 @@ from typing import TypeAlias
 from xml.etree.ElementTree import Element
 
 from orchestrator.errors import InputError
-from orchestrator.system.ssp.archive import Archive
+from orchestrator.system.ssp.archive import Archive, listed
 from orchestrator.system.ssp.hierarchy import (
     Bus,
     Connector,
@@ -20,16 +20,13 @@ from orchestrator.system.ssp.hierarchy import (
     Node,
     definitions_of,
 )
-from orchestrator.system.ssp.transformations import transformation_of
+from orchestrator.system.ssp.transformations import converts_units, transformation_of
 from orchestrator.system.transformation import Transformation, chained
-from orchestrator.system.units import Unit, conversion
+from orchestrator.system.units import Unit
 from orchestrator.system.unpacking import unpacked
 
 #: The types of files that are known.
 _VALUES, _MAPPING = "application/x-ssp-parameter-set", "application/x-ssp-parameter-mapping"
-
-#: Names of parameters that nothing has, of which this many are said.
-_MOST_SAID = 5
 
 
 @dataclass(frozen=True)
@@ -51,7 +48,7 @@ class Given:
     entry: Element | None = None
     converts: bool = True
 
-    def transformation(self, target: Connector) -> Transformation | None:
+    def transformation(self, archive: Archive, target: Connector) -> Transformation | None:
         """What makes of it the value of a node.
 
         Raises:
@@ -61,7 +58,9 @@ class Given:
         stated = None
         if self.entry is not None:
             stated = transformation_of(self.entry, self.items, target.items)
-        return chained(conversion(self.unit, target.unit) if self.converts else None, stated)
+        if not self.converts:
+            return stated
+        return chained(archive.conversion(self.unit, target.unit), stated)
 
 
 #: What is given to nodes, and what is known of each of these.
@@ -101,18 +100,16 @@ class Bindings:
         mapping = binding.find("ParameterMapping")
         if mapping is not None:
             entries = self._content(mapping, element, where, "ParameterMapping", _MAPPING)
-            parameters = {} if entries is None else _mapped(parameters, entries)
+            parameters = {} if entries is None else self._mapped(parameters, entries, where)
         unknown = []
         for name, value in parameters.items():
             reached = {node: (value, connector) for node, connector in element.named(name)}
             given.update(reached)
             if not reached:
                 unknown.append(name)
-        if unknown:
-            names = ", ".join(unknown[:_MOST_SAID])
-            more = f" and {len(unknown) - _MOST_SAID} more" if len(unknown) > _MOST_SAID else ""
+        if unknown and not (isinstance(element, Leaf) and element.component is None):
             self._archive.note(
-                f"{where} has nothing named {names}{more}; the values for it have no effect"
+                f"{where} has nothing named {listed(unknown)}; values for it have no effect"
             )
 
     def _content(
@@ -141,6 +138,21 @@ class Bindings:
             return unpacked(owner.component.fmu)
         raise InputError(f"a file of {'.'.join(owner.way)!r}, which is no component with an FMU")
 
+    def _mapped(
+        self, parameters: dict[str, Given], mapping: Element, where: str
+    ) -> dict[str, Given]:
+        """Those parameters that a mapping names, under their new names."""
+        found = {}
+        for entry in mapping.findall("MappingEntry"):
+            source, target = (
+                self._archive.required(entry, end, where) for end in ("source", "target")
+            )
+            if source in parameters:
+                found[target] = replace(
+                    parameters[source], entry=entry, converts=converts_units(entry)
+                )
+        return found
+
     def _parameters(self, values: Element, where: str) -> dict[str, Given]:
         """The values of a parameter set by their names."""
         defined = definitions_of(self._archive, values)
@@ -148,7 +160,7 @@ class Bindings:
         enumerations = {**self._definitions.enumerations, **defined.enumerations}
         found: dict[str, Given] = {}
         for parameter in values.findall("Parameters/Parameter"):
-            name = parameter.get("name", "")
+            name = self._archive.required(parameter, "name", where)
             value = next(iter(parameter), None)
             text = None if value is None else value.get("value")
             if value is None or text is None:
@@ -173,14 +185,3 @@ def _inside_out(group: Group) -> Iterator[Leaf | Bus | Group]:
         else:
             yield element
     yield group
-
-
-def _mapped(parameters: dict[str, Given], mapping: Element) -> dict[str, Given]:
-    """Those parameters that a mapping names, under their new names."""
-    found = {}
-    for entry in mapping.findall("MappingEntry"):
-        given = parameters.get(entry.get("source", ""))
-        if given is not None:
-            converts = entry.get("suppressUnitConversion", "false") not in ("true", "1")
-            found[entry.get("target", "")] = replace(given, entry=entry, converts=converts)
-    return found

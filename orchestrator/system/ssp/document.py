@@ -66,7 +66,7 @@ class _Reader:
         prefix, _, name = tag.rpartition(":")
         if self._open or name in _OPEN:
             self._open += 1
-        self._check(prefix, name)
+        self._check(prefix)
         plain = {
             key.rpartition(":")[2]: value
             for key, value in attributes.items()
@@ -84,9 +84,10 @@ class _Reader:
         """Refuse what could name further files, or unfold into more than memory holds."""
         raise ValueError("it has a document type, which no file of an SSP has")
 
-    def _check(self, prefix: str, name: str) -> None:
+    def _check(self, prefix: str) -> None:
         namespace = self._scopes[-1].get(prefix)
         if namespace is None and prefix:
             self._note(f"the prefix {prefix!r} is not declared")
         elif not self._open and namespace not in NAMESPACES:
-            self._note(f"<{name}> is in the namespace {namespace!r}, which is not one of SSP 1.0")
+            where = f"the namespace {namespace!r}" if namespace else "no namespace"
+            self._note(f"elements are in {where}, which is none of SSP 1.0")

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 from orchestrator.errors import InputError
 from orchestrator.system.component import Component, read_component
-from orchestrator.system.ssp.archive import Archive
+from orchestrator.system.ssp.archive import Archive, listed
 from orchestrator.system.units import BASES, Unit, Units, unit_of_port
 from orchestrator.system.values import type_of
 
@@ -261,8 +261,7 @@ class Builder:
         connectors = self._connectors(content)
         leaf = Leaf(way, content, component, connectors, self._definitions)
         if component is not None:
-            for name, stated in connectors.items():
-                self._compare(Node(way, name), stated, leaf.connector(name))
+            self._compare(leaf)
         return leaf
 
     def _component(self, content: Element, name: str) -> Component | None:
@@ -289,18 +288,28 @@ class Builder:
             self._archive.problem(f"{name}: {str(error).removeprefix(f'{self._archive.folder}/')}")
             return None
 
-    def _compare(self, node: Node, stated: Connector, own: Connector | None) -> None:
-        """Say where a connector is not what its FMU has."""
-        if own is None:
-            self._archive.note(f"{node}: its FMU has no such variable")
-            return
-        for what, said, true in (
-            ("kind", stated.kind, own.kind),
-            ("type", stated.type, own.type),
-            ("unit", stated.unit and stated.unit.name, own.unit and own.unit.name),
-        ):
-            if said and said != true:
-                self._archive.note(f"{node}: is of {what} {said}, and {true} in its FMU")
+    def _compare(self, leaf: Leaf) -> None:
+        """Say where connectors are not what their FMU has."""
+        absent = []
+        for name, stated in leaf.connectors.items():
+            own = leaf.connector(name)
+            if own is None:
+                absent.append(name)
+                continue
+            for what, said, true in (
+                ("kind", stated.kind, own.kind),
+                ("type", stated.type, own.type),
+                ("unit", stated.unit and stated.unit.name, own.unit and own.unit.name),
+            ):
+                if said and said != true:
+                    self._archive.note(
+                        f"{Node(leaf.way, name)}: its {what} is {said}, and {true} in its FMU"
+                    )
+        if absent:
+            self._archive.note(
+                f"{'.'.join(leaf.way)}: its FMU has no variables for the connectors "
+                f"{listed(absent)}"
+            )
 
     def _connectors(self, content: Element) -> dict[str, Connector]:
         return {

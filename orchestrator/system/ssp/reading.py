@@ -10,7 +10,7 @@ from orchestrator.errors import InputError
 from orchestrator.findings import Findings
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
-from orchestrator.system.ssp.archive import Archive
+from orchestrator.system.ssp.archive import Archive, listed
 from orchestrator.system.ssp.bindings import Bindings, Given, Values
 from orchestrator.system.ssp.experiment import step_of, times_of
 from orchestrator.system.ssp.hierarchy import Builder, Leaf, Node, Way, definitions_of
@@ -73,6 +73,8 @@ def _read(archive: Archive, root: Element) -> System:
         step=times.step,
         steps={name: step for name, step in steps.items() if step is not None},
     )
+    if not leaves:
+        archive.problem("holds no component: there is nothing to run")
     for problem in system.problems():
         archive.problem(problem)
     return system
@@ -103,8 +105,9 @@ class _Ports:
                     self._follow(port, wires.course(node), leaf)
                 except InputError as error:
                     archive.problem(error)
-        for node in given.keys() - self._used:
-            archive.note(f"{node}: the value that is given to it reaches no component")
+        lost = [str(node) for node in given if node not in self._used]
+        if lost:
+            archive.note(f"values that are given to {listed(lost)} reach no component")
 
     def _follow(self, port: PortName, course: Course, leaf: Leaf) -> None:
         """Enter what arrives at a port: another's value, or the outermost that is given."""
@@ -119,7 +122,10 @@ class _Ports:
                 given, connector = self._given[node]
                 unit = connector.unit or given.unit
                 try:
-                    whole = chained(given.transformation(connector), course.transformation(unit, i))
+                    whole = chained(
+                        given.transformation(self._archive, connector),
+                        course.transformation(unit, i),
+                    )
                 except InputError as error:
                     raise InputError(f"{node}: {error}") from None
                 self._set(port, leaf, given, whole)

@@ -43,6 +43,11 @@ def transformation_of(content: Element, source: Items, target: Items) -> Transfo
     return None
 
 
+def converts_units(content: Element) -> bool:
+    """Whether a connection or an entry of a mapping has units converted."""
+    return not BOOLEANS.get(content.get("suppressUnitConversion", "false"), False)
+
+
 def _number(element: Element, name: str, otherwise: str) -> float:
     text = element.get(name, otherwise)
     try:

@@ -9,9 +9,9 @@ from xml.etree.ElementTree import Element
 from orchestrator.errors import InputError
 from orchestrator.system.ssp.archive import Archive
 from orchestrator.system.ssp.hierarchy import GIVES, TAKES, Bus, Connector, Group, Leaf, Node
-from orchestrator.system.ssp.transformations import transformation_of
+from orchestrator.system.ssp.transformations import converts_units, transformation_of
 from orchestrator.system.transformation import Linear, Transformation, chained
-from orchestrator.system.units import Unit, conversion
+from orchestrator.system.units import Unit
 
 #: Parts of arrays and the like, which FMI 2.0 does not have.
 _UNSUPPORTED = ("startIndices", "endIndices")
@@ -40,11 +40,13 @@ class Course:
     """How a value comes to a port of a component.
 
     Attributes:
+        archive: whose connections it takes.
         nodes: through which it comes, from its origin on, the port included.
         wires: between them.
 
     """
 
+    archive: Archive
     nodes: tuple[Node, ...]
     wires: tuple[Wire, ...]
 
@@ -63,7 +65,7 @@ class Course:
         for wire in self.wires[first:]:
             step = wire.stated
             if wire.converts:
-                step = chained(conversion(unit, wire.unit), step)
+                step = chained(self.archive.conversion(unit, wire.unit), step)
                 # What a transformation makes of a value is in the target's unit, or unknown.
                 unit = wire.unit or (unit if wire.stated is None else None)
             else:
@@ -100,7 +102,7 @@ class Wires:
                 raise InputError(f"{node}: the connections that feed it lead in a circle")
             nodes.insert(0, wire.source)
             wires.insert(0, wire)
-        return Course(tuple(nodes), tuple(wires))
+        return Course(self._archive, tuple(nodes), tuple(wires))
 
     def _read(self, group: Group) -> None:
         for connection in group.content.findall("Connections/Connection"):
@@ -133,8 +135,9 @@ class Wires:
             stated = transformation_of(connection, source.connector.items, target.connector.items)
         except InputError as error:
             raise InputError(f"{named}: {error}") from None
-        suppressed = connection.get("suppressUnitConversion", "false") in ("true", "1")
-        self._wires[target.node] = Wire(source.node, target.connector.unit, stated, not suppressed)
+        self._wires[target.node] = Wire(
+            source.node, target.connector.unit, stated, converts_units(connection)
+        )
 
 
 @dataclass(frozen=True)
@@ -156,7 +159,10 @@ class _End:
     @classmethod
     def of(cls, group: Group, connection: Element, which: str) -> _End:
         """The start or the end of a connection."""
-        name, port = connection.get(f"{which}Element"), connection.get(f"{which}Connector", "")
+        # Some writers leave it empty where it is the system itself.
+        name, port = connection.get(f"{which}Element") or None, connection.get(f"{which}Connector")
+        if not port:
+            raise InputError(f"a <{connection.tag}> without {which}Connector")
         element: Leaf | Bus | Group | None = group if name is None else group.members.get(name)
         if element is None:
             raise InputError(
