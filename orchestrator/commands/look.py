@@ -25,13 +25,13 @@ from orchestrator.commands.options import (
 )
 from orchestrator.commands.streams import show
 from orchestrator.errors import InputError, reason
-from orchestrator.experiments.folder import whole
 from orchestrator.experiments.preparation import prepare
 from orchestrator.experiments.record import add_to_record
 from orchestrator.experiments.stored import read_record, read_result, table_in
 from orchestrator.master.observer import Observer
 from orchestrator.master.progress import Progress
 from orchestrator.master.simulation import simulate
+from orchestrator.system.atomic import whole
 
 #: What a plot can be written as.
 _PLOTS = (".png", ".svg", ".pdf")

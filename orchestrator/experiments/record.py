@@ -14,10 +14,11 @@ from typing import Any
 
 from orchestrator.experiments.bill_of_materials import digest_of
 from orchestrator.experiments.bundle import NATIVE, PYTHON
-from orchestrator.experiments.folder import RECORD, whole
+from orchestrator.experiments.folder import RECORD
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observer import Ending, Header, Occurrence
+from orchestrator.system.atomic import whole
 from orchestrator.system.names import port_name
 from orchestrator.system.unpacking import runs_python, unpacked
 

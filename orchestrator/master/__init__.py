@@ -17,6 +17,9 @@ module                  what it holds
 :mod:`.schedule`        which components are stepped when, and on whose outputs
 :mod:`.signals`         what is done to values on their way from outputs to inputs
 :mod:`.attendant`       who acts on a run between two steps
+:mod:`.checkpoint`      what a run needs to go on in another process
+:mod:`.spool`           rows in a file that grows, to be read again
+:mod:`.pace`            a run that goes no faster than a clock
 :mod:`.loop`            the steps in Python, one by one, and which loop makes them
 :mod:`.stepper`         the steps compiled, some hundred in one call of stepper.c
 :mod:`.layout`          what stepper.c works on

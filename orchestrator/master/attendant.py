@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from orchestrator.master.experiment import MOST_STEPS, Experiment
 from orchestrator.master.instance import Instance
+from orchestrator.master.interrupts import Interrupts
+from orchestrator.master.log import Log
 from orchestrator.master.observer import Blocks, Occurrence
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import Stage
@@ -29,6 +31,8 @@ class Run:
         stages: of every step.
         signals: what is done to values on their way from outputs to inputs.
         blocks: take the rows.
+        log: of what the FMUs say.
+        interrupts: signals to stop that have come; whoever waits for something looks there.
         made: how many steps have been made.
         due: after how many somebody acts on it: every loop looks up there.
         happened: events, in their order.
@@ -42,6 +46,8 @@ class Run:
     stages: Sequence[Stage]
     signals: Signals
     blocks: Blocks
+    log: Log
+    interrupts: Interrupts
     made: int = 0
     due: int = NEVER
     happened: list[Occurrence] = field(default_factory=list)
@@ -58,6 +64,9 @@ class Attendant(Protocol):
     def attend(self, run: Run) -> int:
         """Act after :attr:`Run.made` steps, for the first time before any.
 
+        Where a run is resumed, the first call comes after the steps that were made before, whether
+        it was wanted there or not.
+
         Returns:
             After how many steps it wants to be called again; :data:`NEVER`: not any more.
 
@@ -66,6 +75,16 @@ class Attendant(Protocol):
             ComponentFailed: a component did not do what it was asked for.
 
         """
+
+
+class Lasting(Protocol):
+    """What a run that is resumed has to know again of an earlier process."""
+
+    def state(self) -> Any:
+        """What there is to know, as JSON has it."""
+
+    def restore(self, state: Any) -> None:
+        """Know it again."""
 
 
 class Attendance:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 from fmpy.fmi2 import fmi2Discard, fmi2Warning
 
@@ -50,6 +50,14 @@ class Log:
         """All remarks, the first of what was said, and how much that was."""
         more = self._n - len(self._said)
         return (*self._remarks, *self._said, *([f"and {more} messages more"] * (more > 0)))
+
+    def state(self) -> dict[str, Any]:
+        """All of it, as JSON has it."""
+        return {"said": self._said, "n": self._n, "refusals": self.refusals}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Take on what another one has taken."""
+        self._said, self._n, self.refusals = state["said"], state["n"], state["refusals"]
 
 
 class Letters:

@@ -139,15 +139,28 @@ class Blocks:
             NotKept: one of them failed; the others were told.
 
         """
-        failures: list[Exception] = []
         if n := self.block.n:
             # Counted as told before they are told: an observer that fails is not told twice.
-            rows, self.block.n = self._rows[:n], 0
-            for observer in self._observers:
-                try:
-                    observer.take(rows)
-                except (OSError, MemoryError) as error:
-                    failures.append(error)
-            if failures:
-                raise NotKept(f"stopped at t = {rows[-1, 0]:g} s: {reason(failures[0])}")
+            self.block.n = 0
+            self._tell(self._rows[:n])
         self.due = monotonic() + _PATIENCE
+
+    def tell(self, rows: np.ndarray) -> None:
+        """Tell the observers of rows that an earlier process has computed.
+
+        Raises:
+            NotKept: one of them failed; the others were told.
+
+        """
+        self.hand_over()
+        self._tell(rows)
+
+    def _tell(self, rows: np.ndarray) -> None:
+        failures: list[Exception] = []
+        for observer in self._observers:
+            try:
+                observer.take(rows)
+            except (OSError, MemoryError) as error:
+                failures.append(error)
+        if failures:
+            raise NotKept(f"stopped at t = {rows[-1, 0]:g} s: {reason(failures[0])}")

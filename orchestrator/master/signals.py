@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -126,6 +127,23 @@ class Signals:
             if target.component == component and column in self._fed:
                 gathering, place = self._fed[column]
                 gathering.move(self._row.values, place)
+
+    def state(self) -> dict[str, Any]:
+        """What is done to them, as JSON has it."""
+        return {
+            "fed": [
+                (column, float(gathering.factors[place]), float(gathering.offsets[place]))
+                for column, (gathering, place) in self._fed.items()
+            ],
+            "open": list(self._open.items()),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Do to them what was done before; the row is left as it is."""
+        for column, factor, offset in state["fed"]:
+            gathering, place = self._fed[column]
+            gathering.set(place, factor, offset)
+        self._open = {column: tuple(values) for column, values in state["open"]}
 
     def _alter(self, target: PortName, factor: float, offset: float) -> None:
         column, values = self._row.columns[target], self._row.values

@@ -12,7 +12,7 @@ from orchestrator.errors import InputError, StartError, reason
 from orchestrator.master.attendant import Attendance, Attendant, Run
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.instance import ComponentFailed, Ended, Instance
-from orchestrator.master.interrupts import Interrupts, held_interrupts
+from orchestrator.master.interrupts import held_interrupts
 from orchestrator.master.isolated import Isolation, isolated
 from orchestrator.master.loaded import all_loaded
 from orchestrator.master.log import Log
@@ -74,11 +74,13 @@ def simulate(
             interrupts.hand_over = blocks.hand_over
             blocks.append(0.0, row.values)
             signals = Signals(row, [stage.gather for stage in scheduled], system.connections)
-            run = Run(system, experiment, instances, row, scheduled, signals, blocks)
+            run = Run(
+                system, experiment, instances, row, scheduled, signals, blocks, log, interrupts
+            )
             order = [name for names in plan for name in names]
             remark = None
             try:
-                failure = _advance(run, loop, Attendance(run, attendants), order, interrupts)
+                failure = _advance(run, loop, Attendance(run, attendants), order)
             except NotKept as error:
                 # Rows that cannot be kept need not be computed.
                 failure = str(error)
@@ -186,7 +188,6 @@ def _advance(
     loop: Loop,
     attendance: Attendance,
     order: Sequence[str],
-    interrupts: Interrupts,
 ) -> str | None:
     """Step to the end, or to the first failure, and say what it was."""
     blocks, failure = run.blocks, None
@@ -197,7 +198,7 @@ def _advance(
                 attendance.attend()
             if monotonic() > blocks.due:
                 blocks.hand_over()
-            if interrupts.signals:
+            if run.interrupts:
                 failure = f"interrupted at t = {run.time:.12g} s"
                 break
     except ComponentFailed as error:

@@ -22,7 +22,6 @@ from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
 from orchestrator.experiments.bill_of_materials import digest_of
 from orchestrator.experiments.bundle import PYTHON
-from orchestrator.experiments.folder import whole
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.experiments.record import PACKAGES
 from orchestrator.experiments.run import metrics_json
@@ -32,6 +31,7 @@ from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
 from orchestrator.paper.runs import Run
 from orchestrator.paper.workers import Workers
+from orchestrator.system.atomic import whole
 from orchestrator.system.names import port_name
 
 #: Rooms whose code says what is kept of a run.
