@@ -69,6 +69,7 @@ def write_record(
         "command": list(command),
         **clock.times(),
         "failure": ending.failure,
+        "remark": ending.remark,
         "experiment": {
             "stop_time": experiment.stop_time,
             "step": experiment.step,
@@ -117,6 +118,7 @@ def read_ending(record: dict[str, Any]) -> Ending:
     events = record.get("events", ())
     return Ending(
         record.get("failure"),
+        record.get("remark"),
         events=tuple(Occurrence(float(e["time"]), str(e["text"]), str(e["label"])) for e in events),
     )
 

@@ -141,6 +141,8 @@ def run_into(
                         prepared.attendants(),
                     )
                 done.append(run.ended(ending))
+                for event in () if ending.failure else prepared.missed(ending):
+                    say(f"warning: {prepared.scenario.name}: did not happen: {event}")
                 for caution in cautions_after(done[-1].seen):
                     say(f"warning: {prepared.scenario.name}: {caution}")
                 if interrupts:
