@@ -95,6 +95,8 @@ def _identity(prepared: Prepared) -> Identity:
         "the components": ", ".join(system.components),
         **{f"the FMU of {name}": digest_of(of.fmu) for name, of in system.components.items()},
         **{f"what feeds {wire.target}": repr(wire) for wire in system.connections},
+        "the events": repr(prepared.events),
+        "the inputs": "" if prepared.course is None else prepared.course.digest,
         **{f"the step of {name}": repr(step) for name, step in system.steps.items()},
         **{str(name): repr(value) for name, value in system.parameters.items()},
         **{name: repr(value) for name, value in vars(experiment).items()},

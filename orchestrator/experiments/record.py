@@ -17,7 +17,7 @@ from orchestrator.experiments.bundle import NATIVE, PYTHON
 from orchestrator.experiments.folder import RECORD
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.observer import Ending, Header
+from orchestrator.master.observer import Ending, Header, Occurrence
 from orchestrator.system.atomic import whole
 from orchestrator.system.names import port_name
 from orchestrator.system.unpacking import runs_python, unpacked
@@ -71,6 +71,7 @@ def write_record(
         "command": list(command),
         **clock.times(),
         "failure": ending.failure,
+        "remark": ending.remark,
         "experiment": {
             "stop_time": experiment.stop_time,
             "step": experiment.step,
@@ -80,6 +81,7 @@ def write_record(
         },
         "loop": header.loop,
         **(remarks or {}),
+        "events": [occurrence._asdict() for occurrence in ending.events],
         "fmus": {
             component.name: {
                 "file": component.fmu.name,
@@ -114,6 +116,16 @@ def add_to_record(file: Path) -> None:
         return
     with whole(path) as partial:
         partial.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+
+
+def read_ending(record: dict[str, Any]) -> Ending:
+    """How a run has ended, from its record."""
+    events = record.get("events", ())
+    return Ending(
+        record.get("failure"),
+        record.get("remark"),
+        events=tuple(Occurrence(float(e["time"]), str(e["text"]), str(e["label"])) for e in events),
+    )
 
 
 def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:

@@ -17,6 +17,7 @@ from orchestrator.errors import InputError, did_you_mean, reason
 from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.checkpoints import checkpoints_of, leave
 from orchestrator.experiments.folder import locked, replaced
+from orchestrator.experiments.inputs import inputs_of
 from orchestrator.experiments.preparation import (
     Prepared,
     Request,
@@ -33,7 +34,7 @@ from orchestrator.master.experiment import Order, written_order
 from orchestrator.master.files import FORMATS
 from orchestrator.master.isolated import isolation_of
 from orchestrator.master.loop import LOOPS
-from orchestrator.master.observer import Observer
+from orchestrator.master.observer import Observer, Occurrence
 from orchestrator.master.progress import Progress
 from orchestrator.master.simulation import simulate as run
 from orchestrator.master.table import Table
@@ -114,6 +115,11 @@ class Result(Table):
         """What was run."""
         return self._prepared.system
 
+    @property
+    def events(self) -> tuple[Occurrence, ...]:
+        """What has happened during the run: each has a time [s], a text and a label."""
+        return self.ending.events
+
     def metrics(self) -> dict[str, Any]:
         """What the command line writes into metrics.json."""
         return metrics_json(metrics_of(self), self._prepared)
@@ -189,6 +195,8 @@ def simulate(
     variant: str | None = None,
     strict: bool = False,
     steps: Mapping[str, float] | None = None,
+    events: Sequence[Mapping[str, Any]] | None = None,
+    inputs: str | Path | None = None,
     checkpoint: str | Path | None = None,
     checkpoint_every: float | None = None,
     resume: bool = False,
@@ -219,6 +227,10 @@ def simulate(
         strict: refuse what otherwise is a warning.
         steps: of components that take longer ones of their own [s], multiples of the communication
             step; they win over the scenario's.
+        events: what happens during the run, in the place of the scenario's own: tables as a
+            scenario file has them, such as `{"at": 20.0, "lose": "controller.tau.r"}`.
+        inputs: a table of inputs over time, in the place of the scenario's own: a .csv or .parquet
+            file.
         checkpoint: folder for what it takes to go on after the process has ended, whatever ended
             it; removed when the run has come to its end.
         checkpoint_every: how often that is written, in simulated seconds; None: as often as
@@ -249,7 +261,19 @@ def simulate(
         port_name(str(name)): value for name, value in (parameters or {}).items()
     }
     isolation = isolation_of(isolate, step_timeout)
-    request = Request(stop_time, step, order, changes, isolation, kind, loop, strict, steps or {})
+    request = Request(
+        stop_time,
+        step,
+        order,
+        changes,
+        isolation,
+        kind,
+        loop,
+        strict,
+        steps or {},
+        events=events,
+        inputs=inputs_of(inputs),
+    )
     prepared = prepare(scenario, system, request)
     result = Result(prepared)
     observers: list[Observer] = [result, *([Progress(scenario.name)] * progress)]
@@ -261,7 +285,7 @@ def simulate(
             [*observers, *kept],
             prepared.isolation,
             prepared.loop,
-            kept,
+            [*kept, *prepared.attendants()],
         )
         leave(kept, ending.failure is None)
     for number in ending.signals:

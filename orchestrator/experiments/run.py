@@ -176,6 +176,8 @@ def run_into(
                         run.attendants,
                     )
                 done.append(run.ended(ending))
+                for event in () if ending.failure else prepared.missed(ending):
+                    say(f"warning: {prepared.scenario.name}: did not happen: {event}")
                 for caution in cautions_after(done[-1].seen):
                     say(f"warning: {prepared.scenario.name}: {caution}")
                 if interrupts:
@@ -198,9 +200,8 @@ def run_into(
         spare.unlink()
         _write_ends(done, command, clock)
         place = place_of(unfinished, folder)
-    if kept:
-        is_whole = len(done) == len(runs) and all(run.ending.failure is None for run in done)
-        leave(kept, is_whole, say)
+    is_whole = len(done) == len(runs) and all(run.ending.failure is None for run in done)
+    leave(kept, is_whole, say)
     return [
         Finished(place, run.prepared.scenario.name, run.metrics, run.ending, run.notes)
         for run in done
@@ -239,6 +240,7 @@ class _Running:
         self._real_time = None if prepared.real_time is None else RealTime(prepared.real_time)
         if self._real_time is not None:
             self.attendants.append(self._real_time)
+        self.attendants += prepared.attendants()
 
     def ended(self, ending: Ending) -> _Done:
         """When its observers have been told the end."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import json
 from base64 import b64decode, b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from shutil import rmtree
@@ -89,7 +89,6 @@ class Checkpoints:
         identity: Identity,
         every: float,
         resume: bool,
-        lasting: Sequence[Lasting] = (),
     ) -> None:
         """Look for a checkpoint; nothing is written before the run begins.
 
@@ -98,7 +97,6 @@ class Checkpoints:
             identity: of the run.
             every: a checkpoint for so many simulated seconds [s].
             resume: begin with the one that is there, if there is one.
-            lasting: attendants that have something to remember.
 
         Raises:
             InputError: what is there is not wanted, or not what is wanted.
@@ -106,8 +104,7 @@ class Checkpoints:
         """
         if not (isfinite(every) and every > 0.0):
             raise InputError(f"a checkpoint every {every:g} s: must be positive and finite")
-        self.folder, self._identity = folder, identity
-        self._every, self._lasting = every, lasting
+        self.folder, self._identity, self._every = folder, identity, every
         self._found = _read(folder)
         if self._found is not None:
             if not resume:
@@ -163,7 +160,7 @@ class Checkpoints:
                 name: b64encode(instance.state()).decode()
                 for name, instance in run.instances.items()
             },
-            [one.state() for one in self._all_lasting(run)],
+            [one.state() for one in _lasting(run)],
         )
         run.blocks.hand_over()
         try:
@@ -175,6 +172,9 @@ class Checkpoints:
         self.time = run.time
 
     def _resume(self, run: Run, found: _Stored) -> None:
+        # First of all what rows mean, who is told them wants to know.
+        for one, state in zip(_lasting(run), found.lasting, strict=True):
+            one.restore(state)
         first = 1  # which was computed anew
         for rows in self._spool.kept():
             run.blocks.tell(rows[first:])
@@ -185,11 +185,11 @@ class Checkpoints:
         run.row.values[:] = found.row
         for name, instance in run.instances.items():
             instance.restore(b64decode(found.states[name]))
-        for one, state in zip(self._all_lasting(run), found.lasting, strict=True):
-            one.restore(state)
 
-    def _all_lasting(self, run: Run) -> Sequence[Lasting]:
-        return run.signals, run.log, *self._lasting
+
+def _lasting(run: Run) -> list[Lasting]:
+    attendants = [one for one in run.attendants if isinstance(one, Lasting)]
+    return [run.row.texts, run.signals, run.log, *attendants]
 
 
 def interval_in(folder: Path) -> float | None:
