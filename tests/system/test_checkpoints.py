@@ -97,6 +97,65 @@ def test_a_run_that_is_killed_and_resumed_is_one_that_was_not(scenario, options,
     assert record["resumed_at"] == pytest.approx(1.2)
 
 
+EVENTS = """
+stop_time = 2.0
+
+[steps]
+disturbance = 0.04
+planner = 0.14
+
+[inputs]
+file = "inputs.csv"
+
+[wires]
+"plant.tau_w" = false
+
+[[events]]
+at = 0.25
+for = 0.6
+bias = { "plant.y.x" = 0.01 }
+
+[[events]]
+when = "controller.tau.u > -17.5"
+repeat = true
+for = 0.2
+set = { "plant.current.y" = 0.3 }
+
+[[events]]
+at = 1.0
+for = 0.7
+drop = "plant.nu"
+
+[[events]]
+at = 1.1
+for = 0.5
+override = { "plant.tau_w.v" = 5.0 }
+
+[[events]]
+at = 1.5
+reset = "controller"
+"""
+
+
+@pytest.mark.parametrize("options", [["--loop", "python"], ["--order", "jacobi", "--isolate"]])
+def test_a_run_in_which_things_happen(options):
+    """Killed while some of them last, others wait, and slow components hold what is not due."""
+    Path("inputs.csv").write_text(
+        "time,plant.tau_w.u,plant.tau_w.v\n" + "".join(f"{t},{t},{-t}\n" for t in range(4))
+    )
+    Path("events.toml").write_text(EVENTS)
+    arguments = ["events.toml", "--no-figures", *options]
+    assert run(*arguments, out="whole") == 0
+    plain = [option for option in arguments if option != "--isolate"]
+    killed_after(2, *plain, *CHECKPOINTS, out="killed")
+    killed_after(2, *plain, "--resume", out="killed")
+    assert run(*arguments, "--resume", out="killed") == 0
+    assert result("killed") == result("whole")
+    whole, killed = (json.loads(Path(out, _RECORD).read_text()) for out in ("whole", "killed"))
+    assert len(whole["events"]) > 6
+    assert killed["events"] == whole["events"]
+
+
 def test_a_run_with_a_companion_and_figures(capsys):
     """Killed in the first, and in the second."""
     arguments = ["fig5", "--stop-time", "1"]
