@@ -183,7 +183,10 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     system = system.with_parameters(request.parameters)
     course, inputs = None, _first_given(request.inputs, scenario.inputs)
     if inputs is not None:
-        system, course = read_inputs(inputs, system)
+        given = request.parameters.keys()
+        if request.inputs is None:
+            given |= scenario.parameters.keys()
+        system, course = read_inputs(inputs, system, given)
     system.check()
     events = scenario.events
     if request.events is not None:
@@ -214,10 +217,11 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     if not scenario.compare:
         return [prepared]
     companion, system = loaded(scenario.compare, request.kind)
+    played = prepared.course.targets if prepared.course else ()
     shared = {
         target: value
         for target, value in {**scenario.parameters, **request.parameters}.items()
-        if system.has(target)
+        if system.has(target) and target not in played
     }
     events = request.events
     if events is None:
