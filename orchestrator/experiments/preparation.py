@@ -183,9 +183,9 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     system = system.with_parameters(request.parameters)
     course, inputs = None, _first_given(request.inputs, scenario.inputs)
     if inputs is not None:
-        given = request.parameters.keys()
+        given = set(request.parameters)
         if request.inputs is None:
-            given |= scenario.parameters.keys()
+            given |= set(scenario.parameters)
         system, course = read_inputs(inputs, system, given)
     system.check()
     events = scenario.events
