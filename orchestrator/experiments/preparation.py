@@ -113,6 +113,9 @@ def load(
     """
     with warned(strict) as findings:
         scenario, system = loaded(str(name), kind, variant=variant, findings=findings)
+        if left := left_behind(scenario):
+            findings.note(left)
+            findings.refuse()
     return replace(
         system,
         name=scenario.name,
@@ -160,6 +163,13 @@ def loaded(
     check_figure(scenario.figure)
     versions = RUNNABLE if fmi == FMI[0] else WRITABLE
     return scenario, closed_loop(current_fmus(kind, fmi), scenario, versions)
+
+
+def left_behind(scenario: Scenario) -> str | None:
+    """What of a scenario a system by itself does not have, in words."""
+    has = {"events": bool(scenario.events), "inputs": scenario.inputs is not None}
+    names = " and ".join(name for name, there in has.items() if there)
+    return f"{scenario.name}: the system comes without the scenario's {names}" if names else None
 
 
 def check_brings_its_own(name: str, kind: str, fmi: str = FMI[0]) -> None:
