@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -58,8 +59,15 @@ def inputs_of(file: str | Path | None) -> Inputs | None:
     return None if file is None else Inputs(Path(file))
 
 
-def read_inputs(inputs: Inputs, system: System) -> tuple[System, Course]:
+def read_inputs(
+    inputs: Inputs, system: System, given: Collection[PortName]
+) -> tuple[System, Course]:
     """A system that begins with the first values of a table, and what follows.
+
+    Args:
+        inputs: that are wanted.
+        system: that has them.
+        given: ports that have values from where the table is named: it must not name them, too.
 
     Raises:
         InputError: the table cannot be read, or a column is no input that is to be had.
@@ -73,6 +81,8 @@ def read_inputs(inputs: Inputs, system: System) -> tuple[System, Course]:
     try:
         _check(rows, targets)
         for target, column in zip(targets, rows[:, 1:].T, strict=True):
+            if target in map(system.named, given):
+                raise InputError(f"{target} is given a value of its own beside the table")
             _check_column(system, target, column)
         linear = [_is_linear(system, target, inputs.between) for target in targets]
         course = Course(targets, rows[:, 0], rows[:, 1:], np.array(linear))
@@ -103,8 +113,6 @@ def _check_column(system: System, target: PortName, column: np.ndarray) -> None:
     for connection in system.connections:
         if connection.target == target:
             raise InputError(f"{target} is fed by {connection.source} and cannot be set")
-    if target in system.parameters:
-        raise InputError(f"{target} has a value among the parameters already")
     is_real = type_of(variable) == "Real"
     for value in (column.min(), column.max()) if is_real else np.unique(column):
         typed(str(target), variable, _number(value))

@@ -121,6 +121,9 @@ def load(
     """
     with warned(strict) as findings:
         scenario, system = loaded(str(name), kind, variant=variant, findings=findings)
+        if left := left_behind(scenario):
+            findings.note(left)
+            findings.refuse()
     return replace(
         system,
         name=scenario.name,
@@ -170,6 +173,13 @@ def loaded(
     return scenario, closed_loop(current_fmus(kind, fmi), scenario, versions)
 
 
+def left_behind(scenario: Scenario) -> str | None:
+    """What of a scenario a system by itself does not have, in words."""
+    has = {"events": bool(scenario.events), "inputs": scenario.inputs is not None}
+    names = " and ".join(name for name, there in has.items() if there)
+    return f"{scenario.name}: the system comes without the scenario's {names}" if names else None
+
+
 def check_brings_its_own(name: str, kind: str, fmi: str = FMI[0]) -> None:
     """Check that no other FMUs are asked for than those that a system comes with.
 
@@ -191,7 +201,10 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     system = system.with_parameters(request.parameters)
     course, inputs = None, _first_given(request.inputs, scenario.inputs)
     if inputs is not None:
-        system, course = read_inputs(inputs, system)
+        given = set(request.parameters)
+        if request.inputs is None:
+            given |= set(scenario.parameters)
+        system, course = read_inputs(inputs, system, given)
     system.check()
     events = scenario.events
     if request.events is not None:
@@ -243,10 +256,11 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     if not scenario.compare:
         return [prepared]
     companion, system = loaded(scenario.compare, request.kind)
+    played = prepared.course.targets if prepared.course else ()
     shared = {
         target: value
         for target, value in {**scenario.parameters, **request.parameters}.items()
-        if system.has(target)
+        if system.has(target) and target not in played
     }
     steps = {
         name: step
