@@ -110,6 +110,12 @@ class Instance(Protocol):
     def read(self, ports: Sequence[str]) -> dict[str, Value]:
         """Values of some variables, as the FMU holds them."""
 
+    def tune(self, values: Mapping[str, Value]) -> None:
+        """Set tunable parameters between two steps."""
+
+    def reset(self) -> None:
+        """Be what it was before the initialisation, which can then be entered again."""
+
     def state(self) -> bytes:
         """The FMU's whole state between two steps, from which another instance can go on.
 

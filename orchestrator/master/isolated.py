@@ -181,6 +181,14 @@ class IsolatedInstance:
             raise self._nonsense()
         return dict(values)
 
+    def tune(self, values: Mapping[str, Value]) -> None:
+        """Set tunable parameters between two steps."""
+        self._ask("tune", dict(values))
+
+    def reset(self) -> None:
+        """Be what it was before the initialisation."""
+        self._ask("reset")
+
     def state(self) -> bytes:
         """The FMU's whole state between two steps."""
         state = self._ask("state")

@@ -189,6 +189,14 @@ class LoadedInstance:
         """Values of some variables, as the FMU holds them."""
         return {port: self._get(self._variables[port]) for port in ports}
 
+    def tune(self, values: Mapping[str, Value]) -> None:
+        """Set tunable parameters between two steps."""
+        self._set(values)
+
+    def reset(self) -> None:
+        """Be what it was before the initialisation."""
+        self._call("reset")
+
     def state(self) -> bytes:
         """The FMU's whole state between two steps."""
         with self._held("getFMUstate") as state:

@@ -81,12 +81,21 @@ def simulate(
             blocks.append(experiment.start_time, row.shown)
             signals = Signals(row, [stage.gather for stage in scheduled], system.connections)
             run = Run(
-                system, experiment, instances, row, scheduled, signals, blocks, log, interrupts
+                system,
+                experiment,
+                instances,
+                row,
+                scheduled,
+                signals,
+                blocks,
+                log,
+                interrupts,
+                attendants,
             )
             order = [name for names in plan for name in names]
             remark = None
             try:
-                failure = _advance(run, loop, Attendance(run, attendants), order)
+                failure = _advance(run, loop, Attendance(run), order)
             except NotKept as error:
                 # Rows that cannot be kept need not be computed.
                 failure = str(error)
@@ -94,7 +103,9 @@ def simulate(
                 failure, remark = None, str(end)
             if failure is None:
                 _terminate(instances)
-            ending = Ending(failure, remark, log.messages, tuple(interrupts.signals))
+            ending = Ending(
+                failure, remark, log.messages, tuple(interrupts.signals), tuple(run.happened)
+            )
             tell(ending)
         return ending
 
