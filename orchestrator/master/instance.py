@@ -94,9 +94,7 @@ class Instance(Protocol):
 
         """
 
-    def enter_initialization(
-        self, values: Mapping[str, Value], stop_time: float, start_time: float = 0.0
-    ) -> None:
+    def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode.
 
         What may be set in that mode is set there once more: some FMUs take on their own values
@@ -111,6 +109,12 @@ class Instance(Protocol):
 
     def read(self, ports: Sequence[str]) -> dict[str, Value]:
         """Values of some variables, as the FMU holds them."""
+
+    def tune(self, values: Mapping[str, Value]) -> None:
+        """Set tunable parameters between two steps."""
+
+    def reset(self) -> None:
+        """Be what it was before the initialisation, which can then be entered again."""
 
     def state(self) -> bytes:
         """The FMU's whole state between two steps, from which another instance can go on.

@@ -157,11 +157,9 @@ class IsolatedInstance:
                 else:
                     self._text_outputs += [place - first for place in places]
 
-    def enter_initialization(
-        self, values: Mapping[str, Value], stop_time: float, start_time: float = 0.0
-    ) -> None:
+    def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
-        self._ask("enter_initialization", values, stop_time, start_time)
+        self._ask("enter_initialization", values, start_time)
 
     def exit_initialization(self) -> None:
         """Get ready for the first step."""
@@ -182,6 +180,14 @@ class IsolatedInstance:
         if not (answers and all(isinstance(value, Value) for value in values.values())):
             raise self._nonsense()
         return dict(values)
+
+    def tune(self, values: Mapping[str, Value]) -> None:
+        """Set tunable parameters between two steps."""
+        self._ask("tune", dict(values))
+
+    def reset(self) -> None:
+        """Be what it was before the initialisation."""
+        self._ask("reset")
 
     def state(self) -> bytes:
         """The FMU's whole state between two steps."""

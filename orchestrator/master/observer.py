@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from time import monotonic
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -48,6 +48,28 @@ class Header:
         return [(i, self.texts[name]) for i, name in names if name in self.texts]
 
 
+class Occurrence(NamedTuple):
+    """Something that has happened during a run.
+
+    Attributes:
+        time: at which it did [s].
+        text: what it was.
+        label: its name in a figure; empty: it has none, as the end of something.
+        event: its number among those that may happen.
+
+    """
+
+    time: float
+    text: str
+    label: str = ""
+    event: int = 0
+
+    def __str__(self) -> str:
+        """In one line."""
+        label = f" ({self.label})" if self.label and self.label != self.text else ""
+        return f"t = {self.time:.12g} s: {self.text}{label}"
+
+
 @dataclass(frozen=True)
 class Ending:
     """How a run has ended.
@@ -57,6 +79,7 @@ class Ending:
         remark: why it ended early though it has not failed, or None.
         messages: what the FMUs logged with status warning or worse.
         signals: to stop that have come meanwhile.
+        events: that have happened, in their order.
 
     """
 
@@ -64,6 +87,7 @@ class Ending:
     remark: str | None = None
     messages: tuple[str, ...] = ()
     signals: tuple[int, ...] = ()
+    events: tuple[Occurrence, ...] = ()
 
 
 class NotKept(Exception):

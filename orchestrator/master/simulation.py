@@ -82,12 +82,21 @@ def simulate(
             blocks.append(experiment.start_time, row.shown)
             signals = Signals(row, [stage.gather for stage in scheduled], system.connections)
             run = Run(
-                system, experiment, instances, row, scheduled, signals, blocks, log, interrupts
+                system,
+                experiment,
+                instances,
+                row,
+                scheduled,
+                signals,
+                blocks,
+                log,
+                interrupts,
+                attendants,
             )
             order = [name for names in plan for name in names]
             remark = None
             try:
-                failure = _advance(run, loop, Attendance(run, attendants), order)
+                failure = _advance(run, loop, Attendance(run), order)
             except NotKept as error:
                 # Rows that cannot be kept need not be computed.
                 failure = str(error)
@@ -95,7 +104,9 @@ def simulate(
                 failure, remark = None, str(end)
             if failure is None:
                 _terminate(instances)
-            ending = Ending(failure, remark, log.messages, tuple(interrupts.signals))
+            ending = Ending(
+                failure, remark, log.messages, tuple(interrupts.signals), tuple(run.happened)
+            )
             tell(ending)
         return ending
 
@@ -164,9 +175,7 @@ def _initialise(
 
     """
     for name, instance in instances.items():
-        instance.enter_initialization(
-            system.parameters_of(name), experiment.stop_time, experiment.start_time
-        )
+        instance.enter_initialization(system.parameters_of(name), experiment.start_time)
         held = instance.read(system.open_inputs(name))
         row.enter({PortName(name, port): value for port, value in held.items()})
     values = row.values

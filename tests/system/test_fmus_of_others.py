@@ -102,6 +102,26 @@ def test_a_second_instance_of_an_fmu_that_allows_one_gets_its_own_process(tmp_pa
         assert (table["c.y"][2:] == 2.0).all()
 
 
+@pytest.mark.parametrize("way", [WAYS["python"], WAYS["compiled"]], ids=["python", "compiled"])
+def test_nothing_is_left_in_a_library_of_the_run_before(tmp_path, way):
+    """The gain of an instance is one, and one more for each that its library has had before."""
+    system = with_values(system_of(build(tmp_path, "REMEMBERS")), {"u": 2.0})
+    for _ in range(3):
+        assert (run(system, **way)["a.y"] == 2.0).all()
+
+
+def test_a_function_that_no_capability_asks_for_may_be_missing(tmp_path):
+    assert run(system_of(build(tmp_path, "LACKS"))).failure is None
+
+
+@EVERY_WAY
+def test_a_last_step_that_rounding_takes_beyond_the_stop_time_is_made(tmp_path, way):
+    """0.2 and 0.1 are more than 0.3, and the FMU makes no step beyond a stop time that it knows."""
+    table = run(system_of(build(tmp_path)), 0.3, 0.1, **way)
+    assert table.failure is None
+    assert table.time[-1] == 3 * 0.1
+
+
 def test_the_compiled_loop_gives_way_to_fmus_in_their_own_processes(tmp_path):
     fmu = build(tmp_path, "ONCE", 'canBeInstantiatedOnlyOncePerProcess="true"')
     table = run(system_of(fmu, "ab"), loop="compiled")
