@@ -11,11 +11,15 @@ import json
 import re
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
 import numpy as np
+
+from orchestrator import load
+from orchestrator.system.osp import write_osp
 
 #: Where the name of a parameter set stands.
 _PARAMETER_SET = re.compile(r"ParameterSet\b[^>]*\bname=\"([^\"]*)\"")
@@ -27,11 +31,25 @@ Output = tuple[str, str, int]
 def libcosim(file: str, step: float, steps: int, outputs: Sequence[Output]) -> np.ndarray:
     """Values of the outputs after each step, from libcosim."""
     from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
-    from libcosimpy.CosimObserver import CosimObserver  # noqa: PLC0415
 
     # Without a step of its own the archive would end it.
     nanoseconds = round(step * 1e9)
     execution = CosimExecution.from_ssp_file(ssp_path=file, step_size=nanoseconds)
+    return _libcosim(execution, steps, outputs)
+
+
+def libcosim_export(file: str, step: float, steps: int, outputs: Sequence[Output]) -> np.ndarray:
+    """The same, of the system as we have read it, in libcosim's own configuration."""
+    from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
+
+    write_osp(replace(load(file), step=step), Path())
+    execution = CosimExecution.from_osp_config_file(osp_path=".")
+    return _libcosim(execution, steps, [(c.replace(".", "_"), *port) for c, *port in outputs])
+
+
+def _libcosim(execution: Any, steps: int, outputs: Sequence[Output]) -> np.ndarray:
+    from libcosimpy.CosimObserver import CosimObserver  # noqa: PLC0415
+
     observer = CosimObserver.create_last_value()
     execution.add_observer(observer=observer)
     places = [
@@ -72,7 +90,8 @@ def _parameter_sets(file: str) -> list[str]:
     return [name for text in texts for name in _PARAMETER_SET.findall(text)]
 
 
-TOOLS = {"libcosim": libcosim, "ecos": ecos}
+#: Tools by the titles of their columns.
+TOOLS = {"libcosim": libcosim, "libcosim, exported": libcosim_export, "ecos": ecos}
 
 
 if __name__ == "__main__":

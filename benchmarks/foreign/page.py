@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from compare import STEPS
+from other_masters import TOOLS
 
 #: Deviations up to these are rounding errors: of a system in another tool, of an FMU alone.
 SYSTEM_BOUND, FMU_BOUND = 1e-9, 1e-12
@@ -40,7 +41,8 @@ archive of its own. FMUs are run alone, for {steps} steps of their own step size
 their start values. What holds the same bytes is counted once.
 
 Systems that libcosim or ecos can run as well are held against them in Jacobi order, with the same
-steps; FMUs against a plain host of {host} lines that shares nothing with the master, as t_k = k h
+steps: as they are, and in libcosim also as `auv-fmu export --format osp` writes what we have read.
+FMUs are held against a plain host of {host} lines that shares nothing with the master, as t_k = k h
 has it. A deviation is the largest over all Real outputs and steps, relative to the size of an
 output where that is above one. Compared with: {tools}.
 """
@@ -67,10 +69,11 @@ def _archives(archives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     there = [one for one in archives if one["outcome"] != "absent"]
     running = [one for one in there if one["outcome"] == "runs"]
     yield f"\n## Archives\n\n{len(running)} of {len(there)} run.\n"
-    yield "| archive | rows | libcosim | ecos | said |\n| --- | --: | --- | --- | --- |"
+    yield f"| archive | rows | {' | '.join(TOOLS)} | said |"
+    yield f"| --- | --: |{' --- |' * len(TOOLS)} --- |"
     for one in running:
         tools = one.get("tools", {})
-        cells = (_compared(one, tool, tools.get(tool, "")) for tool in ("libcosim", "ecos"))
+        cells = (_compared(one, tool, tools.get(tool, "")) for tool in TOOLS)
         said = "; ".join(one["said"])
         yield f"| {_name(one)} | {one['rows']} | {' | '.join(cells)} | {_cell(said)} |"
     yield "\nThese do not:\n\n| archive | why |\n| --- | --- |"
@@ -139,8 +142,8 @@ def _parameters(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     numbers = [one["changed"].get("deviation") for one in ran]
     compared = [number for number in numbers if isinstance(number, float)]
     yield (
-        f"{_within(compared)} of {len(compared)} with Real outputs agree with the plain host, which "
-        f"sets the same values, to {FMU_BOUND:g}.\n"
+        f"{_within(compared)} of {len(compared)} with Real outputs agree to {FMU_BOUND:g} with the "
+        "plain host, which sets the same values.\n"
     )
     for one in ran:
         deviation = one["changed"].get("deviation")
