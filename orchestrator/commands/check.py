@@ -11,7 +11,7 @@ from orchestrator.commands.streams import show
 from orchestrator.experiments.preparation import Request, loaded, prepare
 from orchestrator.findings import Findings
 from orchestrator.master.binary import check_binary
-from orchestrator.system.component import Component
+from orchestrator.master.schedule import delays
 from orchestrator.system.examination import examine, surprises
 from orchestrator.system.unpacking import unpacked
 
@@ -34,31 +34,40 @@ def add_to(commands: Any) -> None:
 
 def _check(options: argparse.Namespace) -> int:
     findings = Findings()
-    if options.file.endswith(".fmu"):
-        component = examine(Path(options.file), findings)
-        components = {} if component is None else {component.name: component}
-    else:
-        components = _components(options, findings)
-    for component in components.values():
-        with findings.collecting():
-            check_binary(component, unpacked(component.fmu))
-    for kind, texts in (("problem", findings.problems), ("note", findings.notes)):
+    look = _fmu if options.file.endswith(".fmu") else _system
+    to_know = look(options, findings)
+    for kind, texts in (
+        ("problem", findings.problems),
+        ("note", findings.notes),
+        ("to know", to_know),
+    ):
         for text in texts:
             show(f"{kind}: {text}")
-    for name, component in components.items():
-        for text in surprises(component):
-            show(f"to know: {name}: {text}")
     if findings.problems or findings.notes:
         return BAD_INPUT
     show(f"{options.file}: nothing is wrong with it")
     return OK
 
 
-def _components(options: argparse.Namespace, findings: Findings) -> dict[str, Component]:
-    """The components of a system, after a look at it as a whole."""
+def _fmu(options: argparse.Namespace, findings: Findings) -> list[str]:
+    """Look at an FMU; returns what is to be known of it."""
+    component = examine(Path(options.file), findings)
+    if component is None:
+        return []
+    with findings.collecting():
+        check_binary(component, unpacked(component.fmu))
+    return list(surprises(component))
+
+
+def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
+    """Look at a system as a whole, then at its components; returns what is to be known of it."""
+    to_know: list[str] = []
     with findings.collecting():
         scenario, system = loaded(options.file, variant=options.variant, findings=findings)
-        with findings.collecting():
-            prepare(scenario, system, Request())
-        return dict(system.components)
-    return {}
+        for name, component in system.components.items():
+            with findings.collecting():
+                check_binary(component, unpacked(component.fmu))
+            to_know += [f"{name}: {text}" for text in surprises(component)]
+        prepared = prepare(scenario, system, Request())
+        to_know += delays(prepared.system, prepared.experiment.order)
+    return to_know
