@@ -117,7 +117,15 @@ class _Clone:
         if not folder.is_dir():
             address = f"https://github.com/{place}"
             # Without the files: a few of them are wanted, and git fetches those when they are read.
-            command = ["git", "clone", "--bare", "--quiet", "--filter=blob:none", address, folder]
+            command = [
+                "git",
+                "clone",
+                "--bare",
+                "--quiet",
+                "--filter=blob:none",
+                address,
+                str(folder),
+            ]
             subprocess.run(command, check=True)
         self.paths = self._git("ls-tree", "-r", "-z", "--name-only", commit).decode().split("\0")
 

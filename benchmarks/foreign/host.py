@@ -19,7 +19,7 @@ from zipfile import ZipFile
 import numpy as np
 
 #: Types by what the functions that get and set them are called.
-_TYPES = {
+_TYPES: dict[str, Any] = {
     "Real": ctypes.c_double,
     "Integer": ctypes.c_int,
     "Enumeration": ctypes.c_int,

@@ -44,7 +44,7 @@ def libcosim_export(file: str, step: float, steps: int, outputs: Sequence[Output
 
     write_osp(replace(load(file), step=step), Path())
     execution = CosimExecution.from_osp_config_file(osp_path=".")
-    return _libcosim(execution, steps, [(c.replace(".", "_"), *port) for c, *port in outputs])
+    return _libcosim(execution, steps, [(c.replace(".", "_"), p, v) for c, p, v in outputs])
 
 
 def _libcosim(execution: Any, steps: int, outputs: Sequence[Output]) -> np.ndarray:

@@ -66,15 +66,15 @@ def _other(variable: ModelVariable, start: Value | None) -> float | None:
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """Run what a file holds, and keep the rows of its outputs."""
-    system = system_of(options.file)
-    wanted = changed(system.components[ALONE]) if options.changed else {}
-    step = step_of(system)
-    stop_time = min((system.start_time or 0.0) + options.steps * step, system.stop_time or np.inf)
     with warnings.catch_warnings(record=True) as caught:
+        system = system_of(options.file)
+        step = step_of(system)
+        end = (system.start_time or 0.0) + options.steps * step
+        wanted = changed(system.components[ALONE]) if options.changed else {}
         result = simulate(
             system,
             {f"{ALONE}.{name}": value for name, value in wanted.items()},
-            stop_time=stop_time,
+            stop_time=min(end, system.stop_time or np.inf),
             step=step,
             order=options.order,
         )

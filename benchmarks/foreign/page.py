@@ -74,12 +74,17 @@ def _archives(archives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     for one in running:
         tools = one.get("tools", {})
         cells = (_compared(one, tool, tools.get(tool, "")) for tool in TOOLS)
-        said = "; ".join(one["said"])
-        yield f"| {_name(one)} | {one['rows']} | {' | '.join(cells)} | {_cell(said)} |"
+        yield f"| {_name(one)} | {one['rows']} | {' | '.join(cells)} | {_said(one['said'])} |"
     yield "\nThese do not:\n\n| archive | why |\n| --- | --- |"
     for one in there:
         if one["outcome"] != "runs":
             yield f"| {_name(one)} | {_why(one)} |"
+
+
+def _said(lines: Sequence[str]) -> str:
+    """What a run has said, in a cell."""
+    more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
+    return f"{_cell(lines[0])}{more}" if lines else ""
 
 
 def _compared(one: Mapping[str, Any], tool: str, deviation: float | str) -> str:
