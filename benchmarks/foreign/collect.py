@@ -115,18 +115,10 @@ class _Clone:
         """Clone it, unless that has been done."""
         self.place, self._folder, self._commit = place, folder, commit
         if not folder.is_dir():
-            address = f"https://github.com/{place}"
             # Without the files: a few of them are wanted, and git fetches those when they are read.
-            command = [
-                "git",
-                "clone",
-                "--bare",
-                "--quiet",
-                "--filter=blob:none",
-                address,
-                str(folder),
-            ]
-            subprocess.run(command, check=True)
+            options = ["--bare", "--quiet", "--filter=blob:none"]
+            address = f"https://github.com/{place}"
+            subprocess.run(["git", "clone", *options, address, str(folder)], check=True)
         self.paths = self._git("ls-tree", "-r", "-z", "--name-only", commit).decode().split("\0")
 
     def read(self, path: str) -> bytes:
