@@ -41,7 +41,8 @@ from orchestrator.master import layout
 from orchestrator.master.binary import Library, library_of, named
 from orchestrator.master.instance import DO_STEP, ComponentFailed, Ended, Instance, Part
 from orchestrator.master.log import Listener
-from orchestrator.master.transfer import Block
+from orchestrator.master.texts import Texts
+from orchestrator.master.transfer import Block, text_of
 from orchestrator.system.component import Component
 from orchestrator.system.unpacking import runs_python, unpacked
 from orchestrator.system.values import Value
@@ -136,10 +137,10 @@ class LoadedInstance:
         called.argtypes, called.restype = types, fmi2Status
         return partial(called, fmi2Component(self._fmu.component))
 
-    def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
+    def tie(self, values: np.ndarray, parts: Sequence[Part], texts: Texts) -> None:
         """Say where its values are."""
         for part in parts:
-            block = Block(*part[:3], values[part.place])
+            block = Block(*part[:3], values[part.place], texts)
             function = self.function(block.function)
             if part.causality == "input":
                 self._inputs.append(block)
@@ -199,6 +200,14 @@ class LoadedInstance:
         """Values of some variables, as the FMU holds them."""
         return {port: self._get(self._variables[port]) for port in ports}
 
+    def tune(self, values: Mapping[str, Value]) -> None:
+        """Set tunable parameters between two steps."""
+        self._set(values)
+
+    def reset(self) -> None:
+        """Be what it was before the initialisation."""
+        self._call("reset")
+
     def state(self) -> bytes:
         """The FMU's whole state between two steps."""
         with self._held("getFMUstate") as state:
@@ -255,10 +264,9 @@ class LoadedInstance:
     def _get(self, variable: ModelVariable) -> Value:
         value: Value | bytes | None
         (value,) = self._call(f"get{_fmi_type(variable)}", [variable.valueReference])
-        if isinstance(value, bytes):
-            return value.decode(errors="replace")
-        # Some have no text where an empty one is meant.
-        return "" if value is None else bool(value) if variable.type == "Boolean" else value
+        if value is None or isinstance(value, bytes):
+            return text_of(value)
+        return bool(value) if variable.type == "Boolean" else value
 
     def _call(self, method: str, *arguments: Any, **named: Any) -> Any:
         """One of fmpy's methods, which are slow and convenient."""

@@ -3,6 +3,7 @@
    y = gain u, and every other output is the input of its kind. What is peculiar about it says how
    it is compiled. */
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -22,7 +23,7 @@ typedef struct {
     int booleans[VARIABLES];
     char texts[VARIABLES][1000];
     double time, step;
-    int asked;
+    int asked, steps;
     const char *name;
     const Callbacks *callbacks;
 } Instance;
@@ -110,7 +111,12 @@ Status fmi2SetString(Component c, const unsigned *r, size_t n, const char *const
 Status fmi2GetString(Component c, const unsigned *r, size_t n, const char **values)
 {
     Instance *it = c;
-    strcpy(it->texts[Y], it->texts[U]);
+#ifdef SPEAKS
+    if (it->steps)
+        snprintf(it->texts[Y], sizeof it->texts[Y], "%s%d %s", it->name, it->steps, it->texts[U]);
+    else
+#endif
+        strcpy(it->texts[Y], it->texts[U]);
     for (size_t i = 0; i < n; i++)
         values[i] = it->texts[r[i]];
     return OK;
@@ -129,6 +135,7 @@ Status fmi2DoStep(Component c, double t, double h, int no_rollback)
         return Error;
 #endif
     it->step = h;
+    it->steps++;
 #ifdef WAITS
     it->asked = 0;
     return PENDING;

@@ -13,6 +13,9 @@ from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from support.others import WAYS, build, run, system_of
 
+#: Outputs by the inputs that they repeat.
+_PASSED = {"u": "y", "mode": "mode_y", "on": "fault", "said": "heard"}
+
 EVERY_WAY = pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 
 
@@ -46,6 +49,32 @@ def test_an_input_that_nothing_feeds_keeps_what_the_fmu_begins_with(tmp_path, wa
     assert (table["a.u"] == 101325.0).all()
     assert (table["a.y"] == 101325.0).all()
     assert (table["a.mode"] == 1.0).all()
+
+
+@EVERY_WAY
+def test_values_of_all_kinds_are_set_connected_and_recorded(tmp_path, way):
+    system = system_of(
+        build(tmp_path),
+        "ab",
+        {f"b.{target}": f"a.{source}" for target, source in _PASSED.items()},
+    )
+    values = {"u": 0.1, "mode": "storm", "on": True, "said": "Grüße, 1", "count": 7}
+    table = run(with_values(system, values), **way)
+    assert table["a.mode_y"][0] == 4.0
+    assert table["a.heard"].tolist() == ["Grüße, 1"] * 11
+    for name, value in (("y", 0.1), ("mode_y", 4.0), ("fault", 1.0), ("heard", "Grüße, 1")):
+        assert table[f"b.{name}"].tolist() == [value] * 11
+    assert table.parameters[PortName("a", "count")] == 7
+    assert table.ending.messages == ()
+
+
+@EVERY_WAY
+def test_texts_that_change_in_every_step_arrive(tmp_path, way):
+    """Each of two FMUs says the number of its steps, and hears the other's of the step before."""
+    wires = {"a.said": "b.heard", "b.said": "a.heard"}
+    table = run(system_of(build(tmp_path, "SPEAKS"), "ab", wires), **way)
+    assert table["a.heard"].tolist()[:4] == ["start", "a1 start", "a2 b1 start", "a3 b2 a1 start"]
+    assert table["b.heard"].tolist()[:4] == ["start", "b1 start", "b2 a1 start", "b3 a2 b1 start"]
 
 
 @EVERY_WAY
