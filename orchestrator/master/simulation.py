@@ -175,9 +175,7 @@ def _initialise(
 
     """
     for name, instance in instances.items():
-        instance.enter_initialization(
-            system.parameters_of(name), experiment.stop_time, experiment.start_time
-        )
+        instance.enter_initialization(system.parameters_of(name), experiment.start_time)
         held = instance.read(system.open_inputs(name))
         row.enter({PortName(name, port): value for port, value in held.items()})
     values = row.values
