@@ -74,7 +74,7 @@ class Trial:
             places=lambda ws: np.array([[columns[w.target], columns[w.source]] for w in ws]).T,
         )
         wires = (Connection(OUT, FED),)
-        self.gather = Gathering(self.row, wires)
+        self.gather = Gathering.along(self.row, wires)
         self.run = SimpleNamespace(
             row=self.row,
             signals=Signals(self.row, [self.gather], wires),
