@@ -285,7 +285,7 @@ class LoadedInstance:
 
     def failed(self, status: int, function: str) -> ComponentFailed | Ended:
         """What to raise after a call that has ended with a status."""
-        if (function, status) == (DO_STEP, fmi2Discard):
+        if (function, status) == (DO_STEP, fmi2Discard) and not self._library.is_akin:
             with suppress(FMICallException):
                 if self._fmu.getBooleanStatus(fmi2Terminated):
                     time = self._fmu.getRealStatus(fmi2LastSuccessfulTime)
