@@ -11,7 +11,7 @@ from orchestrator.experiments.bundle import FMI, KINDS, NATIVE, PYTHON
 from orchestrator.experiments.preparation import Request, loaded
 from orchestrator.experiments.scenario import Scenario
 from orchestrator.findings import Findings
-from orchestrator.master.experiment import ORDERS
+from orchestrator.master.experiment import ORDERS, order_of
 from orchestrator.master.loop import LOOPS
 from orchestrator.master.observer import Ending
 from orchestrator.system.names import PortName, port_name
@@ -53,9 +53,10 @@ def add_experiment(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--order",
-        choices=ORDERS,
-        default=ORDERS[0],
-        help=f"order in which the components are stepped; default: {ORDERS[0]}",
+        type=order_of,
+        metavar=f"{'|'.join(ORDERS)}|NAME,...",
+        help="order in which the components are stepped, or the names of all of them; default: the "
+        f"scenario's, else {ORDERS[0]}",
     )
     add_kind(parser)
 

@@ -20,11 +20,14 @@ from orchestrator.experiments.wiring import closed_loop
 from orchestrator.findings import Findings
 from orchestrator.master.attendant import Attendant
 from orchestrator.master.events import Event, Events
-from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.experiment import ORDERS, Experiment, Order
 from orchestrator.master.isolated import Isolation
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
 from orchestrator.master.observer import Ending
+from orchestrator.master.paces import paces, with_common_step
 from orchestrator.master.playback import Course, Playback
+from orchestrator.master.real_time import check_factor
+from orchestrator.master.schedule import delays, stages
 from orchestrator.system.component import RUNNABLE, WRITABLE
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.reading import read_ssp
@@ -42,12 +45,14 @@ class Request:
 
     Attributes:
         stop_time, step: experiment [s]; None: the scenario's or the system's own.
-        order: of evaluation.
+        order: of evaluation; None: the scenario's own, or else the first of :data:`ORDERS`.
         parameters: values that win over the scenario's.
         kind: of the bundle's FMUs, one of :data:`orchestrator.experiments.bundle.KINDS`.
         isolation: of the FMUs in processes of their own; None: they run in this one.
         loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
         strict: whether what is not as it should be is refused, even if it is harmless.
+        steps: of components that take longer ones of their own [s]; they win over the scenario's.
+        real_time: simulated seconds in a second; None: as many as can be had.
         events: in the place of the scenario's, as a scenario file writes them; None: its own.
         inputs: in the place of the scenario's.
 
@@ -55,12 +60,14 @@ class Request:
 
     stop_time: float | None = None
     step: float | None = None
-    order: str = ORDERS[0]
+    order: Order | None = None
     parameters: Mapping[PortName, object] = field(default_factory=dict)
     isolation: Isolation | None = None
     kind: str = PYTHON
     loop: str = LOOPS[0]
     strict: bool = False
+    steps: Mapping[str, float] = field(default_factory=dict)
+    real_time: float | None = None
     events: Sequence[Mapping[str, Any]] | None = None
     inputs: Inputs | None = None
 
@@ -80,6 +87,7 @@ class Prepared:
     experiment: Experiment
     isolation: Isolation | None = None
     loop: Loop = PYTHON_LOOP
+    real_time: float | None = None
     events: tuple[Event, ...] = ()
     course: Course | None = None
 
@@ -205,13 +213,34 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     stop_time = _first_given(request.stop_time, scenario.stop_time, system.stop_time)
     if stop_time is None:
         raise InputError(f"{scenario.name}: names no stop time; give one with --stop-time")
+    system = replace(system, steps={**system.steps, **request.steps})
     step = _first_given(request.step, scenario.step, system.step)
     if step is None:
-        step = DEFAULT_STEP
-    experiment = Experiment(stop_time, step, request.order)
+        system = with_common_step(system)
+        step = _first_given(system.step, DEFAULT_STEP)
+        assert step is not None
+    order = request.order or scenario.order or ORDERS[0]
+    experiment = Experiment(stop_time, step, order, system.start_time or 0.0)
+    paces(system, step)
+    stages(system, order)
+    findings = Findings(request.strict)
+    for delay in delays(system, order):
+        findings.note(delay)
+    findings.refuse()
     loop = chosen(request.loop, experiment, request.isolation)
+    if request.real_time is not None:
+        check_factor(request.real_time)
     happening = read_events(scenario.name, events, system)
-    return Prepared(scenario, system, experiment, request.isolation, loop, happening, course)
+    return Prepared(
+        scenario,
+        system,
+        experiment,
+        request.isolation,
+        loop,
+        request.real_time,
+        happening,
+        course,
+    )
 
 
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
@@ -233,6 +262,11 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         for target, value in {**scenario.parameters, **request.parameters}.items()
         if system.has(target) and target not in played
     }
+    steps = {
+        name: step
+        for name, step in {**scenario.steps, **request.steps}.items()
+        if name in system.components
+    }
     events = request.events
     if events is None:
         events = companion.events or scenario.events
@@ -240,10 +274,12 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         companion,
         stop_time=scenario.stop_time,
         step=scenario.step,
+        order=scenario.order,
         events=shared_events(events, system),
         inputs=companion.inputs or scenario.inputs,
     )
-    return [prepared, prepare(same, system, replace(request, parameters=shared, events=None))]
+    wanted = replace(request, parameters=shared, steps=steps, events=None)
+    return [prepared, prepare(same, system, wanted)]
 
 
 def _first_given(*values: T | None) -> T | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -49,6 +49,7 @@ def write_record(
     ending: Ending,
     command: Sequence[str],
     clock: Clock,
+    remarks: Mapping[str, object] | None = None,
 ) -> None:
     """Write the record of a run into the folder of its files.
 
@@ -58,6 +59,7 @@ def write_record(
         header, ending: of its table.
         command: that has run it.
         clock: started with it.
+        remarks: what else there is to say of it.
 
     """
     experiment = header.experiment
@@ -74,8 +76,11 @@ def write_record(
             "stop_time": experiment.stop_time,
             "step": experiment.step,
             "order": experiment.order,
+            "start_time": experiment.start_time,
+            "steps": dict(prepared.system.steps),
         },
         "loop": header.loop,
+        **(remarks or {}),
         "events": [occurrence._asdict() for occurrence in ending.events],
         "fmus": {
             component.name: {
@@ -128,7 +133,12 @@ def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
     experiment = record["experiment"]
     return Header(
         columns,
-        Experiment(experiment["stop_time"], experiment["step"], experiment["order"]),
+        Experiment(
+            experiment["stop_time"],
+            experiment["step"],
+            experiment["order"],
+            experiment.get("start_time", 0.0),
+        ),
         {port_name(name): value for name, value in record["parameters"].items()},
         record.get("loop", "python"),
     )

@@ -23,6 +23,7 @@ from orchestrator.experiments.events import check_events
 from orchestrator.experiments.inputs import ENTRIES as INPUTS
 from orchestrator.experiments.inputs import Inputs
 from orchestrator.experiments.named import names_in, path_of
+from orchestrator.master.experiment import Order
 from orchestrator.reading import explained, text_of
 from orchestrator.system.names import PortName, port_name
 
@@ -49,6 +50,8 @@ class Scenario:
     compare: str = ""
     stop_time: float | None = None
     step: float | None = None
+    steps: Mapping[str, float] = field(default_factory=dict)
+    order: Order | None = None
     only: Sequence[str] = ()
     remark: str = ""
     components: Mapping[str, str] = field(default_factory=dict)
@@ -77,6 +80,10 @@ def _is_table_of_wires(value: Any) -> bool:
     return is_table(value) and all(is_text(v) or v is False for v in value.values())
 
 
+def _is_table_of_numbers(value: Any) -> bool:
+    return is_table(value) and all(map(is_number, value.values()))
+
+
 #: What a scenario file may hold, in the order of the reference page.
 ENTRIES: dict[str, Entry] = {
     "title": Entry(
@@ -101,7 +108,25 @@ ENTRIES: dict[str, Entry] = {
         "none",
     ),
     "stop_time": Entry("number", is_number, "End of the run [s].", "100 s"),
-    "step": Entry("number", is_number, "Communication step [s].", "0.02 s"),
+    "step": Entry(
+        "number",
+        is_number,
+        "Communication step [s].",
+        "the longest that fits into the steps of all components, which are 0.02 s",
+    ),
+    "steps": Entry(
+        "table of numbers",
+        _is_table_of_numbers,
+        "Components that take longer steps of their own, as `component = step` [s], a multiple of "
+        "the communication step. Meanwhile they hold their inputs.",
+        "those that the FMUs were made for, where there is no `step`",
+    ),
+    "order": Entry(
+        "name, or list of names",
+        lambda value: is_text(value) or are_names(value),
+        "In which components are stepped: `gauss-seidel`, `jacobi`, or the names of all of them.",
+        "`gauss-seidel`",
+    ),
     "only": Entry(
         "list of names",
         are_names,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -86,7 +87,9 @@ def closed_loop(
         stop_time=wiring["experiment"]["stop_time"],
         step=wiring["experiment"]["step"],
     )
-    return system if scenario is None else system.with_parameters(scenario.parameters)
+    if scenario is None:
+        return system
+    return replace(system.with_parameters(scenario.parameters), steps=scenario.steps)
 
 
 def _wire(components: Mapping[str, Component], target: str, source: str) -> list[Connection]:

@@ -43,7 +43,8 @@ class Condition:
 
     def holds(self, row: Row) -> bool:
         """Whether it is true of a row."""
-        return COMPARISONS[self.comparison](row.values[row.columns[self.signal]], self.value)
+        value = float(row.values[row.columns[self.signal]])
+        return COMPARISONS[self.comparison](value, self.value)
 
     def __str__(self) -> str:
         """As a scenario writes it."""

@@ -16,6 +16,7 @@ import numpy as np
 from orchestrator.errors import reason
 from orchestrator.master import layout
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.texts import Texts
 from orchestrator.system.names import PortName
 
 #: Rows in a block, and the longest time until observers are told of them [s].
@@ -31,6 +32,7 @@ class Header:
         experiment: that is run.
         parameters: of all components, as the FMUs reported them after initialisation.
         loop: which one makes the steps, `python` or `compiled`: the rows are the same.
+        texts: for which numbers stand in the rows, by the columns that have them.
 
     """
 
@@ -38,6 +40,12 @@ class Header:
     experiment: Experiment
     parameters: Mapping[PortName, Any] = field(default_factory=dict)
     loop: str = field(default="python", compare=False)
+    texts: Mapping[str, Texts] = field(default_factory=dict, compare=False)
+
+    def text_places(self) -> list[tuple[int, Texts]]:
+        """Where numbers of texts stand in a row, time first, and whose they are."""
+        names = enumerate(self.columns, start=1)
+        return [(i, self.texts[name]) for i, name in names if name in self.texts]
 
 
 class Occurrence(NamedTuple):

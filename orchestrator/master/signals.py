@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,34 +10,53 @@ import numpy as np
 from orchestrator.master.row import Row
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection
+from orchestrator.system.transformation import Linear, Mapped
 
 #: Times one, plus minus zero: every number stays what it is, minus zero, too.
 FACTOR, OFFSET = 1.0, -0.0
 
 
 class Gathering:
-    """Values that inputs take from outputs at the same time, each times a factor, plus an offset.
+    """Values moved within the row at the same time, each times a factor, plus an offset.
 
     Attributes:
         targets, sources: where they are in the row.
         factors, offsets: one for each.
+        mapped: places of those that are mapped first, and what to; others stay what they are.
         is_plain: whether all values arrive as they are.
 
     """
 
-    def __init__(self, row: Row, connections: Sequence[Connection]) -> None:
-        """Gather along some connections."""
-        self.targets, self.sources = row.places(connections)
-        self.factors = np.full(len(connections), FACTOR)
-        self.offsets = np.full(len(connections), OFFSET)
+    def __init__(self, targets: np.ndarray, sources: np.ndarray) -> None:
+        """Move values as they are."""
+        self.targets, self.sources = targets, sources
+        self.factors = np.full(len(targets), FACTOR)
+        self.offsets = np.full(len(targets), OFFSET)
+        self.mapped: dict[int, Mapping[float, float]] = {}
         self.is_plain = True
+
+    @classmethod
+    def along(cls, row: Row, connections: Sequence[Connection]) -> Gathering:
+        """What inputs take from outputs along some connections."""
+        gathering = cls(*row.places(connections))
+        for place, connection in enumerate(connections):
+            match connection.transformation:
+                case Linear(factor, offset):
+                    gathering.set(place, factor, offset)
+                case Mapped(pairs):
+                    gathering.mapped[place] = dict(pairs)
+                    gathering.is_plain = False
+        return gathering
 
     def __call__(self, values: np.ndarray) -> None:
         """Move the values within the row."""
         if self.is_plain:
             values[self.targets] = values[self.sources]
-        else:
-            values[self.targets] = self.factors * values[self.sources] + self.offsets
+            return
+        taken = values[self.sources]
+        for place, pairs in self.mapped.items():
+            taken[place] = pairs.get(taken[place], taken[place])
+        values[self.targets] = self.factors * taken + self.offsets
 
     def move(self, values: np.ndarray, place: int) -> None:
         """Move one of the values."""
@@ -48,7 +67,7 @@ class Gathering:
         """Say what is done to one of the values."""
         self.factors[place], self.offsets[place] = factor, offset
         plain = (self.factors == FACTOR) & (self.offsets == OFFSET) & np.signbit(self.offsets)
-        self.is_plain = bool(plain.all())
+        self.is_plain = bool(plain.all()) and not self.mapped
 
 
 class Signals:

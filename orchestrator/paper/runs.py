@@ -17,7 +17,7 @@ from orchestrator.experiments.preparation import (
     with_companion,
 )
 from orchestrator.experiments.scenario import read_scenario
-from orchestrator.master.experiment import ORDERS
+from orchestrator.master.experiment import ORDERS, Order, written_order
 from orchestrator.system.names import port_name
 from orchestrator.system.values import Value, literal
 
@@ -39,7 +39,7 @@ class Run:
 
     scenario: str
     parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
-    order: str = ORDERS[0]
+    order: Order = ORDERS[0]
     stop_time: float | None = None
     step: float | None = None
     kind: str = PYTHON
@@ -52,7 +52,7 @@ class Run:
         options = [
             *(("--stop-time", _text(self.stop_time)) if self.stop_time is not None else ()),
             *(("--step", _text(self.step)) if self.step is not None else ()),
-            *(("--order", self.order) if self.order != ORDERS[0] else ()),
+            *(("--order", written_order(self.order)) if self.order != ORDERS[0] else ()),
             *(("--kind", self.kind) if self.kind != PYTHON else ()),
             *(("--events", self.events) if self.events else ()),
             *(("--inputs", self.inputs) if self.inputs else ()),

@@ -72,7 +72,7 @@ class FmuEngine:
         system = self._systems[run.scenario].with_parameters(
             {port_name(name): value for name, value in run.parameters.items()}
         )
-        experiment = Experiment(run.stop_time, run.step, run.order)
+        experiment = Experiment(run.stop_time, run.step, run.order, system.start_time or 0.0)
         indices = Indices()
         events = self._events.get(run.scenario)
         ending = simulate(

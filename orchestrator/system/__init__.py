@@ -6,6 +6,7 @@ module                  what it holds
 :mod:`.names`           `component.port`, and a component's own ports
 :mod:`.values`          values in the types of FMI's variables, from text and to text
 :mod:`.component`       an FMU and what its description says about it
+:mod:`.description`     that description, read leniently
 :mod:`.transformation`  what happens to a value on its way through a connection
 :mod:`.units`           units by their definitions, and from one to another
 :mod:`.structure`       components, connections and parameters: a system

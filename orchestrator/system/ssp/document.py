@@ -18,7 +18,7 @@ _OPEN = ("Annotations", "MetaData", "Signature")
 
 
 def read_document(text: bytes, note: Callable[[str], None]) -> Element:
-    """The root element of an XML file; tags and attributes are local names.
+    """The root element of an XML file; tags and attributes are local names, text is left out.
 
     Args:
         text: the file.

@@ -283,7 +283,7 @@ class Builder:
 
     def _read(self, name: str, fmu: Path) -> Component | None:
         try:
-            return read_component(name, fmu)
+            return read_component(name, fmu, findings=self._archive.findings)
         except InputError as error:
             self._archive.problem(f"{name}: {str(error).removeprefix(f'{self._archive.folder}/')}")
             return None

@@ -28,7 +28,7 @@ class Row(SimpleNamespace):
 
 def made(out: float, free: float = 7.0):
     row, connections = Row(out, free), (Connection(OUT, FED), Connection(OUT, ALSO))
-    gather = Gathering(row, connections)
+    gather = Gathering.along(row, connections)
     signals = Signals(row, [gather], connections)
     gather(row.values)
     return row, gather, signals
