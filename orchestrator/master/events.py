@@ -237,7 +237,7 @@ class Reset:
             instance = run.instances[name]
             values = {**run.system.parameters_of(name), **layers.tuned(name)}
             instance.reset()
-            instance.enter_initialization(values, run.experiment.stop_time, run.time)
+            instance.enter_initialization(values, run.time)
             run.signals.refresh(name)
             instance.exchange()
             instance.exit_initialization()

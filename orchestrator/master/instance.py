@@ -94,9 +94,7 @@ class Instance(Protocol):
 
         """
 
-    def enter_initialization(
-        self, values: Mapping[str, Value], stop_time: float, start_time: float = 0.0
-    ) -> None:
+    def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode.
 
         What may be set in that mode is set there once more: some FMUs take on their own values

@@ -157,11 +157,9 @@ class IsolatedInstance:
                 else:
                     self._text_outputs += [place - first for place in places]
 
-    def enter_initialization(
-        self, values: Mapping[str, Value], stop_time: float, start_time: float = 0.0
-    ) -> None:
+    def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
-        self._ask("enter_initialization", values, stop_time, start_time)
+        self._ask("enter_initialization", values, start_time)
 
     def exit_initialization(self) -> None:
         """Get ready for the first step."""

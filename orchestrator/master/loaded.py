@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from copy import copy
@@ -44,14 +45,20 @@ from orchestrator.master.log import Listener
 from orchestrator.master.texts import Texts
 from orchestrator.master.transfer import Block, text_of
 from orchestrator.system.component import Component
-from orchestrator.system.unpacking import unpacked
+from orchestrator.system.unpacking import runs_python, unpacked
 from orchestrator.system.values import Value
+
+#: FMI's categories of messages about what goes wrong (FMI 2.0.4, section 2.2.4).
+_COMPLAINTS = {f"logStatus{status}" for status in ("Warning", "Discard", "Error", "Fatal")}
 
 _DoStep: TypeAlias = Callable[[float, float, int], int]
 
 #: FMI's doStep, as the compiled loop calls it.
 _DO_STEP = (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean)
 _CALLBACK = ctypes.CFUNCTYPE(fmi2Status, *_DO_STEP)
+
+#: Messages that are remembered, to say why something has failed.
+_MOST_COMPLAINTS = 3
 
 #: How often is looked whether a step has ended that goes on after its call [s].
 _GLANCE = 1e-3
@@ -76,9 +83,14 @@ class LoadedInstance:
         self._outputs: list[Block] = []
         self._variables = component.variables
         self._gives_state = component.gives_state
+        self._complaints = [
+            category.name
+            for category in component.description.logCategories
+            if category.name in _COMPLAINTS
+        ]
         self._library = library
         self._listener = listener
-        self._complaint = ""
+        self._complaints: deque[str] = deque(maxlen=_MOST_COMPLAINTS)
         self._worst = 0
         self._environment = next(_environments)
         _instances[self._environment] = self
@@ -89,7 +101,8 @@ class LoadedInstance:
             self._fmu.instantiate(callbacks=_callbacks(self._environment), loggingOn=True)
         except Exception as error:
             del _instances[self._environment]
-            why = self._complaint.removeprefix(f"{self.name}: ") or reason(error)
+            heard = [text.removeprefix(f"{self.name}: ") for text in self._complaints]
+            why = " ".join(heard) or reason(error)
             needs = component.description.coSimulation.needsExecutionTool
             tool = "; it needs the tool that it was made with" * needs
             text = f"{named(component)} cannot be instantiated: {why}{tool}"
@@ -160,20 +173,26 @@ class LoadedInstance:
         """Of one of the FMU's functions, without fmi2."""
         return _address(self._fmu.dll[f"fmi2{name}"])
 
-    def enter_initialization(
-        self, values: Mapping[str, Value], stop_time: float, start_time: float = 0.0
-    ) -> None:
+    def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
         self._set(values)
-        self._call("setupExperiment", startTime=start_time, stopTime=stop_time)
+        # No stop time: k h ends beyond it by a rounding error, which many FMUs refuse.
+        self._call("setupExperiment", startTime=start_time)
         self._call("enterInitializationMode")
         # FMI has it that guesses are set before alone.
         variables = self._variables
         self._set({port: v for port, v in values.items() if variables[port].initial == "exact"})
 
     def exit_initialization(self) -> None:
-        """Get ready for the first step."""
+        """Get ready for the first step, in which no FMU is to log more than what goes wrong.
+
+        To log every step may take longer than the step. PythonFMU, which logs nothing on its own,
+        gives the reasons of a failure no category.
+        """
         self._call("exitInitializationMode")
+        if not runs_python(Path(self._fmu.unzipDirectory)):
+            with suppress(FMICallException):
+                self._fmu.setDebugLogging(bool(self._complaints), self._complaints)
 
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
@@ -201,12 +220,13 @@ class LoadedInstance:
 
     def restore(self, state: bytes) -> None:
         """Take on a state."""
-        self._complaint, self._worst = "", 0
+        self._complaints.clear()
+        self._worst = 0
         with self._held("deSerializeFMUstate", state) as read:
             self._call("setFMUstate", read)
         # Some say in a message alone that it is none of theirs.
         if self._worst >= fmi2Discard:
-            raise ComponentFailed(self._complaint)
+            raise ComponentFailed(self._complaints[-1])
 
     @contextmanager
     def _held(self, method: str, *arguments: Any) -> Iterator[Any]:
@@ -238,7 +258,10 @@ class LoadedInstance:
         """Take a message of the FMU; the latest explains a failure, a refusal before a warning."""
         text = f"{self.name}: {'; '.join(message.splitlines())}"
         if status >= min(self._worst, fmi2Discard):
-            self._complaint, self._worst = text, status
+            if self._worst < min(status, fmi2Discard):
+                self._complaints.clear()
+            self._complaints.append(text)
+            self._worst = status
         self._listener.take(status, text)
 
     def _set(self, values: Mapping[str, Value]) -> None:
@@ -278,7 +301,8 @@ class LoadedInstance:
         fatal = error.status == fmi2Fatal
         if fatal:
             self._library.corrupted = True
-        return ComponentFailed(self._complaint or f"{self.name}: {error}", fatal)
+        last = self._complaints[-1] if self._complaints else f"{self.name}: {error}"
+        return ComponentFailed(last, fatal)
 
 
 def _address(function: Any) -> int | None:
@@ -305,14 +329,12 @@ def loaded(
 
     """
     folder = unpacked(component.fmu) if folder is None else folder
-    library = library_of(component, folder)
-    instance = LoadedInstance(component, library, listener)
-    try:
-        yield instance
-    finally:
-        instance.free()
-        if component.is_once_per_process:
-            library.forget(folder)
+    with library_of(component, folder) as library:
+        instance = LoadedInstance(component, library, listener)
+        try:
+            yield instance
+        finally:
+            instance.free()
 
 
 @contextmanager

@@ -3,6 +3,7 @@
    y = gain u, and every other output is the input of its kind. What is peculiar about it says how
    it is compiled. */
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,7 +23,7 @@ typedef struct {
     int integers[VARIABLES];
     int booleans[VARIABLES];
     char texts[VARIABLES][1000];
-    double time, step;
+    double time, step, end;
     int asked, steps;
     const char *name;
     const Callbacks *callbacks;
@@ -43,6 +44,10 @@ Component fmi2Instantiate(const char *name, int type, const char *guid, const ch
 #endif
     Instance *it = calloc(1, sizeof *it);
     memcpy(it->reals, reals, sizeof reals);
+#ifdef REMEMBERS
+    static int before;
+    it->reals[GAIN] += before++;
+#endif
     strcpy(it->texts[U], "start");
     it->integers[U] = 1;
     it->name = strdup(name);
@@ -54,6 +59,7 @@ void fmi2FreeInstance(Component c) { free(c); }
 
 Status fmi2SetupExperiment(Component c, int tolerance, double t, double start, int stop, double end)
 {
+    ((Instance *)c)->end = stop ? end : HUGE_VAL;
     return OK;
 }
 
@@ -130,6 +136,8 @@ Status fmi2DoStep(Component c, double t, double h, int no_rollback)
     if (t + h > 0.5)
         return Discard;
 #endif
+    if (t + h > it->end)
+        return Error;
 #ifdef RIGID
     if (it->step && (h < 0.999 * it->step || h > 1.001 * it->step))
         return Error;

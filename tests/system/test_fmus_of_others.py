@@ -73,8 +73,8 @@ def test_texts_that_change_in_every_step_arrive(tmp_path, way):
     """Each of two FMUs says the number of its steps, and hears the other's of the step before."""
     wires = {"a.said": "b.heard", "b.said": "a.heard"}
     table = run(system_of(build(tmp_path, "SPEAKS"), "ab", wires), **way)
-    assert table["a.heard"].tolist()[:4] == ["start", "a1 start", "a2 b1 start", "a3 b2 a1 start"]
-    assert table["b.heard"].tolist()[:4] == ["start", "b1 start", "b2 a1 start", "b3 a2 b1 start"]
+    assert table["a.heard"].tolist()[:4] == ["", "a1 ", "a2 b1 ", "a3 b2 a1 "]
+    assert table["b.heard"].tolist()[:4] == ["", "b1 ", "b2 a1 ", "b3 a2 b1 "]
 
 
 @EVERY_WAY
@@ -100,6 +100,26 @@ def test_a_second_instance_of_an_fmu_that_allows_one_gets_its_own_process(tmp_pa
         table = run(system, **way)
         assert table.failure is None
         assert (table["c.y"][2:] == 2.0).all()
+
+
+@pytest.mark.parametrize("way", [WAYS["python"], WAYS["compiled"]], ids=["python", "compiled"])
+def test_nothing_is_left_in_a_library_of_the_run_before(tmp_path, way):
+    """The gain of an instance is one, and one more for each that its library has had before."""
+    system = with_values(system_of(build(tmp_path, "REMEMBERS")), {"u": 2.0})
+    for _ in range(3):
+        assert (run(system, **way)["a.y"] == 2.0).all()
+
+
+def test_a_function_that_no_capability_asks_for_may_be_missing(tmp_path):
+    assert run(system_of(build(tmp_path, "LACKS"))).failure is None
+
+
+@EVERY_WAY
+def test_a_last_step_that_rounding_takes_beyond_the_stop_time_is_made(tmp_path, way):
+    """0.2 and 0.1 are more than 0.3, and the FMU makes no step beyond a stop time that it knows."""
+    table = run(system_of(build(tmp_path)), 0.3, 0.1, **way)
+    assert table.failure is None
+    assert table.time[-1] == 3 * 0.1
 
 
 def test_the_compiled_loop_gives_way_to_fmus_in_their_own_processes(tmp_path):
