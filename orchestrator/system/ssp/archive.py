@@ -6,6 +6,7 @@ import os
 from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
+from typing import TypeVar
 from urllib.parse import unquote, urlsplit
 from xml.etree.ElementTree import Element
 
@@ -23,6 +24,9 @@ _SUFFIX = Path(STRUCTURE).suffix
 
 #: The version whose words are read; later ones have more of them, of which each is refused.
 _VERSION = "1.0"
+
+#: A number, or that there may be none.
+_Float = TypeVar("_Float", float, None)
 
 #: Of many names, this many are said.
 _MOST_SAID = 5
@@ -163,7 +167,7 @@ class Archive:
             self.problem(f"{name} {text!r} is no integer")
             return 0
 
-    def number(self, element: Element | None, name: str, otherwise: float | None) -> float | None:
+    def number(self, element: Element | None, name: str, otherwise: _Float) -> float | _Float:
         """An attribute that is a number.
 
         Args:

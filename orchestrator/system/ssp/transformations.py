@@ -6,7 +6,7 @@ from xml.etree.ElementTree import Element
 
 from orchestrator.errors import InputError
 from orchestrator.system.ssp.archive import number
-from orchestrator.system.ssp.hierarchy import Items
+from orchestrator.system.ssp.definitions import Items
 from orchestrator.system.transformation import Linear, Mapped, Transformation
 from orchestrator.system.values import BOOLEANS
 
@@ -37,12 +37,13 @@ def transformation_of(content: Element, source: Items, target: Items) -> Transfo
         table = content.find(name)
         if table is not None:
             entries = table.findall("MapEntry")
-            return Mapped(
-                tuple(
-                    (_value(name, entry, "source", source), _value(name, entry, "target", target))
-                    for entry in entries
-                )
-            )
+            pairs = [
+                (_value(name, entry, "source", source), _value(name, entry, "target", target))
+                for entry in entries
+            ]
+            if len(dict(pairs)) < len(pairs):
+                raise InputError("a mapping has two entries for one source")
+            return Mapped(tuple(pairs))
     return None
 
 
