@@ -9,7 +9,14 @@ from orchestrator.errors import InputError
 
 
 class Refused(InputError):
-    """A file is refused for its findings, which hold every problem; the text is the first."""
+    """Something is refused for problems, of which the text has the first."""
+
+    def __init__(self, *problems: str) -> None:
+        """Say the first, and how many there are."""
+        self.problems = problems
+        more = len(problems) - 1
+        others = f" (and {more} more: see `auv-fmu check`)" if more else ""
+        super().__init__(f"{problems[0]}{others}")
 
 
 class Findings:
@@ -41,22 +48,19 @@ class Findings:
 
     @contextmanager
     def collecting(self) -> Iterator[None]:
-        """Take note of the mistake that ends what is done here, and let the rest go on."""
+        """Take note of the mistakes that end what is done here, and let the rest go on."""
         try:
             yield
-        except Refused:
-            pass
         except InputError as error:
-            self.problem(str(error))
+            for text in error.problems if isinstance(error, Refused) else [str(error)]:
+                self.problem(text)
 
     def refuse(self) -> None:
         """Refuse what has problems.
 
         Raises:
-            Refused: with the first of them.
+            Refused: with all of them.
 
         """
         if self.problems:
-            more = len(self.problems) - 1
-            others = f" (and {more} more: see `auv-fmu check`)" if more else ""
-            raise Refused(f"{self.problems[0]}{others}")
+            raise Refused(*self.problems)

@@ -27,25 +27,19 @@ class Entry(NamedTuple):
     default: str
 
 
-def check_entries(
-    where: object,
-    content: Mapping[str, Any],
-    entries: Mapping[str, Entry],
-    findings: Findings | None = None,
-) -> None:
+def check_entries(where: object, content: Mapping[str, Any], entries: Mapping[str, Entry]) -> None:
     """Check that a table holds nothing but what it may, each of its kind.
 
     Args:
         where: it stands, for the message.
         content: of the table.
         entries: that it may have.
-        findings: take all that it holds beside; None: nobody asks for more than the first.
 
     Raises:
-        InputError: it holds something else.
+        Refused: it holds something else.
 
     """
-    findings = Findings() if findings is None else findings
+    findings = Findings()
     for key, value in content.items():
         if key not in entries:
             hint = did_you_mean(key, entries) or f"; use {', '.join(entries)}"

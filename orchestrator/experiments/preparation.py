@@ -167,10 +167,10 @@ def loaded(
         return Scenario(Path(name).stem, title=Path(name).name), system
     if variant is not None:
         raise InputError(f"{name}: has no variants; an SSP may have")
-    scenario = read_scenario(name, findings)
+    scenario = read_scenario(name)
     check_figure(scenario.figure)
     versions = RUNNABLE if fmi == FMI[0] else WRITABLE
-    return scenario, closed_loop(current_fmus(kind, fmi), scenario, versions, findings)
+    return scenario, closed_loop(current_fmus(kind, fmi), scenario, versions)
 
 
 def left_behind(scenario: Scenario) -> str | None:

@@ -23,7 +23,6 @@ from orchestrator.experiments.events import check_events
 from orchestrator.experiments.inputs import ENTRIES as INPUTS
 from orchestrator.experiments.inputs import Inputs
 from orchestrator.experiments.named import names_in, path_of
-from orchestrator.findings import Findings
 from orchestrator.master.experiment import Order
 from orchestrator.reading import explained, text_of
 from orchestrator.system.names import PortName, port_name
@@ -185,12 +184,8 @@ def names() -> list[str]:
     return names_in(FOLDER)
 
 
-def read_scenario(name: str, findings: Findings | None = None) -> Scenario:
+def read_scenario(name: str) -> Scenario:
     """A scenario of the bundle by its name, or any by the path of its file.
-
-    Args:
-        name: of the scenario, or path of its file.
-        findings: take all mistakes in the file; None: nobody asks for more than the first.
 
     Raises:
         InputError: there is no such scenario, or its file has a mistake.
@@ -199,12 +194,12 @@ def read_scenario(name: str, findings: Findings | None = None) -> Scenario:
     path = path_of(name, FOLDER, "scenario", ".toml or .ssp")
     text = text_of(path, _WHAT)
     with explained(path, _WHAT):
-        return _scenario(path, text, findings)
+        return _scenario(path, text)
 
 
-def _scenario(path: Path, text: str, findings: Findings | None) -> Scenario:
+def _scenario(path: Path, text: str) -> Scenario:
     content = tomllib.loads(text)
-    check_entries(path, content, ENTRIES, findings)
+    check_entries(path, content, ENTRIES)
     content["parameters"] = {
         port_name(key): value for key, value in flattened(content.get("parameters", {}))
     }

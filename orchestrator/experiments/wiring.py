@@ -25,10 +25,7 @@ def read_wiring() -> dict[str, Any]:
 
 
 def closed_loop(
-    folder: Path,
-    scenario: Scenario | None = None,
-    versions: Sequence[str] = RUNNABLE,
-    findings: Findings | None = None,
+    folder: Path, scenario: Scenario | None = None, versions: Sequence[str] = RUNNABLE
 ) -> System:
     """The wiring of the closed loop over the FMUs in a folder.
 
@@ -36,13 +33,12 @@ def closed_loop(
         folder: with the built FMUs.
         scenario: whose components, wires and parameters change it; None: the closed loop as is.
         versions: of FMI that its FMUs may have.
-        findings: take all that is wrong; None: nobody asks for more than the first.
 
     Raises:
-        InputError: a component or group of ports that the scenario names does not exist.
+        Refused: a component or group of ports that the scenario names does not exist.
 
     """
-    findings = Findings() if findings is None else findings
+    findings = Findings()
     wiring = read_wiring()
     chosen, wires = wiring["components"], wiring["wires"]
     if scenario is not None:
