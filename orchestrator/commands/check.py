@@ -15,6 +15,9 @@ from orchestrator.master.schedule import delays
 from orchestrator.system.examination import examine, surprises
 from orchestrator.system.unpacking import unpacked
 
+#: How long a run could last that nobody makes [s].
+_SOME_TIME = 1.0
+
 
 def add_to(commands: Any) -> None:
     """Add this command to the parser."""
@@ -68,6 +71,10 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
             with findings.collecting():
                 check_binary(component, unpacked(component.fmu))
             to_know += [f"{name}: {text}" for text in surprises(component)]
-        prepared = prepare(scenario, system, Request())
+        request = Request()
+        if scenario.stop_time is None and system.stop_time is None:
+            to_know.append("names no stop time: a run wants --stop-time")
+            request = Request(stop_time=(system.start_time or 0.0) + _SOME_TIME)
+        prepared = prepare(scenario, system, request)
         to_know += delays(prepared.system, prepared.experiment.order)
     return to_know

@@ -100,6 +100,12 @@ def test_missing_binary_is_said(dist, workplace, capsys):
     assert f"for this machine, {fmpy.platform}" in line and "amiga32" in line
 
 
+def test_archive_may_leave_the_stop_time_open(dist, workplace, capsys):
+    path = changed(dist / "auv.ssp", (' stopTime="', ' description="'))
+    assert main(["check", str(path)]) == 0
+    assert "--stop-time" in lines(capsys)[0]
+
+
 @pytest.mark.parametrize("ending", ["fmu", "ssp", "toml"])
 @pytest.mark.parametrize("content", [None, b"", b"\xff\x00PK"])
 def test_what_cannot_be_read_is_one_problem(workplace, capsys, ending, content):
