@@ -119,7 +119,13 @@ def _animate(options: argparse.Namespace) -> int:
     prepared = prepare(scenario, system, request(options))
     seen = VisibleRows()
     observers: list[Observer] = [seen, Progress(scenario.name)]
-    ending = simulate(prepared.system, prepared.experiment, observers, loop=prepared.loop)
+    ending = simulate(
+        prepared.system,
+        prepared.experiment,
+        observers,
+        loop=prepared.loop,
+        attendants=prepared.attendants(),
+    )
     if missing := seen.missing(*CONTROL_POINT):
         raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
     title = scenario.title or scenario.name

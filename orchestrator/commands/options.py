@@ -137,9 +137,13 @@ def request(options: argparse.Namespace) -> Request:
 
 
 def status(name: str, ending: Ending) -> int:
-    """Exit status of a run, after saying what went wrong in it."""
+    """Exit status of a run, after saying what has happened, and what went wrong in it."""
     for message in ending.messages:
         say(message)
+    for occurrence in ending.events:
+        say(f"{name}: {occurrence}")
+    if ending.remark is not None:
+        say(f"{name} {ending.remark}")
     if ending.failure is None:
         return OK
     say(f"{name} {ending.failure}")

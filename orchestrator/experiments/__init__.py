@@ -12,6 +12,7 @@ module                    what it holds
 :mod:`.bill_of_materials` checksums and packages of the bundle
 :mod:`.own_controller`    a controller of the user's own, to begin with
 :mod:`.preparation`       from a name to what is run
+:mod:`.checkpoints`       where checkpoints lie, and what they are of
 :mod:`.run`               a run with its files, as the command line makes it
 :mod:`.folder`            a folder of results that changes all at once
 :mod:`.record`            run.json

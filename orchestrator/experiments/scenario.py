@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from orchestrator.errors import InputError
 from orchestrator.experiments.entries import (
     Entry,
     are_names,
@@ -18,6 +19,9 @@ from orchestrator.experiments.entries import (
     is_table,
     is_text,
 )
+from orchestrator.experiments.events import check_events
+from orchestrator.experiments.inputs import ENTRIES as INPUTS
+from orchestrator.experiments.inputs import Inputs
 from orchestrator.experiments.named import names_in, path_of
 from orchestrator.master.experiment import Order
 from orchestrator.reading import explained, text_of
@@ -54,6 +58,8 @@ class Scenario:
     wires: Mapping[str, str | bool] = field(default_factory=dict)
     parameters: Mapping[PortName, Any] = field(default_factory=dict)
     ours: Mapping[str, str] = field(default_factory=dict)
+    events: Sequence[Mapping[str, Any]] = ()
+    inputs: Inputs | None = None
     digest: str = ""
 
     @property
@@ -64,6 +70,10 @@ class Scenario:
 
 def _is_table_of_names(value: Any) -> bool:
     return is_table(value) and all(map(is_text, value.values()))
+
+
+def _are_tables(value: Any) -> bool:
+    return isinstance(value, list) and all(map(is_table, value))
 
 
 def _is_table_of_wires(value: Any) -> bool:
@@ -147,6 +157,18 @@ ENTRIES: dict[str, Entry] = {
         'brackets are quoted: `"controller.K1[1]" = 12.0`.',
         "the FMUs' own",
     ),
+    "events": Entry(
+        "list of tables",
+        _are_tables,
+        "What happens during the run, each as `[[events]]`: [see below](#events).",
+        "nothing",
+    ),
+    "inputs": Entry(
+        "table",
+        is_table,
+        "A table of inputs over time: [see below](#inputs).",
+        "inputs keep their values",
+    ),
     "ours": Entry(
         "table of texts",
         is_table,
@@ -188,4 +210,10 @@ def _scenario(path: Path, text: str) -> Scenario:
     }
     if content.get("compare", "").endswith(".toml"):
         content["compare"] = str(path.parent / content["compare"])
+    check_events(path, content.get("events", ()))
+    if inputs := content.get("inputs"):
+        check_entries(f"{path}: inputs", inputs, INPUTS)
+        if "file" not in inputs:
+            raise InputError(f"{path}: inputs: name a file")
+        content["inputs"] = Inputs(**{**inputs, "file": path.parent / inputs["file"]})
     return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)

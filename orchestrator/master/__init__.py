@@ -15,6 +15,7 @@ module                  what it holds
 :mod:`.keeper`          the process that starts such processes, and leaves none behind
 :mod:`.log`             what FMUs have to say
 :mod:`.row`             the row of all values
+:mod:`.texts`           texts, for which numbers stand in the row
 :mod:`.transfer`        the FMI calls that move them
 :mod:`.paces`           which components take longer steps of their own
 :mod:`.schedule`        which components are stepped when, and on whose outputs
@@ -22,7 +23,7 @@ module                  what it holds
 :mod:`.attendant`       who acts on a run between two steps
 :mod:`.checkpoint`      what a run needs to go on in another process
 :mod:`.spool`           rows in a file that grows, to be read again
-:mod:`.pace`            a run that goes no faster than a clock
+:mod:`.real_time`       a run that goes no faster than a clock
 :mod:`.loop`            the steps in Python, one by one, and which loop makes them
 :mod:`.stepper`         the steps compiled, some hundred in one call of stepper.c
 :mod:`.layout`          what stepper.c works on

@@ -3,18 +3,56 @@
 from __future__ import annotations
 
 import glob
-from contextlib import chdir
+from collections.abc import Iterator
+from contextlib import chdir, contextmanager
 from pathlib import Path
 from shutil import copytree
 from tempfile import mkdtemp
 from threading import Lock
+from typing import Any
 
 import fmpy
-from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi2 import FMU2Slave, fmi2Error
 
 from orchestrator.errors import InputError, reason
 from orchestrator.system.component import Component
-from orchestrator.system.unpacking import check_place
+from orchestrator.system.unpacking import check_place, runs_python
+
+#: How this program names itself in descriptions of FMUs.
+_OWN = "auv-fmu "
+
+#: What only FMUs with some capability need, and some of the others lack.
+_OPTIONAL = ("FMUstate", "Derivative", "Status", "CancelStep", "DebugLogging")
+
+
+class FMU2OfOthers(FMU2Slave):  # type: ignore[misc]
+    """An FMU that may lack functions that its capabilities do not ask for.
+
+    By the beginning of the class's name fmpy knows the version.
+    """
+
+    dll: Any
+
+    def _loadFunctions(self) -> None:
+        dll = self.dll
+        self.dll = _Lenient(dll)
+        super()._loadFunctions()
+        self.dll = dll
+
+
+class _Lenient:
+    """A library in which optional functions are found that are not there."""
+
+    def __init__(self, dll: Any) -> None:
+        self._dll = dll
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return getattr(self._dll, name)
+        except AttributeError:
+            if not any(part in name for part in _OPTIONAL):
+                raise
+            return lambda *_: fmi2Error
 
 
 class Library:
@@ -24,6 +62,9 @@ class Library:
         fmu: fmpy's view of it.
         corrupted: whether one of them has ended with fmi2Fatal: FMI then forbids every further
             call, also for the others, even to free them.
+        is_akin: whether it is made by this program or PythonFMU: nothing is left in it of an
+            instance, and of each step that it refuses it says that it wants to terminate.
+        users: how many there are.
 
     """
 
@@ -40,21 +81,16 @@ class Library:
         try:
             # fmpy changes the current folder meanwhile, and leaves it so if it fails.
             with chdir(Path.cwd()):
-                self.fmu = FMU2Slave(
+                self.fmu = FMU2OfOthers(
                     guid=component.description.guid,
                     modelIdentifier=identifier,
                     unzipDirectory=str(folder),
                 )
         except Exception as error:
             raise InputError(f"{named(component)} cannot be loaded: {reason(error)}") from error
-        self.corrupted = False
-
-    def forget(self, folder: Path) -> None:
-        """Let the next instance in the folder find an FMU that none has used before."""
-        if not self.corrupted:
-            with _LOCK:
-                del _libraries[folder]
-            self.fmu.freeLibrary()
+        tool = component.description.generationTool or ""
+        self.is_akin = tool.startswith(_OWN) or runs_python(folder)
+        self.corrupted, self.users = False, 0
 
 
 def named(component: Component) -> str:
@@ -84,17 +120,34 @@ _libraries: dict[Path, Library] = {}
 _LOCK = Lock()
 
 
-def library_of(component: Component, folder: Path) -> Library:
-    """The library of an unpacked FMU, loaded once a process, or a copy of a corrupted one."""
+@contextmanager
+def library_of(component: Component, folder: Path) -> Iterator[Library]:
+    """The library of an unpacked FMU, for one more instance of it.
+
+    Many libraries hold something of the instances that they have had: each is unloaded with its
+    last one, but for those of which it is known that they do not.
+
+    Raises:
+        InputError: it cannot be loaded.
+
+    """
     with _LOCK:
-        found = _libraries.get(folder)
-        if found is None:
-            found = Library(component, folder)
-        elif found.corrupted:
+        library = _libraries.get(folder)
+        if library is None:
+            library = Library(component, folder)
+        elif library.corrupted:
             # It stays loaded, with all that it has in memory; under another name it is a new one.
-            found = Library(component, _copied(folder))
-        _libraries[folder] = found
-        return found
+            library = Library(component, _copied(folder))
+        _libraries[folder] = library
+        library.users += 1
+    try:
+        yield library
+    finally:
+        with _LOCK:
+            library.users -= 1
+            if not (library.users or library.corrupted or library.is_akin):
+                del _libraries[folder]
+                library.fmu.freeLibrary()
 
 
 def _copied(folder: Path) -> Path:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import json
 from base64 import b64decode, b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from shutil import rmtree
@@ -42,6 +42,7 @@ class _Stored(NamedTuple):
         time, made: how far the run had come [s], and in how many steps.
         every: for how many seconds a checkpoint was written [s].
         of: the run.
+        row: all values, hidden ones too.
         states: of the FMUs, as base64.
         lasting: what else there was to remember.
 
@@ -51,6 +52,7 @@ class _Stored(NamedTuple):
     made: int
     every: float
     of: dict[str, str]
+    row: list[float]
     states: dict[str, str]
     lasting: list[Any]
 
@@ -76,6 +78,7 @@ class Checkpoints:
     As an attendant it comes first: what others do at the same time belongs to what follows.
 
     Attributes:
+        folder: of the checkpoint.
         time: of the checkpoint in the folder [s]; None: there is none.
 
     """
@@ -86,7 +89,6 @@ class Checkpoints:
         identity: Identity,
         every: float,
         resume: bool,
-        lasting: Sequence[Lasting] = (),
     ) -> None:
         """Look for a checkpoint; nothing is written before the run begins.
 
@@ -95,7 +97,6 @@ class Checkpoints:
             identity: of the run.
             every: a checkpoint for so many simulated seconds [s].
             resume: begin with the one that is there, if there is one.
-            lasting: attendants that have something to remember.
 
         Raises:
             InputError: what is there is not wanted, or not what is wanted.
@@ -103,8 +104,7 @@ class Checkpoints:
         """
         if not (isfinite(every) and every > 0.0):
             raise InputError(f"a checkpoint every {every:g} s: must be positive and finite")
-        self._folder, self._identity = folder, identity
-        self._every, self._lasting = every, lasting
+        self.folder, self._identity, self._every = folder, identity, every
         self._found = _read(folder)
         if self._found is not None:
             if not resume:
@@ -121,9 +121,9 @@ class Checkpoints:
 
     def begin(self, header: Header) -> None:
         """Open the file of rows."""
-        self._folder.mkdir(parents=True, exist_ok=True)
+        self.folder.mkdir(parents=True, exist_ok=True)
         self._known = 0 if self._found is None else self._found.made + 1
-        self._spool = Spool(self._folder / _ROWS, 1 + len(header.columns), self._known)
+        self._spool = Spool(self.folder / _ROWS, 1 + len(header.columns), self._known)
 
     def take(self, rows: np.ndarray) -> None:
         """Write some rows, but for those that are told again."""
@@ -147,7 +147,7 @@ class Checkpoints:
 
     def remove(self) -> None:
         """Remove what a run that has come to its end does not need any more."""
-        rmtree(self._folder)
+        rmtree(self.folder)
 
     def _write(self, run: Run) -> None:
         content = _Stored(
@@ -155,22 +155,26 @@ class Checkpoints:
             run.made,
             self._every,
             dict(self._identity),
+            run.row.values.tolist(),
             {
                 name: b64encode(instance.state()).decode()
                 for name, instance in run.instances.items()
             },
-            [one.state() for one in self._all_lasting(run)],
+            [one.state() for one in _lasting(run)],
         )
         run.blocks.hand_over()
         try:
             self._spool.to_disk()
-            with whole(self._folder / _STATE) as partial:
+            with whole(self.folder / _STATE) as partial:
                 partial.write_text(json.dumps(content._asdict()), encoding="utf-8")
         except OSError as error:
             raise NotKept(f"stopped at t = {run.time:g} s: {reason(error)}") from error
         self.time = run.time
 
     def _resume(self, run: Run, found: _Stored) -> None:
+        # First of all what rows mean, who is told them wants to know.
+        for one, state in zip(_lasting(run), found.lasting, strict=True):
+            one.restore(state)
         first = 1  # which was computed anew
         for rows in self._spool.kept():
             run.blocks.tell(rows[first:])
@@ -178,14 +182,14 @@ class Checkpoints:
             if run.interrupts:
                 raise KeyboardInterrupt
             first = 0
-        run.row.values[:] = rows[-1, 1:]
+        run.row.values[:] = found.row
         for name, instance in run.instances.items():
             instance.restore(b64decode(found.states[name]))
-        for one, state in zip(self._all_lasting(run), found.lasting, strict=True):
-            one.restore(state)
 
-    def _all_lasting(self, run: Run) -> Sequence[Lasting]:
-        return run.signals, run.log, *self._lasting
+
+def _lasting(run: Run) -> list[Lasting]:
+    attendants = [one for one in run.attendants if isinstance(one, Lasting)]
+    return [run.row.texts, run.signals, run.log, *attendants]
 
 
 def interval_in(folder: Path) -> float | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import floor, isfinite, ulp
+from math import ceil, floor, isfinite, ulp
 from numbers import Real
 from typing import TypeAlias
 
@@ -97,9 +97,11 @@ class Experiment:
     def _in_steps(self) -> float:
         """The run in steps; a whole number where it is one but for rounding."""
         # However small its share of a step, a run is not empty.
-        n = max(self._length / self.step, ulp(0.0))
-        nearest = round(n)
-        return nearest if abs(n - nearest) <= min(ROUNDING * nearest, _MOST_OF_A_STEP) else n
+        return _rounded(max(self._length / self.step, ulp(0.0)))
+
+    def reaching(self, time: float) -> int:
+        """After how many steps a time [s] has come: the first t_k that is not before it."""
+        return max(ceil(_rounded((time - self.start_time) / self.step)), 0)
 
     @property
     def rows(self) -> int:
@@ -132,3 +134,9 @@ class Experiment:
             t = end
         if self.has_short_step and made < self.rows - 1:
             yield self.rows - 1, t, self.stop_time - t, self.stop_time
+
+
+def _rounded(n: float) -> float:
+    """A number of steps; a whole number where it is one but for rounding."""
+    nearest = round(n)
+    return nearest if abs(n - nearest) <= min(ROUNDING * nearest, _MOST_OF_A_STEP) else n

@@ -70,10 +70,15 @@ class CsvFile:
     def begin(self, header: Header) -> None:
         """Write the names of the columns."""
         self._lines = CsvLines(self._path, ("time", *header.columns))
+        self._texts = header.text_places()
 
     def take(self, rows: np.ndarray) -> None:
         """Write some rows."""
-        self._lines.write(rows.tolist())
+        lines = rows.tolist()
+        for place, texts in self._texts:
+            for line in lines:
+                line[place] = texts.text(line[place])
+        self._lines.write(lines)
 
     def end(self, ending: Ending) -> None:
         """Close the file."""
@@ -81,7 +86,7 @@ class CsvFile:
 
 
 class ParquetFile:
-    """An observer that writes Apache Parquet, all columns as doubles.
+    """An observer that writes Apache Parquet, all columns as doubles but for those of texts.
 
     Without what is written last, nothing of such a file can be read: there is always room for that,
     and for the rows that wait.
@@ -100,8 +105,11 @@ class ParquetFile:
     def begin(self, header: Header) -> None:
         """Make the file and its schema."""
         self._arrow: Any = import_module("pyarrow")
-        double = self._arrow.float64()
-        self._schema = self._arrow.schema([(name, double) for name in ("time", *header.columns)])
+        self._texts = header.text_places()
+        kinds = [self._arrow.float64()] * (1 + len(header.columns))
+        for place, _ in self._texts:
+            kinds[place] = self._arrow.string()
+        self._schema = self._arrow.schema(list(zip(("time", *header.columns), kinds, strict=True)))
         self._file = self._path.open("wb")
         self._writer = import_module("pyarrow.parquet").ParquetWriter(self._file, self._schema)
         self._waiting = [np.empty((0, len(self._schema)))]
@@ -127,6 +135,8 @@ class ParquetFile:
 
     def _write(self, rows: np.ndarray) -> None:
         columns = [self._arrow.array(column) for column in rows.T]
+        for place, texts in self._texts:
+            columns[place] = self._arrow.array([texts.text(number) for number in rows[:, place]])
         self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))
         self._n += 1
 

@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from orchestrator.master import layout
+from orchestrator.master.texts import Texts
 from orchestrator.system.values import Value
 
 #: What a component is asked for in every step, one after the other.
@@ -83,12 +84,17 @@ class Instance(Protocol):
 
         """
 
-    def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
-        """Say where its values are: a view of the row, with the inputs first, and its parts."""
+    def tie(self, values: np.ndarray, parts: Sequence[Part], texts: Texts) -> None:
+        """Say where its values are: a view of the row, with the inputs first, and its parts.
 
-    def enter_initialization(
-        self, values: Mapping[str, Value], stop_time: float, start_time: float = 0.0
-    ) -> None:
+        Args:
+            values: of the row, from its first on.
+            parts: of them.
+            texts: for which numbers stand there.
+
+        """
+
+    def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode.
 
         What may be set in that mode is set there once more: some FMUs take on their own values
@@ -103,6 +109,12 @@ class Instance(Protocol):
 
     def read(self, ports: Sequence[str]) -> dict[str, Value]:
         """Values of some variables, as the FMU holds them."""
+
+    def tune(self, values: Mapping[str, Value]) -> None:
+        """Set tunable parameters between two steps."""
+
+    def reset(self) -> None:
+        """Be what it was before the initialisation, which can then be entered again."""
 
     def state(self) -> bytes:
         """The FMU's whole state between two steps, from which another instance can go on.

@@ -28,6 +28,7 @@ from orchestrator.master.instance import ComponentFailed, Ended, Instance, Part
 from orchestrator.master.interrupts import Interrupts
 from orchestrator.master.keeper import END
 from orchestrator.master.log import Log
+from orchestrator.master.texts import Texts
 from orchestrator.system.component import Component
 from orchestrator.system.unpacking import unpacked
 from orchestrator.system.values import Value
@@ -123,6 +124,10 @@ class IsolatedInstance:
         self._doing, self._hangs, self._steps = "start", False, False
         connection.settimeout(min(timeout, _GLANCE))
         self._inputs, self._outputs = np.zeros(0), np.zeros(0)
+        self._text_inputs: list[int] = []
+        self._text_outputs: list[int] = []
+        # Those of the run, and those of the process there, which numbers its own.
+        self._texts, self._theirs, self._told = Texts(), Texts(), len(Texts())
         inputs, outputs = sizes(component)
         self._channel = Channel(connection, 2 + inputs, outputs, self._waited)
 
@@ -138,17 +143,23 @@ class IsolatedInstance:
         self._doing = "instantiate"
         self._receive()
 
-    def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
+    def tie(self, values: np.ndarray, parts: Sequence[Part], texts: Texts) -> None:
         """Say where its values are."""
         inputs, outputs = len(self._channel.outgoing) - 2, len(self._channel.incoming)
         first = next((part.place.start for part in parts if part.causality == "output"), inputs)
         self._inputs, self._outputs = values[:inputs], values[first : first + outputs]
+        self._texts = texts
+        for part in parts:
+            if part.kind == "String":
+                places = range(part.place.start, part.place.stop)
+                if part.causality == "input":
+                    self._text_inputs += places
+                else:
+                    self._text_outputs += [place - first for place in places]
 
-    def enter_initialization(
-        self, values: Mapping[str, Value], stop_time: float, start_time: float = 0.0
-    ) -> None:
+    def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
-        self._ask("enter_initialization", values, stop_time, start_time)
+        self._ask("enter_initialization", values, start_time)
 
     def exit_initialization(self) -> None:
         """Get ready for the first step."""
@@ -156,9 +167,9 @@ class IsolatedInstance:
 
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
-        self._channel.outgoing[2:] = self._inputs
+        self._put_inputs()
         self._ask("exchange")
-        self._outputs[:] = self._channel.incoming
+        self._read_outputs()
 
     def read(self, ports: Sequence[str]) -> dict[str, Value]:
         """Values of some variables, as the FMU holds them."""
@@ -169,6 +180,14 @@ class IsolatedInstance:
         if not (answers and all(isinstance(value, Value) for value in values.values())):
             raise self._nonsense()
         return dict(values)
+
+    def tune(self, values: Mapping[str, Value]) -> None:
+        """Set tunable parameters between two steps."""
+        self._ask("tune", dict(values))
+
+    def reset(self) -> None:
+        """Be what it was before the initialisation."""
+        self._ask("reset")
 
     def state(self) -> bytes:
         """The FMU's whole state between two steps."""
@@ -194,9 +213,9 @@ class IsolatedInstance:
         outgoing = self._channel.outgoing
         outgoing[0] = t
         outgoing[1] = h
-        outgoing[2:] = self._inputs
+        self._put_inputs()
         self._doing, self._steps = "doStep", True
-        self._send()
+        self._send({})
         return 0
 
     def terminate(self) -> None:
@@ -227,8 +246,24 @@ class IsolatedInstance:
     def _take_outputs(self) -> int:
         self._steps = False
         self._receive()
-        self._outputs[:] = self._channel.incoming
+        self._read_outputs()
         return 0
+
+    def _put_inputs(self) -> None:
+        """Have the inputs go with the next message."""
+        inputs = self._channel.outgoing[2:]
+        inputs[:] = self._inputs
+        for i in self._text_inputs:
+            inputs[i] = self._theirs.number(self._texts.text(inputs[i]))
+
+    def _read_outputs(self) -> None:
+        """Take the outputs that have come with a message."""
+        self._outputs[:] = outputs = self._channel.incoming
+        try:
+            for i in self._text_outputs:
+                self._outputs[i] = self._texts.number(self._theirs.text(outputs[i]))
+        except ValueError as error:
+            raise self._nonsense() from error
 
     def _ask(self, call: str, *arguments: Any) -> Any:
         if self._steps:
@@ -239,9 +274,13 @@ class IsolatedInstance:
         self._send({"call": call, "arguments": arguments})
         return self._receive()
 
-    def _send(self, note: Any = None) -> None:
+    def _send(self, note: dict[str, Any]) -> None:
+        """Send a note, with the texts that are new there."""
+        if news := self._theirs.since(self._told):
+            note["texts"] = news
+            self._told += len(news)
         try:
-            self._channel.send(note)
+            self._channel.send(note or None)
         except OSError as error:
             raise self._lost() from error
 
@@ -265,7 +304,11 @@ class IsolatedInstance:
         fatal: bool = False,
         refused: str | None = None,
         ended: str | None = None,
+        texts: Sequence[str] = (),
     ) -> Any:
+        for text in texts:
+            self._theirs.number(str(text))
+        self._told = len(self._theirs)
         for status, text in messages:
             self._log.take(int(status), str(text))
         if refused is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from copy import copy
@@ -41,7 +42,8 @@ from orchestrator.master import layout
 from orchestrator.master.binary import Library, library_of, named
 from orchestrator.master.instance import DO_STEP, ComponentFailed, Ended, Instance, Part
 from orchestrator.master.log import Listener
-from orchestrator.master.transfer import Block
+from orchestrator.master.texts import Texts
+from orchestrator.master.transfer import Block, text_of
 from orchestrator.system.component import Component
 from orchestrator.system.unpacking import runs_python, unpacked
 from orchestrator.system.values import Value
@@ -54,6 +56,9 @@ _DoStep: TypeAlias = Callable[[float, float, int], int]
 #: FMI's doStep, as the compiled loop calls it.
 _DO_STEP = (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean)
 _CALLBACK = ctypes.CFUNCTYPE(fmi2Status, *_DO_STEP)
+
+#: Messages that are remembered, to say why something has failed.
+_MOST_COMPLAINTS = 3
 
 #: How often is looked whether a step has ended that goes on after its call [s].
 _GLANCE = 1e-3
@@ -85,7 +90,7 @@ class LoadedInstance:
         ]
         self._library = library
         self._listener = listener
-        self._complaint = ""
+        self._complaints: deque[str] = deque(maxlen=_MOST_COMPLAINTS)
         self._worst = 0
         self._environment = next(_environments)
         _instances[self._environment] = self
@@ -96,7 +101,8 @@ class LoadedInstance:
             self._fmu.instantiate(callbacks=_callbacks(self._environment), loggingOn=True)
         except Exception as error:
             del _instances[self._environment]
-            why = self._complaint.removeprefix(f"{self.name}: ") or reason(error)
+            heard = [text.removeprefix(f"{self.name}: ") for text in self._complaints]
+            why = " ".join(heard) or reason(error)
             needs = component.description.coSimulation.needsExecutionTool
             tool = "; it needs the tool that it was made with" * needs
             text = f"{named(component)} cannot be instantiated: {why}{tool}"
@@ -136,10 +142,10 @@ class LoadedInstance:
         called.argtypes, called.restype = types, fmi2Status
         return partial(called, fmi2Component(self._fmu.component))
 
-    def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
+    def tie(self, values: np.ndarray, parts: Sequence[Part], texts: Texts) -> None:
         """Say where its values are."""
         for part in parts:
-            block = Block(*part[:3], values[part.place])
+            block = Block(*part[:3], values[part.place], texts)
             function = self.function(block.function)
             if part.causality == "input":
                 self._inputs.append(block)
@@ -167,12 +173,11 @@ class LoadedInstance:
         """Of one of the FMU's functions, without fmi2."""
         return _address(self._fmu.dll[f"fmi2{name}"])
 
-    def enter_initialization(
-        self, values: Mapping[str, Value], stop_time: float, start_time: float = 0.0
-    ) -> None:
+    def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
         self._set(values)
-        self._call("setupExperiment", startTime=start_time, stopTime=stop_time)
+        # No stop time: k h ends beyond it by a rounding error, which many FMUs refuse.
+        self._call("setupExperiment", startTime=start_time)
         self._call("enterInitializationMode")
         # FMI has it that guesses are set before alone.
         variables = self._variables
@@ -199,6 +204,14 @@ class LoadedInstance:
         """Values of some variables, as the FMU holds them."""
         return {port: self._get(self._variables[port]) for port in ports}
 
+    def tune(self, values: Mapping[str, Value]) -> None:
+        """Set tunable parameters between two steps."""
+        self._set(values)
+
+    def reset(self) -> None:
+        """Be what it was before the initialisation."""
+        self._call("reset")
+
     def state(self) -> bytes:
         """The FMU's whole state between two steps."""
         with self._held("getFMUstate") as state:
@@ -207,12 +220,13 @@ class LoadedInstance:
 
     def restore(self, state: bytes) -> None:
         """Take on a state."""
-        self._complaint, self._worst = "", 0
+        self._complaints.clear()
+        self._worst = 0
         with self._held("deSerializeFMUstate", state) as read:
             self._call("setFMUstate", read)
         # Some say in a message alone that it is none of theirs.
         if self._worst >= fmi2Discard:
-            raise ComponentFailed(self._complaint)
+            raise ComponentFailed(self._complaints[-1])
 
     @contextmanager
     def _held(self, method: str, *arguments: Any) -> Iterator[Any]:
@@ -244,7 +258,10 @@ class LoadedInstance:
         """Take a message of the FMU; the latest explains a failure, a refusal before a warning."""
         text = f"{self.name}: {'; '.join(message.splitlines())}"
         if status >= min(self._worst, fmi2Discard):
-            self._complaint, self._worst = text, status
+            if self._worst < min(status, fmi2Discard):
+                self._complaints.clear()
+            self._complaints.append(text)
+            self._worst = status
         self._listener.take(status, text)
 
     def _set(self, values: Mapping[str, Value]) -> None:
@@ -255,10 +272,9 @@ class LoadedInstance:
     def _get(self, variable: ModelVariable) -> Value:
         value: Value | bytes | None
         (value,) = self._call(f"get{_fmi_type(variable)}", [variable.valueReference])
-        if isinstance(value, bytes):
-            return value.decode(errors="replace")
-        # Some have no text where an empty one is meant.
-        return "" if value is None else bool(value) if variable.type == "Boolean" else value
+        if value is None or isinstance(value, bytes):
+            return text_of(value)
+        return bool(value) if variable.type == "Boolean" else value
 
     def _call(self, method: str, *arguments: Any, **named: Any) -> Any:
         """One of fmpy's methods, which are slow and convenient."""
@@ -269,7 +285,7 @@ class LoadedInstance:
 
     def failed(self, status: int, function: str) -> ComponentFailed | Ended:
         """What to raise after a call that has ended with a status."""
-        if (function, status) == (DO_STEP, fmi2Discard):
+        if (function, status) == (DO_STEP, fmi2Discard) and not self._library.is_akin:
             with suppress(FMICallException):
                 if self._fmu.getBooleanStatus(fmi2Terminated):
                     time = self._fmu.getRealStatus(fmi2LastSuccessfulTime)
@@ -285,7 +301,8 @@ class LoadedInstance:
         fatal = error.status == fmi2Fatal
         if fatal:
             self._library.corrupted = True
-        return ComponentFailed(self._complaint or f"{self.name}: {error}", fatal)
+        last = self._complaints[-1] if self._complaints else f"{self.name}: {error}"
+        return ComponentFailed(last, fatal)
 
 
 def _address(function: Any) -> int | None:
@@ -312,14 +329,12 @@ def loaded(
 
     """
     folder = unpacked(component.fmu) if folder is None else folder
-    library = library_of(component, folder)
-    instance = LoadedInstance(component, library, listener)
-    try:
-        yield instance
-    finally:
-        instance.free()
-        if component.is_once_per_process:
-            library.forget(folder)
+    with library_of(component, folder) as library:
+        instance = LoadedInstance(component, library, listener)
+        try:
+            yield instance
+        finally:
+            instance.free()
 
 
 @contextmanager

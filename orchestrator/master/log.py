@@ -53,11 +53,17 @@ class Log:
 
     def state(self) -> dict[str, Any]:
         """All of it, as JSON has it."""
-        return {"said": self._said, "n": self._n, "refusals": self.refusals}
+        return {
+            "remarks": self._remarks,
+            "said": self._said,
+            "n": self._n,
+            "refusals": self.refusals,
+        }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Take on what another one has taken."""
-        self._said, self._n, self.refusals = state["said"], state["n"], state["refusals"]
+        self._remarks, self.refusals = state["remarks"], state["refusals"]
+        self._said, self._n = state["said"], state["n"]
 
 
 class Letters:

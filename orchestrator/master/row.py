@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from math import isfinite
 
 import numpy as np
 from fmpy.model_description import ModelVariable
 
+from orchestrator.errors import InputError
 from orchestrator.master.instance import Instance, Part
+from orchestrator.master.texts import Texts
 from orchestrator.master.transfer import KINDS
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
@@ -32,6 +35,7 @@ class Row:
         values: of all ports, and the hidden ones.
         shown: a view of the columns alone.
         columns: where the value of a port is.
+        texts: for which numbers stand in it, and the ports of which that is so.
 
     """
 
@@ -60,6 +64,7 @@ class Row:
         self.values = np.zeros(n + more)
         self.shown = self.values[:n]
         self.columns: dict[PortName, int] = {}
+        self.texts, self.text_ports = Texts(), set[PortName]()
         self._hidden: dict[PortName, int] = {}
         self._outputs: list[PortName] = []
         firsts: dict[str, int] = {}
@@ -79,20 +84,24 @@ class Row:
                 name = PortName(component, port.name)
                 self.columns[name] = i
                 self._outputs += [name] * (causality == "output")
-                start = system.components[component].start(port.name)
-                self.values[i] = 0.0 if start is None else float(start)
+                self.text_ports |= {name} if kind == "String" else set()
+                # A description may have nonsense there, which is of no use to anybody.
+                with suppress(InputError):
+                    self.enter({name: system.components[component].start(port.name) or 0.0})
         for component, instance in instances.items():
-            instance.tie(self.values[firsts.get(component, 0) :], parts[component])
-        for target, value in system.parameters.items():
-            if target in self.columns:
-                self.values[self.columns[target]] = float(value)
+            part = self.values[firsts.get(component, 0) :]
+            instance.tie(part, parts[component], self.texts)
+        self.enter(system.parameters)
 
-    def enter(self, component: str, values: Mapping[str, Value]) -> None:
-        """Take values of a component's ports, but for those that are no finite numbers."""
+    def enter(self, values: Mapping[PortName, Value]) -> None:
+        """Take values of ports, but for those that are no finite numbers."""
         for port, value in values.items():
-            column = self.columns.get(PortName(component, port))
-            if column is not None and isinstance(value, int | float) and isfinite(value):
-                self.values[column] = value
+            if port in self.columns and isfinite(number := self.number(value)):
+                self.values[self.columns[port]] = number
+
+    def number(self, value: Value) -> float:
+        """What stands for a value in the row."""
+        return self.texts.number(value) if isinstance(value, str) else float(value)
 
     def not_finite(self, components: Iterable[str]) -> str | None:
         """The first output that is no number or infinite, in words; None: all are finite.

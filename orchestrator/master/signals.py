@@ -58,6 +58,11 @@ class Gathering:
             taken[place] = pairs.get(taken[place], taken[place])
         values[self.targets] = self.factors * taken + self.offsets
 
+    def move(self, values: np.ndarray, place: int) -> None:
+        """Move one of the values."""
+        source = values[self.sources[place]]
+        values[self.targets[place]] = self.factors[place] * source + self.offsets[place]
+
     def set(self, place: int, factor: float, offset: float) -> None:
         """Say what is done to one of the values."""
         self.factors[place], self.offsets[place] = factor, offset
@@ -92,7 +97,8 @@ class Signals:
         self._targets: dict[PortName, list[PortName]] = {}
         for connection in connections:
             self._targets.setdefault(connection.source, []).append(connection.target)
-        self._before: dict[int, float] = {}
+        # Of inputs that nothing feeds: what they would have, and what is done to it.
+        self._open: dict[int, tuple[float, float, float]] = {}
 
     def inputs(self, port: PortName) -> list[PortName]:
         """The inputs that a signal reaches: those that an output feeds, or an input alone."""
@@ -112,12 +118,34 @@ class Signals:
         self.override(target, float(self._row.values[self._row.columns[target]]))
 
     def release(self, target: PortName) -> None:
-        """Let an input take what feeds it, or what it had before."""
+        """Let an input take what feeds it, or what it would have."""
         column = self._row.columns[target]
         if column in self._fed:
             self._alter(target, *self._own[column])
-        elif column in self._before:
-            self._row.values[column] = self._before.pop(column)
+        elif column in self._open:
+            self._row.values[column], _, _ = self._open.pop(column)
+
+    def supply(self, target: PortName, value: float) -> None:
+        """Let an input that nothing feeds have a value, which is altered as one that is fed is."""
+        column = self._row.columns[target]
+        if column in self._open:
+            _, factor, offset = self._open[column]
+            self._open[column] = value, factor, offset
+            value = factor * value + offset
+        self._row.values[column] = value
+
+    def supplied(self, target: PortName) -> float:
+        """What an input has that nothing feeds, before it is altered."""
+        column = self._row.columns[target]
+        value, *_ = self._open.get(column, (float(self._row.values[column]),))
+        return value
+
+    def refresh(self, component: str) -> None:
+        """Let the inputs of a component take at once what feeds them."""
+        for target, column in self._row.columns.items():
+            if target.component == component and column in self._fed:
+                gathering, place = self._fed[column]
+                gathering.move(self._row.values, place)
 
     def state(self) -> dict[str, Any]:
         """What is done to them, as JSON has it."""
@@ -126,7 +154,7 @@ class Signals:
                 (column, float(gathering.factors[place]), float(gathering.offsets[place]))
                 for column, (gathering, place) in self._fed.items()
             ],
-            "before": list(self._before.items()),
+            "open": list(self._open.items()),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -134,7 +162,7 @@ class Signals:
         for column, factor, offset in state["fed"]:
             gathering, place = self._fed[column]
             gathering.set(place, factor, offset)
-        self._before = dict(state["before"])
+        self._open = {column: tuple(values) for column, values in state["open"]}
 
     def _alter(self, target: PortName, factor: float, offset: float) -> None:
         column, values = self._row.columns[target], self._row.values
@@ -142,5 +170,6 @@ class Signals:
             gathering, place = self._fed[column]
             gathering.set(place, factor, offset)
         else:
-            before = self._before.setdefault(column, float(values[column]))
-            values[column] = factor * before + offset
+            value = self.supplied(target)
+            self._open[column] = value, factor, offset
+            values[column] = factor * value + offset

@@ -73,7 +73,8 @@ def simulate(
             _initialise(system, instances, row, experiment, log)
             names = tuple(map(str, row.columns))
             parameters = _parameters(system, instances, log)
-            header = Header(names, experiment, parameters, loop.name)
+            texts = dict.fromkeys(map(str, row.text_ports), row.texts)
+            header = Header(names, experiment, parameters, loop.name, texts)
         scheduled = schedule(system, experiment, plan, instances, row)
         with _told(header, observers) as tell:
             blocks = Blocks(len(row.shown), observers)
@@ -81,12 +82,21 @@ def simulate(
             blocks.append(experiment.start_time, row.shown)
             signals = Signals(row, [stage.gather for stage in scheduled], system.connections)
             run = Run(
-                system, experiment, instances, row, scheduled, signals, blocks, log, interrupts
+                system,
+                experiment,
+                instances,
+                row,
+                scheduled,
+                signals,
+                blocks,
+                log,
+                interrupts,
+                attendants,
             )
             order = [name for names in plan for name in names]
             remark = None
             try:
-                failure = _advance(run, loop, Attendance(run, attendants), order)
+                failure = _advance(run, loop, Attendance(run), order)
             except NotKept as error:
                 # Rows that cannot be kept need not be computed.
                 failure = str(error)
@@ -94,7 +104,9 @@ def simulate(
                 failure, remark = None, str(end)
             if failure is None:
                 _terminate(instances)
-            ending = Ending(failure, remark, log.messages, tuple(interrupts.signals))
+            ending = Ending(
+                failure, remark, log.messages, tuple(interrupts.signals), tuple(run.happened)
+            )
             tell(ending)
         return ending
 
@@ -163,10 +175,9 @@ def _initialise(
 
     """
     for name, instance in instances.items():
-        instance.enter_initialization(
-            system.parameters_of(name), experiment.stop_time, experiment.start_time
-        )
-        row.enter(name, instance.read(system.open_inputs(name)))
+        instance.enter_initialization(system.parameters_of(name), experiment.start_time)
+        held = instance.read(system.open_inputs(name))
+        row.enter({PortName(name, port): value for port, value in held.items()})
     values = row.values
     gather = Gathering.along(row, system.connections)
     # Through a chain of all, once more for what its end feeds, and once to see it at rest.

@@ -83,7 +83,7 @@ class Table:
         return column == "time" or column in self._index
 
     def __getitem__(self, column: str) -> np.ndarray:
-        """The values of one column.
+        """The values of one column; those of a String are texts.
 
         Raises:
             KeyError: there is no such column; the text has a suggestion.
@@ -93,7 +93,10 @@ class Table:
             return self.time
         if column not in self._index:
             raise KeyError(f"no column {column!r}{did_you_mean(str(column), self._index)}")
-        return self.rows[:, self._index[column]]
+        values = self.rows[:, self._index[column]]
+        if column not in self.header.texts:
+            return values
+        return np.array([self.header.texts[column].text(number) for number in values])
 
     @property
     def rows(self) -> np.ndarray:

@@ -49,10 +49,13 @@ def typed(name: str, variable: ModelVariable, value: object) -> Value:
             return BOOLEANS[text.lower()]
         if type_of(variable) == "String":
             return _transferable(text)
+        if type_of(variable) == "Enumeration":
+            text = items_of(variable).get(text, text)
         number = real(text) if type_of(variable) == "Real" else int(_plain(text))
     except (KeyError, ValueError):
         # Python itself refuses to write and to read integers of very many digits.
-        kind = _KINDS.get(type_of(variable), "an integer")
+        items = ", ".join(items_of(variable))
+        kind = f"one of {items}" if items else _KINDS.get(type_of(variable), "an integer")
         raise InputError(f"{name}{shown}: not {kind}") from None
     if isinstance(number, float) and not isfinite(number):
         raise InputError(f"{name}{shown}: must be finite")
@@ -95,6 +98,12 @@ def _range(variable: ModelVariable) -> tuple[float | None, float | None]:
 def type_of(variable: ModelVariable) -> str:
     """The type of a variable, as FMI 2.0 calls it."""
     return _NAMES.get(variable.type, str(variable.type))
+
+
+def items_of(variable: ModelVariable) -> dict[str, str]:
+    """The values of an Enumeration by their names, as its description writes them."""
+    declared = variable.declaredType
+    return {} if declared is None else {item.name: item.value for item in declared.items}
 
 
 def literal(value: Value) -> str:

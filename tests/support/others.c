@@ -3,6 +3,8 @@
    y = gain u, and every other output is the input of its kind. What is peculiar about it says how
    it is compiled. */
 
+#include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,8 +23,8 @@ typedef struct {
     int integers[VARIABLES];
     int booleans[VARIABLES];
     char texts[VARIABLES][1000];
-    double time, step;
-    int asked;
+    double time, step, end;
+    int asked, steps;
     const char *name;
     const Callbacks *callbacks;
 } Instance;
@@ -42,6 +44,10 @@ Component fmi2Instantiate(const char *name, int type, const char *guid, const ch
 #endif
     Instance *it = calloc(1, sizeof *it);
     memcpy(it->reals, reals, sizeof reals);
+#ifdef REMEMBERS
+    static int before;
+    it->reals[GAIN] += before++;
+#endif
     strcpy(it->texts[U], "start");
     it->integers[U] = 1;
     it->name = strdup(name);
@@ -53,6 +59,7 @@ void fmi2FreeInstance(Component c) { free(c); }
 
 Status fmi2SetupExperiment(Component c, int tolerance, double t, double start, int stop, double end)
 {
+    ((Instance *)c)->end = stop ? end : HUGE_VAL;
     return OK;
 }
 
@@ -110,7 +117,12 @@ Status fmi2SetString(Component c, const unsigned *r, size_t n, const char *const
 Status fmi2GetString(Component c, const unsigned *r, size_t n, const char **values)
 {
     Instance *it = c;
-    strcpy(it->texts[Y], it->texts[U]);
+#ifdef SPEAKS
+    if (it->steps)
+        snprintf(it->texts[Y], sizeof it->texts[Y], "%s%d %s", it->name, it->steps, it->texts[U]);
+    else
+#endif
+        strcpy(it->texts[Y], it->texts[U]);
     for (size_t i = 0; i < n; i++)
         values[i] = it->texts[r[i]];
     return OK;
@@ -124,11 +136,14 @@ Status fmi2DoStep(Component c, double t, double h, int no_rollback)
     if (t + h > 0.5)
         return Discard;
 #endif
+    if (t + h > it->end)
+        return Error;
 #ifdef RIGID
     if (it->step && (h < 0.999 * it->step || h > 1.001 * it->step))
         return Error;
 #endif
     it->step = h;
+    it->steps++;
 #ifdef WAITS
     it->asked = 0;
     return PENDING;

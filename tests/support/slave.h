@@ -29,7 +29,9 @@ ABSENT(fmi2SetFMUstate)
 ABSENT(fmi2FreeFMUstate)
 ABSENT(fmi2SerializedFMUstateSize)
 ABSENT(fmi2SerializeFMUstate)
+#ifndef LACKS
 ABSENT(fmi2DeSerializeFMUstate)
+#endif
 ABSENT(fmi2GetDirectionalDerivative)
 ABSENT(fmi2SetRealInputDerivatives)
 ABSENT(fmi2GetRealOutputDerivatives)

@@ -13,6 +13,9 @@ from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from support.others import WAYS, build, run, system_of
 
+#: Outputs by the inputs that they repeat.
+_PASSED = {"u": "y", "mode": "mode_y", "on": "fault", "said": "heard"}
+
 EVERY_WAY = pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 
 
@@ -49,6 +52,32 @@ def test_an_input_that_nothing_feeds_keeps_what_the_fmu_begins_with(tmp_path, wa
 
 
 @EVERY_WAY
+def test_values_of_all_kinds_are_set_connected_and_recorded(tmp_path, way):
+    system = system_of(
+        build(tmp_path),
+        "ab",
+        {f"b.{target}": f"a.{source}" for target, source in _PASSED.items()},
+    )
+    values = {"u": 0.1, "mode": "storm", "on": True, "said": "Grüße, 1", "count": 7}
+    table = run(with_values(system, values), **way)
+    assert table["a.mode_y"][0] == 4.0
+    assert table["a.heard"].tolist() == ["Grüße, 1"] * 11
+    for name, value in (("y", 0.1), ("mode_y", 4.0), ("fault", 1.0), ("heard", "Grüße, 1")):
+        assert table[f"b.{name}"].tolist() == [value] * 11
+    assert table.parameters[PortName("a", "count")] == 7
+    assert table.ending.messages == ()
+
+
+@EVERY_WAY
+def test_texts_that_change_in_every_step_arrive(tmp_path, way):
+    """Each of two FMUs says the number of its steps, and hears the other's of the step before."""
+    wires = {"a.said": "b.heard", "b.said": "a.heard"}
+    table = run(system_of(build(tmp_path, "SPEAKS"), "ab", wires), **way)
+    assert table["a.heard"].tolist()[:4] == ["", "a1 ", "a2 b1 ", "a3 b2 a1 "]
+    assert table["b.heard"].tolist()[:4] == ["", "b1 ", "b2 a1 ", "b3 a2 b1 "]
+
+
+@EVERY_WAY
 def test_an_alarming_message_of_a_call_that_went_well_ends_nothing(tmp_path, way):
     """Nor does an output that happens to be called fault."""
     system = with_values(system_of(build(tmp_path, "CHATTERS")), {"on": True})
@@ -71,6 +100,26 @@ def test_a_second_instance_of_an_fmu_that_allows_one_gets_its_own_process(tmp_pa
         table = run(system, **way)
         assert table.failure is None
         assert (table["c.y"][2:] == 2.0).all()
+
+
+@pytest.mark.parametrize("way", [WAYS["python"], WAYS["compiled"]], ids=["python", "compiled"])
+def test_nothing_is_left_in_a_library_of_the_run_before(tmp_path, way):
+    """The gain of an instance is one, and one more for each that its library has had before."""
+    system = with_values(system_of(build(tmp_path, "REMEMBERS")), {"u": 2.0})
+    for _ in range(3):
+        assert (run(system, **way)["a.y"] == 2.0).all()
+
+
+def test_a_function_that_no_capability_asks_for_may_be_missing(tmp_path):
+    assert run(system_of(build(tmp_path, "LACKS"))).failure is None
+
+
+@EVERY_WAY
+def test_a_last_step_that_rounding_takes_beyond_the_stop_time_is_made(tmp_path, way):
+    """0.2 and 0.1 are more than 0.3, and the FMU makes no step beyond a stop time that it knows."""
+    table = run(system_of(build(tmp_path)), 0.3, 0.1, **way)
+    assert table.failure is None
+    assert table.time[-1] == 3 * 0.1
 
 
 def test_the_compiled_loop_gives_way_to_fmus_in_their_own_processes(tmp_path):

@@ -40,7 +40,7 @@ def ready(system: System, place: str) -> Iterator[tuple[Instance, Row]]:
         with manager as instances:
             row = Row(system, instances)
             ((name, instance),) = instances.items()
-            instance.enter_initialization(system.parameters_of(name), 1.0)
+            instance.enter_initialization(system.parameters_of(name))
             instance.exchange()
             instance.exit_initialization()
             yield instance, row

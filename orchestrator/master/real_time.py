@@ -59,7 +59,18 @@ class Lateness:
         return self._worst
 
 
-class Pace:
+def check_factor(factor: float) -> None:
+    """Check before a run that a clock can set its pace.
+
+    Raises:
+        InputError: it cannot.
+
+    """
+    if not (isfinite(factor) and factor > 0.0):
+        raise InputError(f"real time x {factor:g}: the factor must be positive and finite")
+
+
+class RealTime:
     """An attendant that makes a run wait for a clock, and measures by how much it is late.
 
     A run that is late makes up for it as fast as it can: times are those of one clock, from the
@@ -72,14 +83,7 @@ class Pace:
     """
 
     def __init__(self, factor: float) -> None:
-        """Run as many simulated seconds in a second.
-
-        Raises:
-            InputError: it is not positive and finite.
-
-        """
-        if not (isfinite(factor) and factor > 0.0):
-            raise InputError(f"real time times {factor:g}: the factor must be positive and finite")
+        """Run as many simulated seconds in a second."""
         self.factor = factor
         self.lateness = Lateness()
         self._origin: float | None = None
@@ -106,6 +110,16 @@ class Pace:
             sleep(min(left, _GLANCE))
         self.lateness.take(monotonic() - due)
 
+    def record(self) -> dict[str, float]:
+        """How well it went, for the record of the run [s]."""
+        late = self.lateness
+        return {
+            "factor": self.factor,
+            "late_mean": late.mean,
+            "late_percentile_99": late.percentile,
+            "late_worst": late.worst,
+        }
+
     def __str__(self) -> str:
         """How well it went, in words."""
         late = self.lateness
@@ -113,6 +127,6 @@ class Pace:
             f"{1e3 * seconds:.3g} ms" for seconds in (late.mean, late.percentile, late.worst)
         )
         return (
-            f"real time times {self.factor:g}: late by {mean} on average, by no more than "
-            f"{percentile} in {100 * _SHARE:g} % of the steps, by {worst} at worst"
+            f"real time x {self.factor:g}: late by {mean} on average, {percentile} at the 99th "
+            f"percentile, {worst} at worst"
         )
