@@ -83,7 +83,7 @@ class LoadedInstance:
         self._outputs: list[Block] = []
         self._variables = component.variables
         self._gives_state = component.gives_state
-        self._complaints = [
+        self._categories = [
             category.name
             for category in component.description.logCategories
             if category.name in _COMPLAINTS
@@ -192,7 +192,7 @@ class LoadedInstance:
         self._call("exitInitializationMode")
         if not runs_python(Path(self._fmu.unzipDirectory)):
             with suppress(FMICallException):
-                self._fmu.setDebugLogging(bool(self._complaints), self._complaints)
+                self._fmu.setDebugLogging(bool(self._categories), self._categories)
 
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""

@@ -254,7 +254,7 @@ def _advance(
                 attendance.attend()
             if monotonic() > blocks.due:
                 blocks.hand_over()
-            if run.interrupts:
+            if run.interrupts.signals:
                 failure = f"interrupted at t = {run.time:.12g} s"
                 break
     except ComponentFailed as error:

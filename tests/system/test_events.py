@@ -130,6 +130,19 @@ def test_without_events_nothing_is_different():
     np.testing.assert_array_equal(free.rows, held.rows)
 
 
+def test_a_component_with_longer_steps_hears_of_it_at_its_next_one():
+    """From the seventh to the eleventh instant; it takes inputs at even ones."""
+    plain, biased = (
+        simulate("fig4", stop_time=0.4, kind="native", steps={"controller": 0.04}, events=events)
+        for events in ([], [{"at": 0.14, "for": 0.08, "bias": {"controller.eta.psi": 0.1}}])
+    )
+    difference = biased["controller.eta.psi"] - plain["controller.eta.psi"]
+    # A row holds the inputs of the step that ends there, and the vehicle answers a step later.
+    np.testing.assert_array_equal(difference[:9], 0.0)
+    np.testing.assert_allclose(difference[9:13], 0.1, atol=1e-3)
+    np.testing.assert_allclose(difference[13:], 0.0, atol=1e-2)
+
+
 def test_a_run_is_replayed_from_its_table_bit_for_bit(tmp_path):
     """The vehicle alone, with a CSV of the inputs that it had in the loop."""
     loop = simulate("fig4", stop_time=2.0, kind="native")

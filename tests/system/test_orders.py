@@ -130,8 +130,8 @@ def test_a_ring_is_opened_before_its_first_component_and_one_line_says_so(folder
     assert stages(system, "gauss-seidel") == [["a"], ["b"], ["c"]]
     # What closes the ring is a step old, everything else is new.
     np.testing.assert_array_equal(table["a.u"][1:], table["c.g"][:-1])
-    np.testing.assert_array_equal(table["b.u"], table["a.g"])
-    np.testing.assert_array_equal(table["c.u"], table["b.g"])
+    np.testing.assert_array_equal(table["b.u"][1:], table["a.g"][1:])
+    np.testing.assert_array_equal(table["c.u"][1:], table["b.g"][1:])
 
 
 def test_a_ring_that_feeds_another_is_opened_first(folder):
