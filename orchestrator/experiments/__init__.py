@@ -6,6 +6,8 @@ module                    what it holds
 :mod:`.entries`           what a file of the user's may hold
 :mod:`.named`             files by name, those that come with the program
 :mod:`.scenario`          scenario files
+:mod:`.events`            what they say of events, read for a system
+:mod:`.inputs`            and of inputs that follow a table
 :mod:`.scenario_page`     their reference page
 :mod:`.wiring`            which FMUs there are, and which ports feed which
 :mod:`.bundle`            the FMUs and auv.ssp, built when missing or stale

@@ -17,6 +17,7 @@ from orchestrator.experiments.entries import (
     is_table,
     is_text,
 )
+from orchestrator.findings import Findings
 from orchestrator.master.events import (
     COMPARISONS,
     Action,
@@ -115,23 +116,30 @@ def check_events(where: object, tables: Sequence[Mapping[str, Any]]) -> None:
         InputError: an event is not written as one.
 
     """
+    findings = Findings()
     for number, table in enumerate(tables, start=1):
-        place = f"{where}: event {number}"
-        check_entries(place, table, ENTRIES)
-        if ("at" in table) == ("when" in table):
-            raise InputError(f"{place}: write when it happens: either at or when")
-        actions = [key for key in table if key in _ACTIONS]
-        if len(actions) != 1:
-            said = f"not {' and '.join(actions)}" if actions else f"one of {', '.join(_ACTIONS)}"
-            raise InputError(f"{place}: write one thing that it does, {said}")
-        for key, least in (("at", "not be negative"), ("for", "be positive")):
-            value = table.get(key, 1.0)
-            if not is_finite(value) or value < 0.0 or (key == "for" and value == 0.0):
-                raise InputError(f"{place}: {key} = {value}: must {least}, and finite")
-        if "for" in table and actions[0] in _AT_ONCE:
-            raise InputError(f"{place}: {actions[0]} has no duration: leave `for` out")
-        if "repeat" in table and "when" not in table:
-            raise InputError(f"{place}: repeat is for events with `when`")
+        with findings.collecting():
+            _check_event(f"{where}: event {number}", table)
+    findings.refuse()
+
+
+def _check_event(place: str, table: Mapping[str, Any]) -> None:
+    check_entries(place, table, ENTRIES)
+    if ("at" in table) == ("when" in table):
+        raise InputError(f"{place}: write when it happens: either at or when")
+    actions = [key for key in table if key in _ACTIONS]
+    if len(actions) != 1:
+        said = f"not {' and '.join(actions)}" if actions else f"one of {', '.join(_ACTIONS)}"
+        raise InputError(f"{place}: write one thing that it does, {said}")
+    for key in ("at", "for"):
+        if not is_finite(table.get(key, 1.0)):
+            raise InputError(f"{place}: {key} = {table[key]}: must be finite")
+    if table.get("for", 1.0) <= 0.0:
+        raise InputError(f"{place}: for = {table['for']}: must be positive")
+    if "for" in table and actions[0] in _AT_ONCE:
+        raise InputError(f"{place}: {actions[0]} has no duration: leave `for` out")
+    if "repeat" in table and "when" not in table:
+        raise InputError(f"{place}: repeat is for events with `when`")
 
 
 def read_events(
@@ -148,12 +156,13 @@ def read_events(
         InputError: an event cannot happen to this system.
 
     """
-    events = []
+    findings, events = Findings(), []
     for number, table in enumerate(tables, start=1):
         try:
             events.append(_event(table, system))
         except InputError as error:
-            raise InputError(f"{where}: event {number}: {error}") from error
+            findings.problem(f"{where}: event {number}: {error}")
+    findings.refuse()
     return tuple(events)
 
 
@@ -174,6 +183,9 @@ def shared_events(
 
 def _event(table: Mapping[str, Any], system: System) -> Event:
     [key] = [key for key in table if key in _ACTIONS]
+    start = system.start_time or 0.0
+    if table.get("at", start) < start:
+        raise InputError(f"at = {table['at']}: before the run begins, at {start:g} s")
     text = "stop" if key == "stop" else f"{key} {', '.join(_things(table[key]))}"
     return Event(
         text,
@@ -307,15 +319,7 @@ def _value(system: System, port: PortName, route: Connection | None, value: Any)
     """What an input takes where a signal is overridden."""
     variable = system.component(port.component).variable(port.port)
     number = float(typed(str(port), variable, _text(value)))
-    match route.transformation if route else None:
-        case Linear(factor, offset):
-            return factor * number + offset
-        case Mapped(pairs):
-            known = dict(pairs)
-            if number not in known:
-                raise InputError(f"{port} = {number:g}: nothing is mapped to it on its way")
-            return known[number]
-    return number
+    return route.transformation(number) if route and route.transformation else number
 
 
 def _offset(system: System, port: PortName, route: Connection | None, value: Any) -> float:
@@ -369,7 +373,10 @@ def _set(values: Mapping[str, Any], system: System) -> Action:
 
 
 def _reset(names: Any, system: System) -> Action:
-    return Reset(tuple(system.component(name).name for name in _things(names)))
+    for name in _things(names):
+        if system.steps.get(system.component(name).name, system.step) != system.step:
+            raise InputError(f"{name} takes longer steps of its own: it cannot begin in one")
+    return Reset(tuple(_things(names)))
 
 
 def _stop(value: bool, system: System) -> Action:

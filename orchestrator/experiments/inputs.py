@@ -19,9 +19,6 @@ from orchestrator.system.values import type_of, typed
 #: How a Real input goes from one row to the next; the first is the default.
 _WAYS = ("linear", "hold")
 
-#: When runs begin [s].
-_START = 0.0
-
 #: What `[inputs]` may hold.
 ENTRIES: dict[str, Entry] = {
     "file": Entry(
@@ -86,7 +83,8 @@ def read_inputs(
             _check_column(system, target, column)
         linear = [_is_linear(system, target, inputs.between) for target in targets]
         course = Course(targets, rows[:, 0], rows[:, 1:], np.array(linear))
-        values = map(_number, course.at(_START, int((course.times <= _START).sum()) - 1))
+        start = system.start_time or 0.0
+        values = map(_number, course.at(start, int((course.times <= start).sum()) - 1))
         return system.with_parameters(dict(zip(targets, values, strict=True))), course
     except InputError as error:
         raise InputError(f"{file}: {error}") from error

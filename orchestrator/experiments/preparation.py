@@ -230,7 +230,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     loop = chosen(request.loop, experiment, request.isolation)
     if request.real_time is not None:
         check_factor(request.real_time)
-    happening = read_events(scenario.name, events, system)
+    happening = read_events(scenario.name, events, replace(system, step=step))
     return Prepared(
         scenario,
         system,

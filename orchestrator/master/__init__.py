@@ -21,6 +21,8 @@ module                  what it holds
 :mod:`.schedule`        which components are stepped when, and on whose outputs
 :mod:`.signals`         what is done to values on their way from outputs to inputs
 :mod:`.attendant`       who acts on a run between two steps
+:mod:`.events`          what happens to a run: at a time, or at a condition
+:mod:`.playback`        inputs that follow a table
 :mod:`.checkpoint`      what a run needs to go on in another process
 :mod:`.spool`           rows in a file that grows, to be read again
 :mod:`.real_time`       a run that goes no faster than a clock

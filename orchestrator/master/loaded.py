@@ -45,8 +45,11 @@ from orchestrator.master.log import Listener
 from orchestrator.master.texts import Texts
 from orchestrator.master.transfer import Block, text_of
 from orchestrator.system.component import Component
-from orchestrator.system.unpacking import unpacked
+from orchestrator.system.unpacking import runs_python, unpacked
 from orchestrator.system.values import Value
+
+#: FMI's categories of messages about what goes wrong (FMI 2.0.4, section 2.2.4).
+_LOGGED = {f"logStatus{status}" for status in ("Warning", "Discard", "Error", "Fatal")}
 
 _DoStep: TypeAlias = Callable[[float, float, int], int]
 
@@ -80,6 +83,11 @@ class LoadedInstance:
         self._outputs: list[Block] = []
         self._variables = component.variables
         self._gives_state = component.gives_state
+        self._logged = [
+            category.name
+            for category in component.description.logCategories
+            if category.name in _LOGGED
+        ]
         self._library = library
         self._listener = listener
         self._complaints: deque[str] = deque(maxlen=_MOST_COMPLAINTS)
@@ -176,8 +184,15 @@ class LoadedInstance:
         self._set({port: v for port, v in values.items() if variables[port].initial == "exact"})
 
     def exit_initialization(self) -> None:
-        """Get ready for the first step."""
+        """Get ready for the first step, in which no FMU is to log more than what goes wrong.
+
+        To log every step may take longer than the step. PythonFMU, which logs nothing on its own,
+        gives the reasons of a failure no category.
+        """
         self._call("exitInitializationMode")
+        if not runs_python(Path(self._fmu.unzipDirectory)):
+            with suppress(FMICallException):
+                self._fmu.setDebugLogging(bool(self._logged), self._logged)
 
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""

@@ -44,27 +44,38 @@ class Member(NamedTuple):
     instance: Instance
 
 
+class Pace(NamedTuple):
+    """When a slow component is stepped, or what it has computed is shown.
+
+    Attributes:
+        every: how many communication steps one of its own takes.
+        at_end: whether in the last of them, not in the first.
+
+    """
+
+    every: int
+    at_end: bool = False
+
+    def is_due(self, k: int, steps: int) -> bool:
+        """Whether in the communication step behind the k-th of so many."""
+        if self.at_end:
+            return (k + 1) % self.every == 0 or k + 1 == steps
+        return k % self.every == 0
+
+
 class Stage(NamedTuple):
     """Inputs to gather, and the components to step then.
 
     Attributes:
         gather: moves values within the row.
         members: the components.
-        every: how many communication steps their own takes; others leave the stage out.
-        at_end: whether it belongs to the last of these steps, not to the first.
+        pace: in which communication steps; None: in all of them.
 
     """
 
     gather: Gathering
     members: list[Member]
-    every: int = 1
-    at_end: bool = False
-
-    def is_due(self, k: int, steps: int) -> bool:
-        """Whether it belongs to the communication step behind the k-th of so many."""
-        if self.at_end:
-            return (k + 1) % self.every == 0 or k + 1 == steps
-        return k % self.every == 0
+    pace: Pace | None = None
 
 
 def stages(system: System, order: Order) -> list[list[str]]:
@@ -158,7 +169,8 @@ def schedule(
             [member(instances[name]) for name in names if pace[name] == 1],
         )
         # All inputs are gathered before anybody is stepped.
-        found += [Stage(Gathering.along(row, some), [], n) for n, some in taken.items()] + [fast]
+        found += [Stage(Gathering.along(row, some), [], Pace(n)) for n, some in taken.items()]
+        found.append(fast)
         for name in names:
             if (n := pace[name]) > 1:
                 nothing = Gathering.along(row, ())
@@ -166,8 +178,11 @@ def schedule(
                     Gathering(*row.hidden(ports))
                     for ports in _shown(system.components[name], experiment.order)
                 )
-                found += [Stage(nothing, [member(instances[name])], n), Stage(early, [], n)]
-                shown.append(Stage(later, [], n, at_end=True))
+                found += [
+                    Stage(nothing, [member(instances[name])], Pace(n)),
+                    Stage(early, [], Pace(n)),
+                ]
+                shown.append(Stage(later, [], Pace(n, at_end=True)))
     return [stage for stage in found + shown if stage.members or len(stage.gather.targets)]
 
 

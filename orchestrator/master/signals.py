@@ -42,8 +42,7 @@ class Gathering:
         for place, connection in enumerate(connections):
             match connection.transformation:
                 case Linear(factor, offset):
-                    # What is added to minus zero stays what it is.
-                    gathering.set(place, factor, offset or OFFSET)
+                    gathering.set(place, factor, offset)
                 case Mapped(pairs):
                     gathering.mapped[place] = dict(pairs)
                     gathering.is_plain = False
@@ -61,8 +60,9 @@ class Gathering:
 
     def move(self, values: np.ndarray, place: int) -> None:
         """Move one of the values."""
-        source = values[self.sources[place]]
-        values[self.targets[place]] = self.factors[place] * source + self.offsets[place]
+        taken = values[self.sources[place]]
+        taken = self.mapped.get(place, {}).get(taken, taken)
+        values[self.targets[place]] = self.factors[place] * taken + self.offsets[place]
 
     def set(self, place: int, factor: float, offset: float) -> None:
         """Say what is done to one of the values."""
@@ -95,15 +95,9 @@ class Signals:
             place: (float(gathering.factors[at]), float(gathering.offsets[at]))
             for place, (gathering, at) in self._fed.items()
         }
-        self._targets: dict[PortName, list[PortName]] = {}
-        for connection in connections:
-            self._targets.setdefault(connection.source, []).append(connection.target)
+        self._targets = [connection.target for connection in connections]
         # Of inputs that nothing feeds: what they would have, and what is done to it.
         self._open: dict[int, tuple[float, float, float]] = {}
-
-    def inputs(self, port: PortName) -> list[PortName]:
-        """The inputs that a signal reaches: those that an output feeds, or an input alone."""
-        return self._targets.get(port, [port])
 
     def override(self, target: PortName, value: float) -> None:
         """Let an input take a value, whatever feeds it."""
@@ -113,10 +107,6 @@ class Signals:
         """Let an input take the value that it would take, and something more."""
         factor, own = self._own.get(self._row.columns[target], (FACTOR, OFFSET))
         self._alter(target, factor, own + offset)
-
-    def freeze(self, target: PortName) -> None:
-        """Let an input keep the value that it has."""
-        self.override(target, float(self._row.values[self._row.columns[target]]))
 
     def release(self, target: PortName) -> None:
         """Let an input take what feeds it, or what it would have."""
@@ -143,9 +133,9 @@ class Signals:
 
     def refresh(self, component: str) -> None:
         """Let the inputs of a component take at once what feeds them."""
-        for target, column in self._row.columns.items():
-            if target.component == component and column in self._fed:
-                gathering, place = self._fed[column]
+        for target in self._targets:
+            if target.component == component:
+                gathering, place = self._fed[self._row.columns[target]]
                 gathering.move(self._row.values, place)
 
     def state(self) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
+from math import lcm
 from time import monotonic
 
 import numpy as np
@@ -133,12 +134,16 @@ def _whole_steps(system: System, experiment: Experiment, log: Log) -> Experiment
 
     """
     rigid = [name for name, component in system.components.items() if not component.takes_any_step]
-    if not (rigid and experiment.has_short_step):
+    pace = paces(system, experiment.step)
+    period = lcm(*(pace[name] for name in rigid))
+    whole = experiment.full_steps // period * period
+    if not rigid or whole == experiment.rows - 1:
         return experiment
     why = f"{', '.join(rigid)}: takes steps of one length alone, so"
-    if experiment.full_steps == 0:
-        raise InputError(f"{why} the stop time must be at least one step, {experiment.step:g} s")
-    end = experiment.time(experiment.full_steps)
+    if whole == 0:
+        shortest = period * experiment.step
+        raise InputError(f"{why} the run must last at least one step, {shortest:g} s")
+    end = experiment.time(whole)
     log.remark(f"{why} the run ends with the last whole step, at t = {end:.12g} s")
     return replace(experiment, stop_time=end)
 
@@ -249,7 +254,7 @@ def _advance(
                 attendance.attend()
             if monotonic() > blocks.due:
                 blocks.hand_over()
-            if run.interrupts:
+            if run.interrupts.signals:
                 failure = f"interrupted at t = {run.time:.12g} s"
                 break
     except ComponentFailed as error:

@@ -8,7 +8,7 @@ from ctypes import CDLL, POINTER, c_double, c_int, c_size_t
 from orchestrator.master import layout
 from orchestrator.master.attendant import Run
 from orchestrator.master.instance import CALLS
-from orchestrator.master.schedule import Stage
+from orchestrator.master.schedule import Pace, Stage
 
 #: Longest time until Python looks whether somebody wants the run to stop [s].
 _GLANCE = 0.02
@@ -60,8 +60,7 @@ def _laid_out(stage: Stage) -> layout.Stage:
         len(gather.targets),
         len(mappings),
         len(members),
-        stage.every,
-        stage.at_end,
+        *(stage.pace or Pace(1)),
     )
 
 

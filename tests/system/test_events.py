@@ -15,9 +15,10 @@ import pytest
 from auv_fmu import closed_loop as line
 from auv_fmu import plant
 from auv_fmu.closed_loop import LAWS, PAPER, Setting
-from orchestrator import simulate
+from orchestrator import load, simulate
 from orchestrator.analysis.signals import tracking_error
 from orchestrator.commands.main import main
+from orchestrator.errors import InputError
 from orchestrator.experiments.preparation import Request, loaded, prepare, with_companion
 from orchestrator.experiments.scenario import read_scenario
 from orchestrator.master.experiment import ORDERS
@@ -130,6 +131,19 @@ def test_without_events_nothing_is_different():
     np.testing.assert_array_equal(free.rows, held.rows)
 
 
+def test_a_component_with_longer_steps_hears_of_it_at_its_next_one():
+    """From the seventh to the eleventh instant; it takes inputs at even ones."""
+    plain, biased = (
+        simulate("fig4", stop_time=0.4, kind="native", steps={"controller": 0.04}, events=events)
+        for events in ([], [{"at": 0.14, "for": 0.08, "bias": {"controller.eta.psi": 0.1}}])
+    )
+    difference = biased["controller.eta.psi"] - plain["controller.eta.psi"]
+    # A row holds the inputs of the step that ends there, and the vehicle answers a step later.
+    np.testing.assert_array_equal(difference[:9], 0.0)
+    np.testing.assert_allclose(difference[9:13], 0.1, atol=1e-3)
+    np.testing.assert_allclose(difference[13:], 0.0, atol=1e-2)
+
+
 def test_a_run_is_replayed_from_its_table_bit_for_bit(tmp_path):
     """The vehicle alone, with a CSV of the inputs that it had in the loop."""
     loop = simulate("fig4", stop_time=2.0, kind="native")
@@ -199,6 +213,16 @@ def test_a_run_that_an_event_stops_has_not_failed(workplace: Path, capsys):
     with Path("results/fig4/result.csv").open(encoding="utf-8") as table:
         x = [float(row["plant.eta.x"]) for row in csv.DictReader(table)]
     assert x[-1] < 1.9 <= min(x[:-1])
+
+
+def test_what_a_system_has_not_is_said_where_it_goes_without(workplace: Path, capsys):
+    left = "fault-sensor: the system comes without the scenario's events"
+    assert main(["export", "fault-sensor", "--kind", "native"]) == 0
+    assert f"auv-fmu: warning: {left}" in capsys.readouterr().err.splitlines()
+    with pytest.warns(UserWarning, match=left):
+        load("fault-sensor", "native")
+    with pytest.raises(InputError, match=left):
+        load("fault-sensor", "native", strict=True)
 
 
 # What is said of the scenarios

@@ -60,7 +60,21 @@ def variation(result: Table) -> float:
 
 def test_all_figures_are_there():
     assert names() == sorted(
-        ["fig3a", "fig3b", "fig4", "fig5", "fig5-pd", "fig6", "fig6-pd", "fig7a", "fig7b", "fig7c"]
+        [
+            "fig3a",
+            "fig3b",
+            "fig4",
+            "fig5",
+            "fig5-pd",
+            "fig6",
+            "fig6-pd",
+            "fig7a",
+            "fig7b",
+            "fig7c",
+            "fault-sensor",
+            "fault-thruster",
+            "current-step",
+        ]
     )
 
 

@@ -68,8 +68,7 @@ def test_what_is_overridden_is_transformed_as_the_signal_is(system):
     assert through(degrees, bias={str(target): 2.0}) == Alter("bias", ((target, 2.0),))
     mapped = Mapped(((0.0, 7.0), (1.0, 5.0)))
     assert through(mapped, override={name: 1.0}) == Alter("override", ((target, 5.0),))
-    with pytest.raises(InputError, match="nothing is mapped to it"):
-        through(mapped, override={name: 2.0})
+    assert through(mapped, override={name: 2.0}) == Alter("override", ((target, 2.0),))
     with pytest.raises(InputError, match="nothing can be added"):
         through(mapped, bias={name: 2.0})
 
@@ -81,7 +80,7 @@ def test_what_is_overridden_is_transformed_as_the_signal_is(system):
         ({"at": 1.0, "when": "plant.eta.z > 1", "lose": "plant.tau.u"}, "either at or when"),
         ({"at": 1.0}, "one of set, override"),
         ({"at": 1.0, "lose": "a.b", "drop": "a.b"}, "not lose and drop"),
-        ({"at": -1.0, "stop": True}, "at = -1.0: must not be negative"),
+        ({"at": -1.0, "stop": True}, "at = -1.0: before the run begins, at 0 s"),
         ({"at": float("nan"), "stop": True}, "finite"),
         ({"at": 1.0, "lose": "plant.tau.u", "for": 0.0}, "for = 0.0: must be positive"),
         ({"at": 1.0, "stop": True, "for": 1.0}, "stop has no duration"),

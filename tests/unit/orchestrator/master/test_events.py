@@ -52,8 +52,8 @@ class Component:
     def reset(self):
         self.asked.append("reset")
 
-    def enter_initialization(self, values, stop_time, start_time):
-        self.asked.append(("enter", values, stop_time, start_time))
+    def enter_initialization(self, values, start_time):
+        self.asked.append(("enter", values, start_time))
 
     def exchange(self):
         self.asked.append("exchange")
@@ -74,7 +74,7 @@ class Trial:
             places=lambda ws: np.array([[columns[w.target], columns[w.source]] for w in ws]).T,
         )
         wires = (Connection(OUT, FED),)
-        self.gather = Gathering(self.row, wires)
+        self.gather = Gathering.along(self.row, wires)
         self.run = SimpleNamespace(
             row=self.row,
             signals=Signals(self.row, [self.gather], wires),
@@ -200,7 +200,7 @@ def test_a_parameter_that_is_not_taken_ends_the_run():
 def test_a_component_begins_anew_with_the_parameters_that_it_has():
     _, trial = seen([event(Set(((GAIN, 3.0),), ()), at=1.0), event(Reset(("a",)), at=2.0)])
     values = {"gain": 3.0, "other": 2.0}
-    entered = ("enter", values, EXPERIMENT.stop_time, 2.0)
+    entered = ("enter", values, 2.0)
     assert trial.component.asked == ["reset", entered, "exchange", "exit", "exchange"]
 
 
