@@ -109,7 +109,7 @@ def check_binary(component: Component, folder: Path) -> None:
     file = f"{identifier}{fmpy.sharedLibraryExtension}"
     if (binaries / fmpy.platform / file).is_file():
         return
-    others = sorted(path.parent.name for path in binaries.glob(f"*/{glob.escape(identifier)}.*"))
+    others = sorted({path.parent.name for path in binaries.glob(f"*/{glob.escape(identifier)}.*")})
     there = f"binaries for {', '.join(others)} alone" if others else "no binaries at all"
     raise InputError(
         f"{named(component)} has no {file} for this machine, {fmpy.platform}: it has {there}"
