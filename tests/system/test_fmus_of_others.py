@@ -170,9 +170,7 @@ def test_an_fmu_that_takes_steps_of_one_length_gets_no_other(tmp_path, way):
         "t = 0.9 s",
     )
     assert run(system, 0.9, 0.3, **way).ending.messages == ()
-    with pytest.raises(
-        InputError, match="a: takes steps of one length alone, so the run"
-    ):
+    with pytest.raises(InputError, match="a: takes steps of one length alone, so the run"):
         run(system, 0.2, 0.3, **way)
 
 
