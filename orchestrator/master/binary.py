@@ -18,8 +18,8 @@ from orchestrator.errors import InputError, reason
 from orchestrator.system.component import Component
 from orchestrator.system.unpacking import check_place, runs_python
 
-#: The tool that makes libraries in which nothing is left of an instance.
-_CLEAN = "auv-fmu "
+#: How this program names itself in descriptions of FMUs.
+_OWN = "auv-fmu "
 
 #: What only FMUs with some capability need, and some of the others lack.
 _OPTIONAL = ("FMUstate", "Derivative", "Status", "CancelStep", "DebugLogging")
@@ -62,6 +62,8 @@ class Library:
         fmu: fmpy's view of it.
         corrupted: whether one of them has ended with fmi2Fatal: FMI then forbids every further
             call, also for the others, even to free them.
+        is_akin: whether it is made by this program or PythonFMU: nothing is left in it of an
+            instance, and of each step that it refuses it says that it wants to terminate.
         users: how many there are.
 
     """
@@ -86,6 +88,8 @@ class Library:
                 )
         except Exception as error:
             raise InputError(f"{named(component)} cannot be loaded: {reason(error)}") from error
+        tool = component.description.generationTool or ""
+        self.is_akin = tool.startswith(_OWN) or runs_python(folder)
         self.corrupted, self.users = False, 0
 
 
@@ -121,7 +125,7 @@ def library_of(component: Component, folder: Path) -> Iterator[Library]:
     """The library of an unpacked FMU, for one more instance of it.
 
     Many libraries hold something of the instances that they have had: each is unloaded with its
-    last one, but for those that are known to be clean.
+    last one, but for those of which it is known that they do not.
 
     Raises:
         InputError: it cannot be loaded.
@@ -141,14 +145,9 @@ def library_of(component: Component, folder: Path) -> Iterator[Library]:
     finally:
         with _LOCK:
             library.users -= 1
-            if not (library.users or library.corrupted or _is_clean(component, folder)):
+            if not (library.users or library.corrupted or library.is_akin):
                 del _libraries[folder]
                 library.fmu.freeLibrary()
-
-
-def _is_clean(component: Component, folder: Path) -> bool:
-    tool = component.description.generationTool or ""
-    return tool.startswith(_CLEAN) or runs_python(folder)
 
 
 def _copied(folder: Path) -> Path:

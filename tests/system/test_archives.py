@@ -91,7 +91,7 @@ def test_entities_of_a_description_reach_no_file(dist: Path, tmp_path: Path):
     [
         ('modelIdentifier="AuvPlant"', 'modelIdentifier="../x"', "names no library"),
         ('name="eta.y"', 'name="eta.x"', "is not unique"),
-        ('fmiVersion="2.0"', 'fmiVersion="7"', "Unsupported FMI version"),
+        ('fmiVersion="2.0"', 'fmiVersion="7"', "is of FMI 7; only FMUs of FMI 2.0"),
     ],
 )
 def test_description_that_cannot_be_meant_is_refused(dist, tmp_path, old, new, why):
