@@ -49,7 +49,7 @@ from orchestrator.system.unpacking import runs_python, unpacked
 from orchestrator.system.values import Value
 
 #: FMI's categories of messages about what goes wrong (FMI 2.0.4, section 2.2.4).
-_COMPLAINTS = {f"logStatus{status}" for status in ("Warning", "Discard", "Error", "Fatal")}
+_LOGGED = {f"logStatus{status}" for status in ("Warning", "Discard", "Error", "Fatal")}
 
 _DoStep: TypeAlias = Callable[[float, float, int], int]
 
@@ -83,10 +83,10 @@ class LoadedInstance:
         self._outputs: list[Block] = []
         self._variables = component.variables
         self._gives_state = component.gives_state
-        self._categories = [
+        self._logged = [
             category.name
             for category in component.description.logCategories
-            if category.name in _COMPLAINTS
+            if category.name in _LOGGED
         ]
         self._library = library
         self._listener = listener
@@ -192,7 +192,7 @@ class LoadedInstance:
         self._call("exitInitializationMode")
         if not runs_python(Path(self._fmu.unzipDirectory)):
             with suppress(FMICallException):
-                self._fmu.setDebugLogging(bool(self._categories), self._categories)
+                self._fmu.setDebugLogging(bool(self._logged), self._logged)
 
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""

@@ -15,9 +15,10 @@ import pytest
 from auv_fmu import closed_loop as line
 from auv_fmu import plant
 from auv_fmu.closed_loop import LAWS, PAPER, Setting
-from orchestrator import simulate
+from orchestrator import load, simulate
 from orchestrator.analysis.signals import tracking_error
 from orchestrator.commands.main import main
+from orchestrator.errors import InputError
 from orchestrator.experiments.preparation import Request, loaded, prepare, with_companion
 from orchestrator.experiments.scenario import read_scenario
 from orchestrator.master.experiment import ORDERS
@@ -212,6 +213,16 @@ def test_a_run_that_an_event_stops_has_not_failed(workplace: Path, capsys):
     with Path("results/fig4/result.csv").open(encoding="utf-8") as table:
         x = [float(row["plant.eta.x"]) for row in csv.DictReader(table)]
     assert x[-1] < 1.9 <= min(x[:-1])
+
+
+def test_what_a_system_has_not_is_said_where_it_goes_without(workplace: Path, capsys):
+    left = "fault-sensor: the system comes without the scenario's events"
+    assert main(["export", "fault-sensor", "--kind", "native"]) == 0
+    assert f"auv-fmu: warning: {left}" in capsys.readouterr().err.splitlines()
+    with pytest.warns(UserWarning, match=left):
+        load("fault-sensor", "native")
+    with pytest.raises(InputError, match=left):
+        load("fault-sensor", "native", strict=True)
 
 
 # What is said of the scenarios

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from orchestrator.commands.main import main
 from orchestrator.errors import InputError
+from orchestrator.experiments.stored import read_result
 from orchestrator.findings import Findings
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
+from orchestrator.system.ssp.writing import write_ssp
 from support.others import WAYS, build, run, system_of
 
 #: Outputs by the inputs that they repeat.
@@ -66,6 +70,24 @@ def test_values_of_all_kinds_are_set_connected_and_recorded(tmp_path, way):
         assert table[f"b.{name}"].tolist() == [value] * 11
     assert table.parameters[PortName("a", "count")] == 7
     assert table.ending.messages == ()
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_files_hold_texts_and_give_the_numbers_beside_them_again(workplace, form):
+    """Also where a text has commas, quotes and lines of its own."""
+    said = 'one, "two"\nthree'
+    [archive] = write_ssp(with_values(system_of(build(workplace)), {"said": said}), workplace)
+    if form == "parquet":
+        pytest.importorskip("pyarrow")
+    command = f"run {archive} --stop-time 0.3 --step 0.1 --no-figures --out r --format {form}"
+    assert main(command.split()) == 0
+    if form == "csv":
+        with Path("r", "result.csv").open(newline="", encoding="utf-8") as file:
+            names, *rows = csv.reader(file)
+        assert [row[names.index("a.heard")] for row in rows] == [said] * 4
+    _, table = read_result(Path("r"))
+    assert (table["a.y"] == 101325.0).all()
+    assert "a.heard" not in table
 
 
 @EVERY_WAY
@@ -148,7 +170,9 @@ def test_an_fmu_that_takes_steps_of_one_length_gets_no_other(tmp_path, way):
         "t = 0.9 s",
     )
     assert run(system, 0.9, 0.3, **way).ending.messages == ()
-    with pytest.raises(InputError, match="a: takes steps of one length alone, so the stop time"):
+    with pytest.raises(
+        InputError, match="a: takes steps of one length alone, so the run must last"
+    ):
         run(system, 0.2, 0.3, **way)
 
 
