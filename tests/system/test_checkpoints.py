@@ -243,6 +243,24 @@ def test_what_would_be_lost_or_was_damaged_is_refused(left, capsys):
     assert "r/checkpoint/state.json: no checkpoint" in capsys.readouterr().err
 
 
+def test_rows_that_are_not_what_they_were_are_told(left, capsys):
+    """As if the process had come two steps beyond its checkpoint, the second with other noise."""
+    whole = simulate("fig4", stop_time=1.0)
+    behind = whole.rows[16:18].copy()
+    behind[1, 1 + whole.columns.index("plant.y.x")] += 1e-3
+    with Path("r/checkpoint/rows.bin").open("r+b") as file:
+        file.seek(16 * behind[0].nbytes)
+        file.write(behind.tobytes())
+        file.truncate()
+    assert run(*LEFT, "--resume", out="r") == 0
+    assert capsys.readouterr().err.splitlines() == [
+        "auv-fmu: fig4: goes on at t = 0.3 s",
+        "auv-fmu: plant.y.x is not what it was at t = 0.34 s before the run was resumed: an FMU "
+        "does not restore all of its state",
+    ]
+    assert Path("r/result.csv").read_text().count("\n") == 52
+
+
 def test_what_makes_no_sense_is_refused(capsys):
     for options, words in (
         (["--resume"], "there is nothing to resume in r/checkpoint"),
