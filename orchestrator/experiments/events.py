@@ -17,6 +17,7 @@ from orchestrator.experiments.entries import (
     is_table,
     is_text,
 )
+from orchestrator.findings import Findings
 from orchestrator.master.events import (
     COMPARISONS,
     Action,
@@ -115,24 +116,30 @@ def check_events(where: object, tables: Sequence[Mapping[str, Any]]) -> None:
         InputError: an event is not written as one.
 
     """
+    findings = Findings()
     for number, table in enumerate(tables, start=1):
-        place = f"{where}: event {number}"
-        check_entries(place, table, ENTRIES)
-        if ("at" in table) == ("when" in table):
-            raise InputError(f"{place}: write when it happens: either at or when")
-        actions = [key for key in table if key in _ACTIONS]
-        if len(actions) != 1:
-            said = f"not {' and '.join(actions)}" if actions else f"one of {', '.join(_ACTIONS)}"
-            raise InputError(f"{place}: write one thing that it does, {said}")
-        for key in ("at", "for"):
-            if not is_finite(table.get(key, 1.0)):
-                raise InputError(f"{place}: {key} = {table[key]}: must be finite")
-        if table.get("for", 1.0) <= 0.0:
-            raise InputError(f"{place}: for = {table['for']}: must be positive")
-        if "for" in table and actions[0] in _AT_ONCE:
-            raise InputError(f"{place}: {actions[0]} has no duration: leave `for` out")
-        if "repeat" in table and "when" not in table:
-            raise InputError(f"{place}: repeat is for events with `when`")
+        with findings.collecting():
+            _check_event(f"{where}: event {number}", table)
+    findings.refuse()
+
+
+def _check_event(place: str, table: Mapping[str, Any]) -> None:
+    check_entries(place, table, ENTRIES)
+    if ("at" in table) == ("when" in table):
+        raise InputError(f"{place}: write when it happens: either at or when")
+    actions = [key for key in table if key in _ACTIONS]
+    if len(actions) != 1:
+        said = f"not {' and '.join(actions)}" if actions else f"one of {', '.join(_ACTIONS)}"
+        raise InputError(f"{place}: write one thing that it does, {said}")
+    for key in ("at", "for"):
+        if not is_finite(table.get(key, 1.0)):
+            raise InputError(f"{place}: {key} = {table[key]}: must be finite")
+    if table.get("for", 1.0) <= 0.0:
+        raise InputError(f"{place}: for = {table['for']}: must be positive")
+    if "for" in table and actions[0] in _AT_ONCE:
+        raise InputError(f"{place}: {actions[0]} has no duration: leave `for` out")
+    if "repeat" in table and "when" not in table:
+        raise InputError(f"{place}: repeat is for events with `when`")
 
 
 def read_events(
@@ -149,12 +156,13 @@ def read_events(
         InputError: an event cannot happen to this system.
 
     """
-    events = []
+    findings, events = Findings(), []
     for number, table in enumerate(tables, start=1):
         try:
             events.append(_event(table, system))
         except InputError as error:
-            raise InputError(f"{where}: event {number}: {error}") from error
+            findings.problem(f"{where}: event {number}: {error}")
+    findings.refuse()
     return tuple(events)
 
 

@@ -76,14 +76,13 @@ class Library:
 
         """
         check_place(folder)
-        identifier = component.description.coSimulation.modelIdentifier
-        _check_binary(component, folder / "binaries", identifier)
+        check_binary(component, folder)
         try:
             # fmpy changes the current folder meanwhile, and leaves it so if it fails.
             with chdir(Path.cwd()):
                 self.fmu = FMU2OfOthers(
                     guid=component.description.guid,
-                    modelIdentifier=identifier,
+                    modelIdentifier=component.description.coSimulation.modelIdentifier,
                     unzipDirectory=str(folder),
                 )
         except Exception as error:
@@ -98,13 +97,15 @@ def named(component: Component) -> str:
     return f"{component.name}: {component.fmu.name}"
 
 
-def _check_binary(component: Component, binaries: Path, identifier: str) -> None:
-    """Check that an FMU has a library for this machine.
+def check_binary(component: Component, folder: Path) -> None:
+    """Check that an FMU, unpacked into a folder, has a library for this machine.
 
     Raises:
         InputError: it has none.
 
     """
+    binaries = folder / "binaries"
+    identifier = component.description.coSimulation.modelIdentifier
     file = f"{identifier}{fmpy.sharedLibraryExtension}"
     if (binaries / fmpy.platform / file).is_file():
         return

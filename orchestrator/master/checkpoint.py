@@ -23,6 +23,7 @@ import numpy as np
 
 from orchestrator.errors import InputError, reason
 from orchestrator.master.attendant import Lasting, Run
+from orchestrator.master.log import Log
 from orchestrator.master.observer import Ending, Header, NotKept
 from orchestrator.master.spool import Spool
 from orchestrator.system.atomic import whole
@@ -117,11 +118,13 @@ class Checkpoints:
                     f"{folder} is of another run: {', '.join(different)} differ; run what it was "
                     "made by, or delete it to begin anew"
                 )
+        self._log: Log | None = None
         self.time: float | None = None if self._found is None else self._found.time
 
     def begin(self, header: Header) -> None:
         """Open the file of rows."""
         self.folder.mkdir(parents=True, exist_ok=True)
+        self._columns = ("time", *header.columns)
         self._known = 0 if self._found is None else self._found.made + 1
         self._spool = Spool(self.folder / _ROWS, 1 + len(header.columns), self._known)
 
@@ -129,7 +132,13 @@ class Checkpoints:
         """Write some rows, but for those that are told again."""
         again = min(self._known, len(rows))
         self._known -= again
-        self._spool.append(rows[again:])
+        new = rows[again:]
+        if (different := self._spool.append(new)) and self._log is not None:
+            row, column = different
+            self._log.remark(
+                f"{self._columns[column]} is not what it was at t = {new[row, 0]:g} s before the "
+                "run was resumed: an FMU does not restore all of its state"
+            )
 
     def end(self, ending: Ending) -> None:
         """Close the file of rows."""
@@ -137,6 +146,7 @@ class Checkpoints:
 
     def attend(self, run: Run) -> int:
         """Write a checkpoint, or begin with one."""
+        self._log = run.log
         if self._found is not None:
             self._resume(run, self._found)
             self._found = None

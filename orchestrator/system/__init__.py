@@ -16,6 +16,7 @@ module                  what it holds
 :mod:`.children`        modules run in processes that do not outlive this one
 :mod:`.unpacking`       archives unpacked, once a process and version
 :mod:`.ssp`             systems as SSP 1.0 archives, read and written
+:mod:`.examination`     an FMU examined without loading it
 :mod:`.osp`             systems as libcosim's own configuration
 :mod:`.container`       a system as one FMU
 ======================  ==============================================================

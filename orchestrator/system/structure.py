@@ -149,7 +149,8 @@ class System:
             raise InputError(problem)
 
     def problems(self) -> Iterator[str]:
-        """All that is wrong with connections and parameters, a line each."""
+        """All that is wrong with names, connections and parameters, a line each."""
+        yield from self._ambiguous()
         fed: dict[PortName, PortName] = {}
         for connection in self.connections:
             try:
@@ -175,6 +176,16 @@ class System:
                 yield f"{target} is fed by {fed[target]} and cannot be set"
             if not settable:
                 yield f"{target} is of causality {causality} and cannot be set"
+
+    def _ambiguous(self) -> Iterator[str]:
+        """Names that two ports have: of a component, and of one whose name is a part of its own."""
+        for name, component in self.components.items():
+            for outer, rest in splits(name):
+                if outer in self.components:
+                    others = self.components[outer].variables
+                    for port in component.variables:
+                        if f"{rest}.{port}" in others:
+                            yield f"two ports are named {name}.{port}"
 
     def _check_connection(self, connection: Connection) -> None:
         source, target = connection.source, connection.target

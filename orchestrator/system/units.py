@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import isfinite
 from typing import Any
 
 from orchestrator.errors import InputError
@@ -86,6 +87,8 @@ def conversion(source: Unit | None, target: Unit | None) -> Linear | None:
             raise UndefinedUnit(
                 f"units differ, {source.name} and {target.name}, and nothing defines {unit.name}"
             )
+        if not (isfinite(unit.factor) and isfinite(unit.offset) and unit.factor):
+            raise InputError(f"unit {unit.name} has the factor {unit.factor:g}")
     if source.exponents != target.exponents:
         raise InputError(f"units differ, {source.name} and {target.name}")
     if (source.factor, source.offset) == (target.factor, target.offset):

@@ -4,8 +4,11 @@
 module                    what it does
 ========================  ============================================================
 :mod:`.document`          a file of an archive as elements, leniently
+:mod:`.validation`        files held against the schemas of the standard
 :mod:`.archive`           an archive: its files, and what is wrong with it
+:mod:`.definitions`       units and enumerations of a file
 :mod:`.hierarchy`         systems in systems, their components and connectors
+:mod:`.building`          these, from the elements of a file
 :mod:`.transformations`   what connections and mappings do to a value
 :mod:`.wires`             connections, followed through the connectors of systems
 :mod:`.bindings`          parameter sets, their mappings, and whom they reach

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Sequence
+from math import isfinite
 from pathlib import Path
+from typing import TypeVar
 from urllib.parse import unquote, urlsplit
 from xml.etree.ElementTree import Element
 
@@ -12,6 +14,7 @@ from orchestrator.errors import InputError, did_you_mean, reason
 from orchestrator.findings import Findings
 from orchestrator.system.ssp import STRUCTURE
 from orchestrator.system.ssp.document import read_document
+from orchestrator.system.ssp.validation import violations
 from orchestrator.system.transformation import Linear
 from orchestrator.system.units import UndefinedUnit, Unit, conversion
 from orchestrator.system.unpacking import unpacked
@@ -21,6 +24,9 @@ _SUFFIX = Path(STRUCTURE).suffix
 
 #: The version whose words are read; later ones have more of them, of which each is refused.
 _VERSION = "1.0"
+
+#: A number, or that there may be none.
+_Float = TypeVar("_Float", float, None)
 
 #: Of many names, this many are said.
 _MOST_SAID = 5
@@ -82,14 +88,21 @@ class Archive:
 
         """
         name = path.relative_to(self.folder) if path.is_relative_to(self.folder) else path.name
+        text = path.read_bytes()
+        remarks: list[str] = []
         try:
-            root = read_document(path.read_bytes(), lambda text: self.note(f"{name}: {text}"))
+            root = read_document(text, remarks.append)
         except Exception as error:
             raise InputError(f"{self.path}: not a readable SSP: {name}: {reason(error)}") from error
         version = root.get("version")
         if version != _VERSION:
             stated = "no version" if version is None else f"version {version!r}"
-            self.note(f"{name}: names {stated} of SSP; it is read as {_VERSION}")
+            remarks.append(f"names {stated} of SSP; it is read as {_VERSION}")
+        # Of other namespaces and versions the schemas know nothing.
+        if not remarks and (wrong := violations(root.tag, text)):
+            remarks.append(f"not valid: {listed(wrong, '; ')}")
+        for remark in dict.fromkeys(remarks):
+            self.note(f"{name}: {remark}")
         return root
 
     def file(self, source: str, needer: str, base: Path | None = None) -> Path | None:
@@ -145,7 +158,16 @@ class Archive:
             self.problem(f"{owner}: a <{element.tag}> without {name}")
         return element.get(name, "")
 
-    def number(self, element: Element | None, name: str, otherwise: float | None) -> float | None:
+    def integer(self, element: Element, name: str) -> int:
+        """An attribute that is an integer; zero where it is not stated or, with a problem, none."""
+        text = element.get(name, "0")
+        try:
+            return int(text)
+        except ValueError:
+            self.problem(f"{name} {text!r} is no integer")
+            return 0
+
+    def number(self, element: Element | None, name: str, otherwise: _Float) -> float | _Float:
         """An attribute that is a number.
 
         Args:
@@ -156,14 +178,29 @@ class Archive:
         """
         text = None if element is None else element.get(name)
         try:
-            return otherwise if text is None else real(text)
-        except ValueError:
-            self.problem(f"{name} {text!r} is no number")
+            return otherwise if text is None else number(name, text)
+        except InputError as error:
+            self.problem(error)
             return otherwise
 
 
-def listed(names: Iterable[str]) -> str:
-    """Names with commas between them; of many the first."""
-    all_names = list(names)
-    more = len(all_names) - _MOST_SAID
-    return ", ".join(all_names[:_MOST_SAID]) + (f" and {more} more" if more > 0 else "")
+def number(name: str, text: str) -> float:
+    """The number that an attribute is.
+
+    Raises:
+        InputError: it is none, or not finite.
+
+    """
+    try:
+        found = real(text)
+    except ValueError:
+        raise InputError(f"{name} {text!r} is no number") from None
+    if not isfinite(found):
+        raise InputError(f"{name} {text!r} is not finite")
+    return found
+
+
+def listed(names: Sequence[str], between: str = ", ") -> str:
+    """Names, of many the first, with something between them."""
+    more = len(names) - _MOST_SAID
+    return between.join(names[:_MOST_SAID]) + (f" and {more} more" if more > 0 else "")

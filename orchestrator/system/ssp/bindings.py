@@ -10,16 +10,8 @@ from xml.etree.ElementTree import Element
 
 from orchestrator.errors import InputError
 from orchestrator.system.ssp.archive import Archive, listed
-from orchestrator.system.ssp.hierarchy import (
-    Bus,
-    Connector,
-    Definitions,
-    Group,
-    Items,
-    Leaf,
-    Node,
-    definitions_of,
-)
+from orchestrator.system.ssp.definitions import Definitions, Items, definitions_of
+from orchestrator.system.ssp.hierarchy import Bus, Connector, Group, Leaf, Node
 from orchestrator.system.ssp.transformations import converts_units, transformation_of
 from orchestrator.system.transformation import Transformation, chained
 from orchestrator.system.units import Unit
@@ -155,9 +147,7 @@ class Bindings:
 
     def _parameters(self, values: Element, where: str) -> dict[str, Given]:
         """The values of a parameter set by their names."""
-        defined = definitions_of(self._archive, values)
-        units = {**self._definitions.units, **defined.units}
-        enumerations = {**self._definitions.enumerations, **defined.enumerations}
+        known = self._definitions.and_those_of(definitions_of(self._archive, values))
         found: dict[str, Given] = {}
         for parameter in values.findall("Parameters/Parameter"):
             name = self._archive.required(parameter, "name", where)
@@ -169,11 +159,9 @@ class Bindings:
             if parameter.find("Dimension") is not None:
                 self._archive.problem(f"{where}: {name}: arrays are not supported")
                 continue
-            unit = value.get("unit")
-            items = enumerations.get(value.get("name", ""), {})
             if name in found:
                 self._archive.note(f"{where}: {name} stands twice in a parameter set")
-            found[name] = Given(text, units.get(unit, Unit(unit)) if unit else None, items)
+            found[name] = Given(text, known.unit(value), known.items(value))
         return found
 
 

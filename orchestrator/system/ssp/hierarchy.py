@@ -2,35 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 from typing import TypeAlias
 from xml.etree.ElementTree import Element
 
-from orchestrator.errors import InputError
-from orchestrator.system.component import Component, read_component
-from orchestrator.system.ssp.archive import Archive, listed
-from orchestrator.system.units import BASES, Unit, Units, unit_of_port
+from orchestrator.system.component import Component
+from orchestrator.system.ssp.definitions import Items
+from orchestrator.system.units import Unit, Units, unit_of_port
 from orchestrator.system.values import type_of
 
 #: The names of a system and of those around it, without that of the outermost.
 Way: TypeAlias = tuple[str, ...]
-
-#: An enumeration's values by the names of its items.
-Items: TypeAlias = Mapping[str, int]
-
-_FMU = "application/x-fmu-sharedlibrary"
-
-#: Types of connectors, by what SSP 2.0 calls them as well.
-_TYPES = {
-    "Real": "Real", "Float64": "Real", "Integer": "Integer", "Int32": "Integer",
-    "Boolean": "Boolean", "String": "String", "Enumeration": "Enumeration",
-}  # fmt: skip
-
-#: What a connector may have besides its type.
-_NO_TYPES = ("Dimension", "Clock", "ConnectorGeometry", "Annotations")
 
 #: Which way a value goes, by the kind of an element's connector, seen from the system around it.
 GIVES = ("output", "calculatedParameter", "constant", "local", "independent")
@@ -74,14 +57,6 @@ class Connector:
 
 
 @dataclass(frozen=True)
-class Definitions:
-    """Units and enumerations that a file defines."""
-
-    units: Units = field(default_factory=dict)
-    enumerations: Mapping[str, Items] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
 class Leaf:
     """A component.
 
@@ -90,7 +65,7 @@ class Leaf:
         content: its element in the file.
         component: None: its FMU cannot be read, which has been said.
         connectors: that the file states.
-        definitions: of the file.
+        units: that the file defines.
 
     """
 
@@ -98,7 +73,7 @@ class Leaf:
     content: Element
     component: Component | None
     connectors: Mapping[str, Connector]
-    definitions: Definitions
+    units: Units
 
     def connector(self, name: str) -> Connector | None:
         """A connector as the FMU has it; None: it has none of that name."""
@@ -108,7 +83,7 @@ class Leaf:
         if variable is None:
             return None
         stated = self.connectors.get(name)
-        unit = unit_of_port(self.component, name, self.definitions.units)
+        unit = unit_of_port(self.component, name, self.units)
         if unit is None and stated is not None:
             unit = stated.unit
         declared = variable.declaredType
@@ -184,148 +159,3 @@ class Group:
                 yield from element.leaves()
             elif isinstance(element, Leaf):
                 yield element
-
-
-def definitions_of(archive: Archive, root: Element) -> Definitions:
-    """The units and enumerations of a file."""
-    units = {}
-    for unit in root.findall("Units/Unit"):
-        name, base = unit.get("name", ""), unit.find("BaseUnit")
-        if base is not None:
-            exponents = tuple(int(archive.number(base, of, 0.0) or 0) for of in BASES)
-            factor, offset = (
-                archive.number(base, "factor", 1.0),
-                archive.number(base, "offset", 0.0),
-            )
-            units[name] = Unit(name, exponents, factor or 1.0, offset or 0.0)
-    enumerations = {
-        enumeration.get("name", ""): {
-            item.get("name", ""): int(archive.number(item, "value", 0.0) or 0)
-            for item in enumeration.findall("Item")
-        }
-        for enumeration in root.findall("Enumerations/Enumeration")
-    }
-    return Definitions(units, enumerations)
-
-
-class Builder:
-    """Reads the systems of a description."""
-
-    def __init__(self, archive: Archive, definitions: Definitions) -> None:
-        """Take the archive, and what its description defines."""
-        self._archive, self._definitions = archive, definitions
-
-    def group(
-        self, content: Element, way: Way = (), buses: Mapping[str, Way] | None = None
-    ) -> Group:
-        """A system and all that is in it.
-
-        Args:
-            content: its element.
-            way: to it.
-            buses: ways to the signal dictionaries of the systems around it, by their names.
-
-        """
-        buses = {
-            **(buses or {}),
-            **{
-                name: (*way, name, "")
-                for dictionary in content.findall("SignalDictionaries/SignalDictionary")
-                if (name := dictionary.get("name", ""))
-            },
-        }
-        members: dict[str, Leaf | Bus | Group] = {}
-        for element in content.findall("Elements/*"):
-            name = element.get("name", "")
-            if not re.fullmatch(r"[^/\\]+", name):
-                self._archive.problem(f"component {name!r}: write it without slashes")
-            elif name in members:
-                self._archive.problem(f"two components are named {'.'.join((*way, name))}")
-            elif element.tag == "System":
-                members[name] = self.group(element, (*way, name), buses)
-            elif element.tag == "Component":
-                members[name] = self._leaf(element, (*way, name))
-            elif element.tag == "SignalDictionaryReference":
-                dictionary = element.get("dictionary", "")
-                if dictionary in buses:
-                    connectors = self._connectors(element)
-                    members[name] = Bus(buses[dictionary], element, connectors)
-                else:
-                    self._archive.problem(f"{name}: there is no signal dictionary {dictionary!r}")
-            else:
-                self._archive.problem(f"{name}: a <{element.tag}> in a system is not supported")
-        return Group(way, content, self._connectors(content), members)
-
-    def _leaf(self, content: Element, way: Way) -> Leaf:
-        component = self._component(content, ".".join(way))
-        connectors = self._connectors(content)
-        leaf = Leaf(way, content, component, connectors, self._definitions)
-        if component is not None:
-            self._compare(leaf)
-        return leaf
-
-    def _component(self, content: Element, name: str) -> Component | None:
-        source, kind = content.get("source"), content.get("type", _FMU)
-        if kind != _FMU:
-            self._archive.problem(
-                f"{name}: a component of type {kind!r} is not supported; an FMU is"
-            )
-        elif source is None:
-            self._archive.problem(f"{name}: a component without a source, which cannot be run")
-        elif content.get("implementation", "any") not in ("any", "CoSimulation"):
-            self._archive.problem(
-                f"{name}: asks for {content.get('implementation')}, which is not supported; "
-                "CoSimulation is"
-            )
-        elif (fmu := self._archive.file(source, name)) is not None:
-            return self._read(name, fmu)
-        return None
-
-    def _read(self, name: str, fmu: Path) -> Component | None:
-        try:
-            return read_component(name, fmu, findings=self._archive.findings)
-        except InputError as error:
-            self._archive.problem(f"{name}: {str(error).removeprefix(f'{self._archive.folder}/')}")
-            return None
-
-    def _compare(self, leaf: Leaf) -> None:
-        """Say where connectors are not what their FMU has."""
-        absent = []
-        for name, stated in leaf.connectors.items():
-            own = leaf.connector(name)
-            if own is None:
-                absent.append(name)
-                continue
-            for what, said, true in (
-                ("kind", stated.kind, own.kind),
-                ("type", stated.type, own.type),
-                ("unit", stated.unit and stated.unit.name, own.unit and own.unit.name),
-            ):
-                if said and said != true:
-                    self._archive.note(
-                        f"{Node(leaf.way, name)}: its {what} is {said}, and {true} in its FMU"
-                    )
-        if absent:
-            self._archive.note(
-                f"{'.'.join(leaf.way)}: its FMU has no variables for the connectors "
-                f"{listed(absent)}"
-            )
-
-    def _connectors(self, content: Element) -> dict[str, Connector]:
-        return {
-            connector.get("name", ""): self._connector(connector)
-            for connector in content.findall("Connectors/Connector")
-        }
-
-    def _connector(self, connector: Element) -> Connector:
-        type_of_it = next((child for child in connector if child.tag not in _NO_TYPES), None)
-        kind = connector.get("kind")
-        if type_of_it is None:
-            return Connector(kind, None, None, {})
-        unit = type_of_it.get("unit")
-        return Connector(
-            kind,
-            _TYPES.get(type_of_it.tag, type_of_it.tag),
-            self._definitions.units.get(unit, Unit(unit)) if unit else None,
-            self._definitions.enumerations.get(type_of_it.get("name", ""), {}),
-        )

@@ -12,8 +12,10 @@ from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.archive import Archive, listed
 from orchestrator.system.ssp.bindings import Bindings, Given, Values
+from orchestrator.system.ssp.building import Builder
+from orchestrator.system.ssp.definitions import definitions_of
 from orchestrator.system.ssp.experiment import step_of, times_of
-from orchestrator.system.ssp.hierarchy import Builder, Leaf, Node, Way, definitions_of
+from orchestrator.system.ssp.hierarchy import Leaf, Node, Way
 from orchestrator.system.ssp.wires import Course, Wires
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.transformation import Transformation, chained

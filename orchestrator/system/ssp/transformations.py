@@ -5,9 +5,10 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element
 
 from orchestrator.errors import InputError
-from orchestrator.system.ssp.hierarchy import Items
+from orchestrator.system.ssp.archive import number
+from orchestrator.system.ssp.definitions import Items
 from orchestrator.system.transformation import Linear, Mapped, Transformation
-from orchestrator.system.values import BOOLEANS, real
+from orchestrator.system.values import BOOLEANS
 
 _LINEAR = "LinearTransformation"
 _TABLES = (
@@ -29,31 +30,26 @@ def transformation_of(content: Element, source: Items, target: Items) -> Transfo
     """
     linear = content.find(_LINEAR)
     if linear is not None:
-        return Linear(_number(linear, "factor", "1"), _number(linear, "offset", "0"))
+        return Linear(
+            number("factor", linear.get("factor", "1")), number("offset", linear.get("offset", "0"))
+        )
     for name in _TABLES:
         table = content.find(name)
         if table is not None:
             entries = table.findall("MapEntry")
-            return Mapped(
-                tuple(
-                    (_value(name, entry, "source", source), _value(name, entry, "target", target))
-                    for entry in entries
-                )
-            )
+            pairs = [
+                (_value(name, entry, "source", source), _value(name, entry, "target", target))
+                for entry in entries
+            ]
+            if len(dict(pairs)) < len(pairs):
+                raise InputError("a mapping has two entries for one source")
+            return Mapped(tuple(pairs))
     return None
 
 
 def converts_units(content: Element) -> bool:
     """Whether a connection or an entry of a mapping has units converted."""
     return not BOOLEANS.get(content.get("suppressUnitConversion", "false"), False)
-
-
-def _number(element: Element, name: str, otherwise: str) -> float:
-    text = element.get(name, otherwise)
-    try:
-        return real(text)
-    except ValueError:
-        raise InputError(f"{name} {text!r} is no number") from None
 
 
 def _value(table: str, entry: Element, end: str, items: Items) -> float:
@@ -67,4 +63,4 @@ def _value(table: str, entry: Element, end: str, items: Items) -> float:
         if text not in items:
             raise InputError(f"{end} {text!r} of a mapping is not in its enumeration")
         return float(items[text])
-    return _number(entry, end, "")
+    return number(end, text)

@@ -42,6 +42,13 @@ def test_name_belongs_to_the_longest_component_that_has_such_a_port(system, text
     changed.check()
 
 
+def test_two_ports_of_one_name_are_refused(system, tmp_path: Path):
+    fmu(tmp_path / "q.fmu", variable("q", "parameter"))
+    again = System("s", {**system.components, "a.p": read_component("a.p", tmp_path / "q.fmu")}, ())
+    with pytest.raises(InputError, match=r"two ports are named a\.p\.q"):
+        again.check()
+
+
 def test_name_of_no_port_is_refused(system):
     assert not system.has(port_name("a.b.x"))
     with pytest.raises(InputError, match=r"a has no port or parameter 'b\.x'"):

@@ -472,6 +472,8 @@ def test_all_problems_are_collected(read: Read):
         (system(component("a").replace("><", f"><ssd:Connectors>{connector('y', 'input')}"
                                        "</ssd:Connectors><", 1)),
          "a.y: its kind is input, and output in its FMU"),
+        (system(component("a", delay="1")),
+         "not valid: line 1: Element 'Component', attribute 'delay': The attribute 'delay' is not"),
     ],
 )  # fmt: skip
 def test_what_is_harmless_is_a_note_and_a_problem_for_the_strict(read: Read, text: str, why: str):
