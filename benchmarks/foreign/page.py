@@ -49,8 +49,8 @@ _HEAD = """\
 and every SSP archive in them, runs each in a process of its own, and writes this page. Archives are
 run unchanged, in the default order, for {steps} steps or to the end that they name, whichever comes
 first; a folder with a `SystemStructure.ssd` is zipped as it is, and each further `.ssd` in it is an
-archive of its own. FMUs are run alone, for {steps} steps of their own step size, with all inputs at
-their start values. What holds the same bytes is counted once.
+archive of its own. FMUs are run alone, for {steps} steps of the size that they name, else of 20 ms,
+with all inputs at their start values. What holds the same bytes is counted once.
 
 Systems that libcosim or ecos can run as well are held against them in Jacobi order, with the same
 steps: as they are, and in libcosim also as `auv-fmu export --format osp` writes what we have read.
