@@ -113,14 +113,14 @@ ENTRIES: dict[str, Entry] = {
         "number",
         is_number,
         "Communication step [s].",
-        "the longest that fits into the steps of all components, which are 0.02 s",
+        "0.02 s",
     ),
     "steps": Entry(
         "table of numbers",
         _is_table_of_numbers,
         "Components that take longer steps of their own, as `component = step` [s], a multiple of "
         "the communication step. Meanwhile they hold their inputs.",
-        "those that the FMUs were made for, where there is no `step`",
+        "none",
     ),
     "order": Entry(
         "name, or list of names",
