@@ -20,6 +20,7 @@ import resource
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -37,7 +38,9 @@ from orchestrator.master.loop import chosen
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
 from orchestrator.system.component import read_component
+from orchestrator.system.osp import write_osp
 from orchestrator.system.ssp.reading import read_ssp
+from orchestrator.system.ssp.writing import write_ssp
 from orchestrator.system.structure import System
 
 #: Rounds, steps of a run, and the longest that the steps of one run shall take [s].
@@ -75,9 +78,10 @@ def ours(system: System, order: str) -> tuple[Run, float]:
     return run, step
 
 
-def in_fmpy(fmu: Path, step: float) -> Run:
+def in_fmpy(system: System, step: float, _: Path) -> Run:
     """fmpy on an unpacked FMU."""
-    folder = fmpy.extract(str(fmu))
+    [component] = system.components.values()
+    folder = fmpy.extract(str(component.fmu))
     description = fmpy.read_model_description(folder, validate=False)
 
     def run(steps: int) -> float:
@@ -96,15 +100,16 @@ def in_fmpy(fmu: Path, step: float) -> Run:
     return run
 
 
-def in_libcosim(ssp: Path, _: float) -> Run:
-    """libcosim on an archive."""
+def in_libcosim(system: System, step: float, folder: Path) -> Run:
+    """libcosim on a system in its own format: archives of others end its process."""
     from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level  # noqa: PLC0415
 
     log_output_level(CosimLogLevel.ERROR)
+    write_osp(replace(system, step=step), folder)
 
     def run(steps: int) -> float:
-        execution = CosimExecution.from_ssp_file(ssp_path=str(ssp))
+        execution = CosimExecution.from_osp_config_file(osp_path=str(folder))
         start = perf_counter()
         if not execution.step(steps):
             raise InputError("libcosim ended the run")
@@ -113,11 +118,12 @@ def in_libcosim(ssp: Path, _: float) -> Run:
     return run
 
 
-def in_ecos(ssp: Path, step: float) -> Run:
-    """ecos on an archive."""
+def in_ecos(system: System, step: float, folder: Path) -> Run:
+    """ecos on a system as we write it."""
     for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
         ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
     ecospy: Any = importlib.import_module("ecospy")
+    [ssp] = write_ssp(replace(system, step=step), folder)
 
     def run(steps: int) -> float:
         with ecospy.EcosSimulation(step_size=step, ssp_path=str(ssp)) as simulation:
@@ -136,12 +142,12 @@ HOSTS = {
 }
 
 
-def pair(path: Path, host: str) -> None:
+def pair(path: Path, host: str, folder: Path) -> None:
     """Time a file here and in another host, in turns, and tell both a step [s]."""
     alone = path.suffix == ".fmu"
     system = System(path.stem, {"a": read_component("a", path)}, ()) if alone else read_ssp(path)
     here, step = ours(system, "jacobi")
-    there = HOSTS[path.suffix][host](path, step)
+    there = HOSTS[path.suffix][host](system, step, folder)
     taken = max(here(FIRST), there(FIRST))
     steps = max(20, min(STEPS, int(FIRST * LONGEST / taken)))
     runs = [(run, min(run(1) for _ in range(SET_UPS))) for run in (here, there)]
@@ -198,6 +204,7 @@ def main() -> None:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == [_PAIR]:
-        pair(Path(sys.argv[2]), sys.argv[3])
+        with TemporaryDirectory(prefix="auvfmu") as work:
+            pair(Path(sys.argv[2]), sys.argv[3], Path(work))
     else:
         main()

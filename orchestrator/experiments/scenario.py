@@ -23,6 +23,7 @@ from orchestrator.experiments.events import check_events
 from orchestrator.experiments.inputs import ENTRIES as INPUTS
 from orchestrator.experiments.inputs import Inputs
 from orchestrator.experiments.named import names_in, path_of
+from orchestrator.findings import Findings
 from orchestrator.master.experiment import Order
 from orchestrator.reading import explained, text_of
 from orchestrator.system.names import PortName, port_name
@@ -199,7 +200,17 @@ def read_scenario(name: str) -> Scenario:
 
 def _scenario(path: Path, text: str) -> Scenario:
     content = tomllib.loads(text)
-    check_entries(path, content, ENTRIES)
+    findings = Findings()
+    with findings.collecting():
+        check_entries(path, content, ENTRIES)
+    if _are_tables(events := content.get("events", ())):
+        with findings.collecting():
+            check_events(path, events)
+    inputs = content.get("inputs", {})
+    if is_table(inputs) and inputs:
+        with findings.collecting():
+            content["inputs"] = _inputs(path, inputs)
+    findings.refuse()
     content["parameters"] = {
         port_name(key): value for key, value in flattened(content.get("parameters", {}))
     }
@@ -210,10 +221,11 @@ def _scenario(path: Path, text: str) -> Scenario:
     }
     if content.get("compare", "").endswith(".toml"):
         content["compare"] = str(path.parent / content["compare"])
-    check_events(path, content.get("events", ()))
-    if inputs := content.get("inputs"):
-        check_entries(f"{path}: inputs", inputs, INPUTS)
-        if "file" not in inputs:
-            raise InputError(f"{path}: inputs: name a file")
-        content["inputs"] = Inputs(**{**inputs, "file": path.parent / inputs["file"]})
     return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
+
+
+def _inputs(path: Path, table: Mapping[str, Any]) -> Inputs:
+    check_entries(f"{path}: inputs", table, INPUTS)
+    if "file" not in table:
+        raise InputError(f"{path}: inputs: name a file")
+    return Inputs(**{**table, "file": path.parent / table["file"]})
