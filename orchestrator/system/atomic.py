@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from uuid import uuid4
 
-from orchestrator.system.leftovers import claimed, remove_left
+from orchestrator.system.leftovers import created, remove_left
 
 #: How the name of a file begins that is being written.
 _PARTIAL = ".partial-"
@@ -28,8 +28,7 @@ def whole(path: Path) -> Iterator[Path]:
     # Ends as the other does: some writers tell the format by that.
     partial = path.with_name(f"{_PARTIAL}{uuid4().hex}{path.suffix}")
     try:
-        partial.touch()
-        with claimed(partial):
+        with created(partial):
             yield partial
             to_disk(partial)
             partial.replace(path)

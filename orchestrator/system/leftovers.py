@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from shutil import rmtree
@@ -46,6 +46,25 @@ def claimed(path: Path, wait: bool = False) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
+
+
+@contextmanager
+def created(path: Path) -> Iterator[None]:
+    """Make an empty file under a name that nobody else has, and keep other processes from it.
+
+    Raises:
+        OSError: it cannot be made.
+
+    """
+    with ExitStack() as stack:
+        is_there = False
+        while not is_there:
+            path.touch()
+            # Another process may take it for left before it is locked.
+            with suppress(FileNotFoundError):
+                stack.enter_context(claimed(path, wait=True))
+                is_there = path.exists()
+        yield
 
 
 def _lock(descriptor: int, wait: bool = False) -> bool:

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 import pytest
 
 from orchestrator.system import leftovers
-from orchestrator.system.leftovers import claimed, process_folder, remove_left
+from orchestrator.system.leftovers import claimed, created, process_folder, remove_left
 from support.machine import ended, eventually, forked
 
 
@@ -45,6 +45,24 @@ def test_what_another_process_holds_stays_until_it_is_killed(tmp_path: Path):
     ended(pid)
     remove_left(tmp_path, ".partial-[abc]")
     assert not held.exists()
+
+
+def test_a_new_file_is_not_taken_for_left(tmp_path: Path):
+    """Others clean up at any moment, also between making a file and locking it."""
+
+    def clean() -> None:
+        while True:
+            remove_left(tmp_path, ".partial-*")
+
+    pid = forked(clean)
+    try:
+        for i in range(300):
+            path = tmp_path / f".partial-{i}"
+            with created(path):
+                assert path.exists()
+    finally:
+        os.kill(pid, signal.SIGKILL)
+        ended(pid)
 
 
 def test_a_link_leads_nowhere(tmp_path: Path):
