@@ -16,13 +16,13 @@ _DEFAULTS, _WAYPOINTS = Parameters(), Waypoints()
 def _of_each_waypoint(member: str, unit: str, description: str) -> tuple[Port, ...]:
     starts = getattr(_WAYPOINTS, member)
     return tuple(
-        parameter(f"waypoint[{k}].{member}", start, unit, f"{description} of waypoint {k}")
+        parameter(f"waypoint[{k}].{member}", start, unit, description)
         for k, start in enumerate(starts, start=1)
     )
 
 
-_X, _Y, _Z = (_of_each_waypoint(axis, "m", f"{axis} coordinate") for axis in "xyz")
-_T = _of_each_waypoint("t", "s", "Time")
+_X, _Y, _Z = (_of_each_waypoint(axis, "m", f"Waypoint: {axis}") for axis in "xyz")
+_T = _of_each_waypoint("t", "s", "When it is passed, if `timed`")
 
 _COUNT = Port(
     "count",

@@ -1,8 +1,8 @@
-"""PathPlanner as a slave."""
+"""PathPlanner as a slave: the corner ahead is kept from step to step."""
 
 from __future__ import annotations
 
-from auv_fmu.path_planner import Parameters, PathState
+from auv_fmu.path_planner import Corner, Parameters, PathState
 from fmus.path_planner import behaviour
 from fmus.path_planner.behaviour import Outputs
 from fmus.path_planner.ports import DESCRIPTION, PARAMETERS, PORTS
@@ -17,16 +17,23 @@ class PathPlanner(Component[PathState, Nothing, Outputs, Parameters]):
     ports = PORTS
     parameter_set = PARAMETERS
 
+    #: The state of the latest reference and the corner ahead of it, where the next step looks on.
+    _moved: PathState | None = None
+    _ahead: Corner
+
     def check(self, parameters: Parameters) -> None:
         behaviour.check(parameters)
 
     def begin(self, inputs: Nothing, t: float) -> tuple[PathState, Outputs]:
-        return behaviour.begin(self.parameters, t)
+        self._moved, self._ahead, outputs = behaviour.begin(self.parameters, t)
+        return self._moved, outputs
 
     def advance(
         self, state: PathState, inputs: Nothing, t: float, h: float, n: int
     ) -> tuple[PathState, Outputs]:
-        return behaviour.advance(self.parameters, state, t, h)
+        ahead = self._ahead if state is self._moved else behaviour.derive(self.parameters, state)
+        self._moved, self._ahead, outputs = behaviour.advance(self.parameters, state, ahead, t, h)
+        return self._moved, outputs
 
     def expected(
         self, parameters: Parameters, state: PathState, outputs: Outputs

@@ -6,6 +6,7 @@ module                    what it holds
 :mod:`.entries`           what a file of the user's may hold
 :mod:`.named`             files by name, those that come with the program
 :mod:`.scenario`          scenario files
+:mod:`.waypoints`         a path from a table of waypoints
 :mod:`.scenario_page`     their reference page
 :mod:`.wiring`            which FMUs there are, and which ports feed which
 :mod:`.bundle`            the FMUs and auv.ssp, built when missing or stale

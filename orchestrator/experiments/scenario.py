@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from orchestrator.errors import InputError
 from orchestrator.experiments.entries import (
     Entry,
     are_names,
@@ -19,6 +20,7 @@ from orchestrator.experiments.entries import (
     is_text,
 )
 from orchestrator.experiments.named import names_in, path_of
+from orchestrator.experiments.waypoints import path_parameters
 from orchestrator.reading import explained, text_of
 from orchestrator.system.names import PortName, port_name
 
@@ -65,6 +67,10 @@ def _is_table_of_names(value: Any) -> bool:
 
 def _is_table_of_wires(value: Any) -> bool:
     return is_table(value) and all(is_text(v) or v is False for v in value.values())
+
+
+def _is_path(value: Any) -> bool:
+    return _is_table_of_names(value) and {"file"} <= value.keys() <= {"file", "component"}
 
 
 #: What a scenario file may hold, in the order of the reference page.
@@ -122,6 +128,14 @@ ENTRIES: dict[str, Entry] = {
         'brackets are quoted: `"controller.K1[1]" = 12.0`.',
         "the FMUs' own",
     ),
+    "path": Entry(
+        "table with file, and component if it is not planner",
+        _is_path,
+        "Waypoints of a [PathPlanner](components/PathPlanner.md): `file` is a table in CSV, "
+        "relative to this one, with the columns `x,y,z` or `t,x,y,z` and a line a waypoint. They "
+        "become parameters of the component.",
+        "none",
+    ),
     "ours": Entry(
         "table of texts",
         is_table,
@@ -156,6 +170,9 @@ def _scenario(path: Path, text: str) -> Scenario:
     content["parameters"] = {
         port_name(key): value for key, value in flattened(content.get("parameters", {}))
     }
+    if "path" in content:
+        parameters = content["parameters"]
+        parameters |= _path_parameters(path, parameters, **content.pop("path"))
     content["ours"] = {key: str(why) for key, why in flattened(content.get("ours", {}))}
     content["components"] = {
         component: str(path.parent / fmu) if fmu.endswith(".fmu") else fmu
@@ -164,3 +181,13 @@ def _scenario(path: Path, text: str) -> Scenario:
     if content.get("compare", "").endswith(".toml"):
         content["compare"] = str(path.parent / content["compare"])
     return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
+
+
+def _path_parameters(
+    path: Path, others: Mapping[PortName, Any], file: str, component: str = "planner"
+) -> dict[PortName, Any]:
+    """What a path comes to, in a scenario with other parameters."""
+    found = path_parameters(path.parent / file, component)
+    for name in found.keys() & others.keys():
+        raise InputError(f"{path}: {name} is given by {file} already")
+    return found

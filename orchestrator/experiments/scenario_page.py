@@ -98,6 +98,21 @@ title = "Still water"
 "plant.tau_w" = false
 ```
 
+A path through waypoints, from a table `survey.csv` beside the file:
+
+```toml
+title = "A survey"
+
+[components]
+planner = "PathPlanner"
+
+[path]
+file = "survey.csv"
+
+[parameters]
+planner.cruise = 0.4
+```
+
 A controller of one's own, from an FMU beside the file, is in [the guide](own-controller.md).
 """)
 

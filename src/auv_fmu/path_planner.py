@@ -70,8 +70,8 @@ class Parameters(NamedTuple):
     vehicle: Vehicle = Vehicle()  #: that is to follow
     ell: float = ELL  #: distance of its control point [m]
     limits: Limits = Limits()  #: of its actuators
-    speed_max: float = Limits().tau_max[0] / Vehicle().d11  #: what (2) and (3) let it run [m/s]
-    turn_max: float = Limits().tau_max[2] / Vehicle().d66  #: and turn [rad/s]
+    speed_max: float = 2.5  #: that is let pass [m/s]: with (2) and (3) a straight run ends at 2.67
+    turn_max: float = 4.0  #: that is let pass [rad/s]: where a turn on the spot ends
 
 
 class PathState(NamedTuple):
@@ -163,16 +163,18 @@ def reference(waypoints: Waypoints, corner: Corner, t: float) -> Reference:
 
     """
     T = waypoints.rounding
-    last = corner.k >= waypoints.n
-    dy_d, ddy_d = velocity(waypoints, corner.k), _AT_REST
-    y_d = advance(waypoint(waypoints, waypoints.n - 1 if last else corner.k), dy_d, t - corner.t)
+    k = corner.k if corner.k < waypoints.n else waypoints.n - 1
+    v = velocity(waypoints, corner.k)
+    y_d, dy_d, ddy_d = advance(waypoint(waypoints, k), v, t - corner.t), v, _AT_REST
     while corner.k < waypoints.n and corner.t - T / 2 < t:
         a = (t - corner.t) / T + 0.5
-        jump = difference(velocity(waypoints, corner.k + 1), velocity(waypoints, corner.k))
+        v_next = velocity(waypoints, corner.k + 1)
+        jump = difference(v_next, v)
         y_d = advance(y_d, jump, T * a * a * a * (1.0 - a / 2))
         dy_d = advance(dy_d, jump, a * a * (3.0 - 2 * a))
         ddy_d = advance(ddy_d, jump, 6 * a * (1.0 - a) / T)
         corner = next_corner(waypoints, corner)
+        v = v_next
     return Reference(y_d, dy_d, ddy_d)
 
 
