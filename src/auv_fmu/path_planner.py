@@ -37,7 +37,7 @@ from auv_fmu.vehicle import Vehicle
 
 #: Most waypoints of a path, as many as a Vector32 holds; and those that the default leaves over.
 MOST = 32
-_UNUSED = (0.0,) * 24
+_UNUSED = (0.0,) * 26
 
 #: Moments of a rounding at which it is held against the limits, as a share of it: the middle of it,
 #: where a corner of equal speeds asks for most, is among them.
@@ -53,10 +53,10 @@ class ImpossiblePath(ArithmeticError):
 class Waypoints(NamedTuple):
     """Points to pass, and when; the defaults are a small survey, near the vehicle of Fig. 4."""
 
-    n: int = 8  #: how many
-    x: Vector32 = (3.0, 15.0, 15.0, 3.0, 3.0, 15.0, 15.0, 3.0, *_UNUSED)  #: [m]
-    y: Vector32 = (6.0, 6.0, 10.0, 10.0, 14.0, 14.0, 18.0, 18.0, *_UNUSED)  #: [m]
-    z: Vector32 = (0.0, 4.0, 4.0, 4.0, 4.0, 4.0, 4.0, 0.0, *_UNUSED)  #: [m]
+    n: int = 6  #: how many
+    x: Vector32 = (3.0, 15.0, 15.0, 3.0, 3.0, 15.0, *_UNUSED)  #: [m]
+    y: Vector32 = (6.0, 6.0, 10.0, 10.0, 14.0, 14.0, *_UNUSED)  #: [m]
+    z: Vector32 = (0.0, 4.0, 4.0, 4.0, 4.0, 0.0, *_UNUSED)  #: [m]
     t: Vector32 = (0.0,) * 32  #: when to pass them [s], if they are timed
     timed: bool = False  #: whether at their times, or at the cruise speed
     cruise: float = 0.5  #: speed on all legs [m/s], if they are not

@@ -59,9 +59,8 @@ def variation(result: Table) -> float:
 
 
 def test_all_figures_are_there():
-    assert names() == sorted(
-        ["fig3a", "fig3b", "fig4", "fig5", "fig5-pd", "fig6", "fig6-pd", "fig7a", "fig7b", "fig7c"]
-    )
+    figures = {"fig3a", "fig3b", "fig4", "fig5", "fig5-pd", "fig6", "fig6-pd"}
+    assert figures | {"fig7a", "fig7b", "fig7c"} <= set(names())
 
 
 def test_fig3a_follows_the_analytic_solution(run: Runner):
