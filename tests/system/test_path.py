@@ -10,9 +10,10 @@ import pytest
 from auv_fmu import path_planner
 from auv_fmu.path_planner import Waypoints
 from orchestrator.analysis.signals import tracking_error
-from orchestrator.commands.main import main
+from orchestrator.errors import InputError
 from orchestrator.experiments.scenario import read_scenario
 from orchestrator.experiments.wiring import closed_loop
+from orchestrator.system.names import PortName
 from support.runs import run
 
 #: Near the default path, at times: straight ahead, a rest, and a turn to starboard.
@@ -62,10 +63,10 @@ def test_path_from_a_table_is_passed_at_its_times(workplace: Path, native: Path)
     np.testing.assert_allclose(y_d[-1], (13, 16, 2), atol=1e-12)
 
 
-@pytest.mark.parametrize("kind", ["python", "native"])
-def test_path_that_the_vehicle_cannot_follow_is_refused_in_one_line(workplace, capsys, kind: str):
-    arguments = ["--set", "planner.rounding=1", "--kind", kind, "--no-figures"]
-    assert main(["run", "path", *arguments]) in (1, 2)
-    said = capsys.readouterr().err.splitlines()
-    assert [line for line in said if "more tightly than the vehicle's control point" in line]
-    assert "Traceback" not in "".join(said)
+@pytest.mark.parametrize("kind", ["dist", "native"])
+def test_path_that_the_vehicle_cannot_follow_is_refused_in_one_line(request, kind: str):
+    system = closed_loop(request.getfixturevalue(kind), read_scenario("path"))
+    sharp = system.with_parameters({PortName("planner", "rounding"): 1.0})
+    with pytest.raises(InputError, match=r"planner: .*at \(14\.9, .*more tightly than") as error:
+        run(sharp, 1.0, 0.02)
+    assert "\n" not in str(error.value)
