@@ -15,6 +15,8 @@ module                  what it holds
 :mod:`.row`             the row of all values
 :mod:`.transfer`        the FMI calls that move them
 :mod:`.schedule`        which components are stepped when, and on whose outputs
+:mod:`.signals`         what is done to values on their way from outputs to inputs
+:mod:`.attendant`       who acts on a run between two steps
 :mod:`.loop`            the steps in Python, one by one, and which loop makes them
 :mod:`.stepper`         the steps compiled, some hundred in one call of stepper.c
 :mod:`.layout`          what stepper.c works on
@@ -32,6 +34,7 @@ The loop, in :func:`.simulation.simulate`::
     exchange initial values until they rest
     tell the observers the first row
     for every step from t to t + h:
+        let attendants act whose time has come
         for every stage of the schedule:
             gather the inputs of its components
             step each of them, then read their outputs

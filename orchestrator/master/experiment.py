@@ -85,13 +85,17 @@ class Experiment:
         """The time after k steps [s]."""
         return k * self.step if k <= self.full_steps else self.stop_time
 
-    def steps(self) -> Iterator[tuple[int, float, float, float]]:
-        """Number, beginning, length and end of every step [s]: t_k = k h, never accumulated."""
-        step = self.step
-        k, t = 0, 0.0
-        for k in range(1, self.full_steps + 1):
+    def steps(self, made: int = 0) -> Iterator[tuple[int, float, float, float]]:
+        """Number, beginning, length and end of every step [s]: t_k = k h, never accumulated.
+
+        Args:
+            made: how many steps have been made.
+
+        """
+        step, t = self.step, self.time(made)
+        for k in range(made + 1, self.full_steps + 1):
             end = k * step
             yield k, t, step, end
             t = end
-        if self.has_short_step:
-            yield k + 1, t, self.stop_time - t, self.stop_time
+        if self.has_short_step and made < self.rows - 1:
+            yield self.rows - 1, t, self.stop_time - t, self.stop_time

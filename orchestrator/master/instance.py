@@ -25,6 +25,10 @@ class ComponentFailed(Exception):
         self.fatal = fatal
 
 
+class Ended(Exception):
+    """The run ends here, and well; the text says why."""
+
+
 class Part(NamedTuple):
     """Ports of one component that have the same causality and kind.
 

@@ -36,6 +36,8 @@ class Stage(Structure):
     _fields_ = (
         ("targets", c_void_p),
         ("sources", c_void_p),
+        ("factors", c_void_p),
+        ("offsets", c_void_p),
         ("members", POINTER(Member)),
         ("n_connections", c_size_t),
         ("n_members", c_size_t),
@@ -53,7 +55,6 @@ class Run(Structure):
         ("step", c_double),
         ("stop_time", c_double),
         ("full_steps", c_size_t),
-        ("steps", c_size_t),
     )
 
 

@@ -5,7 +5,7 @@ Both make the same calls of FMI in the same order, and the same rows bit for bit
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
 from ctypes import CDLL
 from functools import partial
@@ -14,11 +14,11 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from orchestrator.errors import InputError
+from orchestrator.master.attendant import Run
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.isolated import Isolation
 from orchestrator.master.library import kept, made
-from orchestrator.master.observer import Blocks
-from orchestrator.master.schedule import Stage, step
+from orchestrator.master.schedule import step
 from orchestrator.master.stepper import stepped
 
 #: Loops that can be asked for; the first is the default.
@@ -32,19 +32,11 @@ _SET_UP, _COMPILED = 20, 10_000
 class Steps(Protocol):
     """Makes the steps of a run, and is an iterator over the moments at which Python may look."""
 
-    def __call__(
-        self, experiment: Experiment, stages: Sequence[Stage], values: np.ndarray, blocks: Blocks
-    ) -> Iterator[int]:
-        """Make the steps; it ends before a row that is not finite.
-
-        Args:
-            experiment: which steps.
-            stages: of each.
-            values: the row of all values.
-            blocks: take a row after each step.
+    def __call__(self, run: Run) -> Iterator[None]:
+        """Make the steps that are left, and count them; it ends before a row that is not finite.
 
         Yields:
-            How many steps have been made.
+            Nothing, when Python may look: after as many steps as are due, at the latest.
 
         Raises:
             ComponentFailed: by the step behind them.
@@ -59,20 +51,20 @@ class Loop(NamedTuple):
     steps: Steps
 
 
-def interpreted(
-    experiment: Experiment, stages: Sequence[Stage], values: np.ndarray, blocks: Blocks
-) -> Iterator[int]:
+def interpreted(run: Run) -> Iterator[None]:
     """Make the steps in Python, and look after each."""
+    values, append = run.row.values, run.blocks.append
     # Times zero, what is finite is zero and what is not is nan: the cheapest way to see it.
     is_not_finite = partial(np.vdot, values, np.zeros_like(values))
-    for k, t, h, end in experiment.steps():
-        for targets, sources, members in stages:
-            values[targets] = values[sources]
+    for k, t, h, end in run.experiment.steps(run.made):
+        for gather, members in run.stages:
+            gather(values)
             step(members, t, h)
         if is_not_finite():
             return
-        blocks.append(end, values)
-        yield k
+        append(end, values)
+        run.made = k
+        yield
 
 
 #: The loop that is always there.

@@ -45,13 +45,15 @@ class Ending:
     """How a run has ended.
 
     Attributes:
-        failure: why it ended early, or None.
+        failure: why it failed, or None.
+        remark: why it ended early though it has not failed, or None.
         messages: what the FMUs logged with status warning or worse.
         signals: to stop that have come meanwhile.
 
     """
 
     failure: str | None = None
+    remark: str | None = None
     messages: tuple[str, ...] = ()
     signals: tuple[int, ...] = ()
 

@@ -14,11 +14,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-import numpy as np
 from fmpy.fmi2 import fmi2Warning
 
 from orchestrator.master.instance import Instance
 from orchestrator.master.row import Row
+from orchestrator.master.signals import Gathering
 from orchestrator.system.graph import feedthrough_stages, has_feedthrough
 from orchestrator.system.structure import Connection, System
 
@@ -38,8 +38,7 @@ class Member(NamedTuple):
 class Stage(NamedTuple):
     """Inputs to gather, and the components to step then."""
 
-    targets: np.ndarray
-    sources: np.ndarray
+    gather: Gathering
     members: list[Member]
 
 
@@ -72,7 +71,7 @@ def schedule(
         late = len(plan) > 1 and has_feedthrough(system, connection)
         gathered[stage_of[connection.target.component] if late else 0].append(connection)
     return [
-        Stage(*row.places(connections), [member(instances[name]) for name in names])
+        Stage(Gathering(row, connections), [member(instances[name]) for name in names])
         for names, connections in zip(plan, gathered, strict=True)
     ]
 

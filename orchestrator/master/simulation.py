@@ -9,8 +9,9 @@ from time import monotonic
 import numpy as np
 
 from orchestrator.errors import InputError, StartError, reason
+from orchestrator.master.attendant import Attendance, Attendant, Run
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.instance import ComponentFailed, Instance
+from orchestrator.master.instance import ComponentFailed, Ended, Instance
 from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.isolated import Isolation, isolated
 from orchestrator.master.loaded import all_loaded
@@ -19,6 +20,7 @@ from orchestrator.master.loop import PYTHON_LOOP, Loop
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import schedule, stages
+from orchestrator.master.signals import Signals
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 
@@ -29,6 +31,7 @@ def simulate(
     observers: Sequence[Observer] = (),
     isolation: Isolation | None = None,
     loop: Loop = PYTHON_LOOP,
+    attendants: Sequence[Attendant] = (),
 ) -> Ending:
     """Run a system from t = 0.
 
@@ -38,6 +41,7 @@ def simulate(
         observers: take the rows.
         isolation: run each FMU in a process of its own; None: all in this one.
         loop: makes the steps.
+        attendants: act between them, in this order.
 
     Returns:
         How the run has ended: after a failure the observers have the rows before it.
@@ -67,16 +71,20 @@ def simulate(
             blocks = Blocks(len(row.values), observers)
             interrupts.hand_over = blocks.hand_over
             blocks.append(0.0, row.values)
-            steps = loop.steps(experiment, scheduled, row.values, blocks)
+            signals = Signals(row, [stage.gather for stage in scheduled], system.connections)
+            run = Run(system, experiment, instances, row, scheduled, signals, blocks)
             order = [name for names in plan for name in names]
+            remark = None
             try:
-                failure = _advance(experiment, steps, row, order, blocks, interrupts)
+                failure = _advance(run, loop, Attendance(run, attendants), order, interrupts)
             except NotKept as error:
                 # Rows that cannot be kept need not be computed.
                 failure = str(error)
+            except Ended as end:
+                failure, remark = None, str(end)
             if failure is None:
                 _terminate(instances)
-            ending = Ending(failure, log.messages, tuple(interrupts.signals))
+            ending = Ending(failure, remark, log.messages, tuple(interrupts.signals))
             tell(ending)
         return ending
 
@@ -154,29 +162,34 @@ def _terminate(instances: Mapping[str, Instance]) -> None:
 
 
 def _advance(
-    experiment: Experiment,
-    steps: Iterator[int],
-    row: Row,
+    run: Run,
+    loop: Loop,
+    attendance: Attendance,
     order: Sequence[str],
-    blocks: Blocks,
     interrupts: Interrupts,
 ) -> str | None:
     """Step to the end, or to the first failure, and say what it was."""
-    k, failure = 0, None
+    blocks, failure = run.blocks, None
     try:
-        for k in steps:
+        attendance.attend()
+        for _ in loop.steps(run):
+            if run.made >= run.due:
+                attendance.attend()
             if monotonic() > blocks.due:
                 blocks.hand_over()
             if interrupts.signals:
-                failure = f"interrupted at t = {experiment.time(k):.12g} s"
+                failure = f"interrupted at t = {run.time:.12g} s"
                 break
     except ComponentFailed as error:
-        failure = f"stopped at t = {experiment.time(k):.12g} s: {error}"
+        failure = f"stopped at t = {run.time:.12g} s: {error}"
     except KeyboardInterrupt:
-        failure = f"interrupted at t = {experiment.time(k):.12g} s"
+        failure = f"interrupted at t = {run.time:.12g} s"
+    except Ended as end:
+        blocks.hand_over()
+        raise Ended(f"ended at t = {run.time:.12g} s: {end}") from None
     # Also where another component has refused it in the same step.
-    if not_finite := row.not_finite(order):
-        failure = f"stopped at t = {experiment.time(k + 1):.12g} s: {not_finite}"
+    if not_finite := run.row.not_finite(order):
+        failure = f"stopped at t = {run.experiment.time(run.made + 1):.12g} s: {not_finite}"
     blocks.hand_over()
     return failure
 

@@ -49,6 +49,7 @@ typedef struct {
 /* Inputs to gather, and the components to step then. */
 typedef struct {
     const size_t *targets, *sources;
+    const double *factors, *offsets;
     const member *members;
     size_t n_connections, n_members;
 } stage;
@@ -59,7 +60,6 @@ typedef struct {
     size_t n_stages, n_values;
     double step, stop_time;
     size_t full_steps; /* and, if there are more steps, a shorter one */
-    size_t steps;
 } run;
 
 /* Rows, each with the time in front; Python reads their number meanwhile. */
@@ -140,7 +140,8 @@ static int step_failed(const run *this, double t, double h, failure *why) {
     for (why->stage = 0; why->stage < this->n_stages; why->stage++) {
         const stage *it = &this->stages[why->stage];
         for (i = 0; i < it->n_connections; i++) {
-            this->values[it->targets[i]] = this->values[it->sources[i]];
+            this->values[it->targets[i]] =
+                it->factors[i] * this->values[it->sources[i]] + it->offsets[i];
         }
         if (stage_failed(it, t, h, why)) return 1;
     }
@@ -159,10 +160,11 @@ static int all_finite(const double values[], size_t n) {
     return sum == 0.0;
 }
 
-/* Make the steps from the k-th on. */
-EXPORTED int advance(const run *this, size_t k, double patience, block *rows, failure *why) {
+/* Make the steps from the k-th on, until so many are made. */
+EXPORTED int advance(const run *this, size_t k, size_t until, double patience, block *rows,
+                     failure *why) {
     const double due = now() + patience;
-    for (; k < this->steps && rows->n < rows->most; k++) {
+    for (; k < until && rows->n < rows->most; k++) {
         const int full = k < this->full_steps;
         const double t = (double)k * this->step;
         const double end = full ? (double)(k + 1) * this->step : this->stop_time;

@@ -2,40 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from ctypes import CDLL, POINTER, c_double, c_int, c_size_t
 
-import numpy as np
-
 from orchestrator.master import layout
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.observer import Blocks
+from orchestrator.master.attendant import Run
 from orchestrator.master.schedule import CALLS, Stage
 
 #: Longest time until Python looks whether somebody wants the run to stop [s].
 _GLANCE = 0.02
 
 
-def stepped(
-    library: CDLL,
-    experiment: Experiment,
-    stages: Sequence[Stage],
-    values: np.ndarray,
-    blocks: Blocks,
-) -> Iterator[int]:
-    """Make the steps of a run: see :class:`.loop.Steps`.
-
-    Args:
-        library: stepper.c, compiled.
-        experiment, stages, values, blocks: of the run.
-
-    """
+def stepped(library: CDLL, run: Run) -> Iterator[None]:
+    """Make the steps of a run by stepper.c, compiled: see :class:`.loop.Steps`."""
     advance = library.advance
     advance.restype = c_int
     advance.argtypes = (
-        POINTER(layout.Run), c_size_t, c_double, POINTER(layout.Block), POINTER(layout.Failure),
+        POINTER(layout.Run), c_size_t, c_size_t, c_double, POINTER(layout.Block),
+        POINTER(layout.Failure),
     )  # fmt: skip
-    run = layout.Run(
+    stages, values, experiment, blocks = run.stages, run.row.values, run.experiment, run.blocks
+    plan = layout.Run(
         (layout.Stage * len(stages))(*map(_laid_out, stages)),
         values.ctypes.data,
         len(stages),
@@ -43,28 +30,28 @@ def stepped(
         experiment.step,
         experiment.stop_time,
         experiment.full_steps,
-        experiment.rows - 1,
     )
+    steps = experiment.rows - 1
     block, failure = blocks.block, layout.Failure()
-    k, outcome = 0, layout.DUE
-    while outcome == layout.DUE and k < run.steps:
+    outcome = layout.DUE
+    while outcome == layout.DUE and run.made < steps:
         if block.n == block.most:
             blocks.hand_over()
         before = block.n
-        outcome = advance(run, k, _GLANCE, block, failure)
-        k += block.n - before
-        yield k
+        outcome = advance(plan, run.made, min(run.due, steps), _GLANCE, block, failure)
+        run.made += block.n - before
+        yield
     if outcome == layout.FAILED:
         member = stages[failure.stage].members[failure.member]
         raise member.instance.failed(failure.status, CALLS[failure.call])
 
 
 def _laid_out(stage: Stage) -> layout.Stage:
-    members = [member.instance.pointers() for member in stage.members]
+    gather, members = stage.gather, [member.instance.pointers() for member in stage.members]
     return layout.Stage(
-        stage.targets.ctypes.data,
-        stage.sources.ctypes.data,
+        *(array.ctypes.data for array in (gather.targets, gather.sources)),
+        *(array.ctypes.data for array in (gather.factors, gather.offsets)),
         (layout.Member * len(members))(*members),
-        len(stage.targets),
+        len(gather.targets),
         len(members),
     )
