@@ -391,6 +391,7 @@ NO_START = {
     "ObserverController": Setting({}, {"dy_d.x": 1e200}, {"dy_d.x": 0.0}),
     "PdController": Setting({}, {"dy_d.x": 1e200}, {"dy_d.x": 0.0}),
     "MotionPlanner": Setting({}, {"m11": 1e-9, "tau_d.u": 1e300}, {"tau_d.u": 5.0}),
+    "PathPlanner": Setting({}, {"rounding": 0.1}, {"rounding": 6.0}),
 }
 
 
