@@ -69,7 +69,7 @@ PARAMETERS = ParameterSet(
     turn_max=parameter("turn_max", _DEFAULTS.turn_max, "rad/s", "Sharpest turn let pass", 0.0),
 )
 
-_WAYS = (_COUNT, _TIMED, _CRUISE, _ROUNDING, *(port for k in zip(_X, _Y, _Z, _T) for port in k))
+_WAYS = (_COUNT, *(port for k in zip(_X, _Y, _Z, _T) for port in k), _TIMED, _CRUISE, _ROUNDING)
 
 PORTS: tuple[Port, ...] = (
     *outputs("y_d", POSITION, "Desired control point"),

@@ -57,7 +57,7 @@ class Waypoints(NamedTuple):
     x: Vector32 = (3.0, 15.0, 15.0, 3.0, 3.0, 15.0, *_UNUSED)  #: [m]
     y: Vector32 = (6.0, 6.0, 10.0, 10.0, 14.0, 14.0, *_UNUSED)  #: [m]
     z: Vector32 = (0.0, 4.0, 4.0, 4.0, 4.0, 0.0, *_UNUSED)  #: [m]
-    t: Vector32 = (0.0,) * 32  #: when to pass them [s], if they are timed
+    t: Vector32 = (3.0, 28.0, 36.0, 60.0, 68.0, 93.0, *_UNUSED)  #: when [s], if they are timed
     timed: bool = False  #: whether at their times, or at the cruise speed
     cruise: float = 0.5  #: speed on all legs [m/s], if they are not
     rounding: float = 6.0  #: T, the time that a corner is rounded in [s]
