@@ -2,7 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from orchestrator.errors import InputError
+
+
+class Refused(InputError):
+    """Something is refused for problems, of which the text has the first."""
+
+    def __init__(self, *problems: str) -> None:
+        """Say the first, and how many there are."""
+        self.problems = problems
+        more = len(problems) - 1
+        others = f" (and {more} more: see `auv-fmu check`)" if more else ""
+        super().__init__(f"{problems[0]}{others}")
 
 
 class Findings:
@@ -32,14 +46,21 @@ class Findings:
         elif text not in self.notes:
             self.notes.append(text)
 
+    @contextmanager
+    def collecting(self) -> Iterator[None]:
+        """Take note of the mistakes that end what is done here, and let the rest go on."""
+        try:
+            yield
+        except InputError as error:
+            for text in error.problems if isinstance(error, Refused) else [str(error)]:
+                self.problem(text)
+
     def refuse(self) -> None:
         """Refuse what has problems.
 
         Raises:
-            InputError: with the first of them.
+            Refused: with all of them.
 
         """
         if self.problems:
-            more = len(self.problems) - 1
-            others = f" (and {more} more: see `auv-fmu check`)" if more else ""
-            raise InputError(f"{self.problems[0]}{others}")
+            raise Refused(*self.problems)

@@ -117,9 +117,7 @@ def _check_level(state: PlantState, rotation: Rotation) -> None:
 
 
 def _seen(parameters: Parameters, state: PlantState, rotation: Rotation) -> Outputs:
-    euler, y, dy, nu = plant.outputs(
-        state, rotation, parameters.ell, parameters.roll.rolls, parameters.current
-    )
+    euler, y, dy, nu = plant.outputs(state, rotation, parameters.ell, parameters.roll.rolls)
     return {
         "eta": (*state.position, *euler),
         "nu": nu,

@@ -26,7 +26,11 @@ _ROLLS = Port(
     start=_ROLL.rolls,
 )
 _CURRENT = parameters(
-    "current", _DEFAULTS.current, VELOCITY, "Ocean current in the earth frame; not in the paper"
+    "current",
+    _DEFAULTS.current,
+    VELOCITY,
+    "Ocean current in the earth frame; not in the paper",
+    tunable=True,
 )
 _LAGS = parameters(
     "actuator.T",

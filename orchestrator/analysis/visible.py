@@ -109,12 +109,15 @@ class VisibleRows(Table):
 
     def _add(self, pairs: np.ndarray) -> None:
         """Put rows, each behind the one before it, into the last division, or into a new one."""
-        steps = np.diff(pairs[:, :, 0], axis=1)
-        division = _Division(self._extremes(pairs), 0.5 * (steps * pairs.sum(axis=1)).sum(axis=0))
+        n = len(pairs)
+        areas = 0.5 * np.diff(pairs[:, :, 0], axis=1) * pairs.sum(axis=1)
         if self._in_last:
-            division = self._merged(self._divisions.pop(), division)
-        self._divisions.append(division)
-        self._in_last = (self._in_last + len(pairs)) % self._per_division
+            # Row by row, so that the means do not depend on the blocks in which rows come.
+            begun = self._divisions.pop()
+            pairs = np.concatenate((begun.pairs, pairs))
+            areas = np.vstack((begun.integral, areas))
+        self._divisions.append(_Division(self._extremes(pairs), areas.sum(axis=0)))
+        self._in_last = (self._in_last + n) % self._per_division
         if not self._in_last and len(self._divisions) == 2 * _DIVISIONS:
             halves = self._divisions[::2], self._divisions[1::2]
             self._divisions = list(map(self._merged, *halves))

@@ -9,6 +9,7 @@ module              commands
 :mod:`.options`     options that several commands have
 :mod:`.build`       build, list, gains
 :mod:`.run`         run
+:mod:`.check`       check
 :mod:`.sweep`       sweep
 :mod:`.look`        plot, view, animate
 :mod:`.new`         new: a controller of one's own

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -17,13 +18,15 @@ from orchestrator.commands.options import (
     add_set,
     add_system,
     assignments,
+    read,
 )
-from orchestrator.commands.streams import show
+from orchestrator.commands.streams import say, show
 from orchestrator.errors import InputError
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.exchange.verify import verify
+from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.folder import replaced
-from orchestrator.experiments.preparation import DEFAULT_STEP, Request, load, loaded, prepare
+from orchestrator.experiments.preparation import DEFAULT_STEP, Request, left_behind, load, prepare
 from orchestrator.system.container import write_container
 from orchestrator.system.osp import write_osp
 from orchestrator.system.ssp.writing import write_ssp
@@ -90,8 +93,8 @@ def _add_scenario(parser: argparse.ArgumentParser) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    request = Request(step=options.step, parameters=assignments(options))
-    prepared = prepare(*loaded(options.scenario, options.kind, options.fmi), request)
+    request = Request(step=options.step, parameters=assignments(options), strict=options.strict)
+    prepared = prepare(*read(options, options.fmi), request)
     experiment = prepared.experiment
     system = replace(
         prepared.system,
@@ -99,6 +102,8 @@ def _export(options: argparse.Namespace) -> int:
         stop_time=experiment.stop_time,
         step=experiment.step,
     )
+    if left := left_behind(prepared.scenario):
+        say(f"warning: {left}")
     folder = options.out or Path("exports", prepared.scenario.name)
     with replaced(folder) as unfinished:
         written = FORMATS[options.format](system, unfinished)
@@ -108,7 +113,7 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _verify(options: argparse.Namespace) -> int:
-    system = load(options.scenario)
+    system = _system(options.scenario)
     certificate = verify(
         options.table, system.with_parameters(assignments(options)), options.tolerance
     )
@@ -116,11 +121,21 @@ def _verify(options: argparse.Namespace) -> int:
     return OK
 
 
+def _system(name: str, kind: str = PYTHON) -> System:
+    """What another tool runs; warnings go where those of a command go."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        system = load(name, kind)
+    for warning in caught:
+        say(f"warning: {warning.message}")
+    return system
+
+
 def _hosts(options: argparse.Namespace) -> int:
     unknown = set(options.host) - HOSTS.keys()
     if unknown:
         raise InputError(f"no host {', '.join(sorted(unknown))}; there are {', '.join(HOSTS)}")
-    system = load(options.scenario, options.kind)
+    system = _system(options.scenario, options.kind)
     step = system.step or DEFAULT_STEP
     verdicts = compare(system, options.host or list(HOSTS), options.steps, step)
     show(f"{'host':13} {'package':34} {'max deviation':>14} {'steps/s':>8}  worst port")

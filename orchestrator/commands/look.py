@@ -14,16 +14,24 @@ from orchestrator.analysis.plot import plot, wanted
 from orchestrator.analysis.signals import CONTROL_POINT
 from orchestrator.analysis.view import page
 from orchestrator.analysis.visible import VisibleRows
-from orchestrator.commands.options import OK, add_experiment, add_set, add_system, request, status
+from orchestrator.commands.options import (
+    OK,
+    add_experiment,
+    add_set,
+    add_system,
+    read,
+    request,
+    status,
+)
 from orchestrator.commands.streams import show
 from orchestrator.errors import InputError, reason
-from orchestrator.experiments.folder import whole
-from orchestrator.experiments.preparation import loaded, prepare
+from orchestrator.experiments.preparation import prepare
 from orchestrator.experiments.record import add_to_record
 from orchestrator.experiments.stored import read_record, read_result, table_in
 from orchestrator.master.observer import Observer
 from orchestrator.master.progress import Progress
 from orchestrator.master.simulation import simulate
+from orchestrator.system.atomic import whole
 
 #: What a plot can be written as.
 _PLOTS = (".png", ".svg", ".pdf")
@@ -105,13 +113,19 @@ def _view(options: argparse.Namespace) -> int:
 
 
 def _animate(options: argparse.Namespace) -> int:
-    scenario, system = loaded(options.scenario, options.kind)
+    scenario, system = read(options)
     out = options.out or Path("results", f"{scenario.name}.gif")
     check_film(out, options.fps)
     prepared = prepare(scenario, system, request(options))
     seen = VisibleRows()
     observers: list[Observer] = [seen, Progress(scenario.name)]
-    ending = simulate(prepared.system, prepared.experiment, observers, loop=prepared.loop)
+    ending = simulate(
+        prepared.system,
+        prepared.experiment,
+        observers,
+        loop=prepared.loop,
+        attendants=prepared.attendants(),
+    )
     if missing := seen.missing(*CONTROL_POINT):
         raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
     title = scenario.title or scenario.name

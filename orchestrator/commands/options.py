@@ -8,11 +8,14 @@ from pathlib import Path
 from orchestrator.commands.streams import say
 from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import FMI, KINDS, NATIVE, PYTHON
-from orchestrator.experiments.preparation import Request
-from orchestrator.master.experiment import ORDERS
+from orchestrator.experiments.preparation import Request, loaded
+from orchestrator.experiments.scenario import Scenario
+from orchestrator.findings import Findings
+from orchestrator.master.experiment import ORDERS, order_of
 from orchestrator.master.loop import LOOPS
 from orchestrator.master.observer import Ending
 from orchestrator.system.names import PortName, port_name
+from orchestrator.system.structure import System
 
 #: Exit status: done, a simulation failed, bad usage or input, ended by the user.
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -24,6 +27,16 @@ def add_system(parser: argparse.ArgumentParser) -> None:
         "scenario",
         metavar="SCENARIO|FILE.toml|FILE.ssp",
         help="a scenario of `auv-fmu list`, a scenario file, or an SSP",
+    )
+    parser.add_argument(
+        "--variant",
+        metavar="NAME",
+        help="which description in an SSP: NAME.ssd; default: SystemStructure",
+    )
+    parser.add_argument(
+        "--strict",
+        action="store_true",
+        help="refuse what otherwise is a warning",
     )
 
 
@@ -40,9 +53,10 @@ def add_experiment(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--order",
-        choices=ORDERS,
-        default=ORDERS[0],
-        help=f"order in which the components are stepped; default: {ORDERS[0]}",
+        type=order_of,
+        metavar=f"{'|'.join(ORDERS)}|NAME,...",
+        help="order in which the components are stepped, or the names of all of them; default: the "
+        f"scenario's, else {ORDERS[0]}",
     )
     add_kind(parser)
 
@@ -101,6 +115,15 @@ def add_out(parser: argparse.ArgumentParser, default: Path | None, otherwise: st
     )
 
 
+def read(options: argparse.Namespace, fmi: str = FMI[0]) -> tuple[Scenario, System]:
+    """What is run; what is not as it should be, and does no harm, becomes a warning."""
+    findings = Findings(options.strict)
+    found = loaded(options.scenario, options.kind, fmi, options.variant, findings)
+    for note in findings.notes:
+        say(f"warning: {note}")
+    return found
+
+
 def request(options: argparse.Namespace) -> Request:
     """What the user asks for beyond the scenario."""
     return Request(
@@ -109,13 +132,18 @@ def request(options: argparse.Namespace) -> Request:
         options.order,
         assignments(options),
         kind=options.kind,
+        strict=options.strict,
     )
 
 
 def status(name: str, ending: Ending) -> int:
-    """Exit status of a run, after saying what went wrong in it."""
+    """Exit status of a run, after saying what has happened, and what went wrong in it."""
     for message in ending.messages:
         say(message)
+    for occurrence in ending.events:
+        say(f"{name}: {occurrence}")
+    if ending.remark is not None:
+        say(f"{name} {ending.remark}")
     if ending.failure is None:
         return OK
     say(f"{name} {ending.failure}")

@@ -19,12 +19,15 @@ from orchestrator.commands.options import (
     add_out,
     add_set,
     add_system,
+    read,
     request,
     status,
 )
 from orchestrator.commands.streams import say, show
-from orchestrator.experiments.preparation import loaded, prepare, with_companion
+from orchestrator.experiments.inputs import inputs_of
+from orchestrator.experiments.preparation import prepare, with_companion
 from orchestrator.experiments.run import Files, run_into
+from orchestrator.experiments.scenario import read_scenario
 from orchestrator.master.files import FORMATS
 from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.isolated import STEP_TIMEOUT, isolation_of
@@ -67,21 +70,63 @@ def add_to(commands: Any) -> None:
         help="how long an isolated FMU may take for one call [s]; "
         f"default: {STEP_TIMEOUT:g}; needs --isolate",
     )
+    run.add_argument(
+        "--checkpoint-every",
+        type=float,
+        metavar="S",
+        help="keep what it takes to go on, every so many simulated seconds, in DIR/checkpoint",
+    )
+    run.add_argument(
+        "--resume", action="store_true", help="go on from the last checkpoint in DIR/checkpoint"
+    )
+    run.add_argument(
+        "--real-time",
+        type=float,
+        metavar="FACTOR",
+        help="go no faster than FACTOR simulated seconds in a second",
+    )
     add_loop(run)
+    run.add_argument(
+        "--events",
+        metavar="SCENARIO|FILE.toml",
+        help="what happens during the run: the events of another scenario, for this one or an SSP",
+    )
+    run.add_argument(
+        "--inputs",
+        type=Path,
+        metavar="FILE",
+        help="a table in CSV or Parquet of inputs that nothing feeds, over time",
+    )
     run.set_defaults(action=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
     isolation = isolation_of(options.isolate, options.step_timeout)
-    wanted = replace(request(options), isolation=isolation, loop=options.loop)
-    runs = with_companion(prepare(*loaded(options.scenario, options.kind), wanted), wanted)
+    wanted = replace(
+        request(options),
+        isolation=isolation,
+        loop=options.loop,
+        real_time=options.real_time,
+        events=None if options.events is None else read_scenario(options.events).events,
+        inputs=inputs_of(options.inputs),
+    )
+    runs = with_companion(prepare(*read(options), wanted), wanted)
     folder = options.out or Path("results", runs[0].scenario.name)
-    files = Files(options.interval, options.columns, options.format, options.figures)
+    files = Files(
+        options.interval,
+        options.columns,
+        options.format,
+        options.figures,
+        options.checkpoint_every,
+        options.resume,
+    )
     # Until all is said: who stops a run several times wants to know, too, where its rows are.
     with held_interrupts(_answer):
         finished = run_into(folder, runs, files, options.command, say)
         for run in finished:
             _print_summary(run.metrics)
+            for note in run.notes:
+                show(f"  {note}")
         show(f"written to {finished[0].folder}{os.sep}")
         if finished[0].folder != folder:
             say(f"{folder} keeps the whole result that was there before")

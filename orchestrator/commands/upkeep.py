@@ -10,11 +10,12 @@ from orchestrator.commands.options import OK, add_out
 from orchestrator.commands.streams import show
 from orchestrator.exchange.reference import write_reference
 from orchestrator.experiments.bundle import current_fmus, run_fmus
-from orchestrator.experiments.folder import replaced, whole
+from orchestrator.experiments.folder import replaced
 from orchestrator.experiments.scenario_page import scenario_page
 from orchestrator.paper.errata import errata_page
 from orchestrator.studies.ready_page import ready_page
 from orchestrator.studies.study_page import study_page
+from orchestrator.system.atomic import whole
 
 
 def add_to(commands: Any) -> None:

@@ -12,9 +12,8 @@ import numpy as np
 from orchestrator.errors import InputError, last_line
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.library import COMPILERS, machines_compiler
-from orchestrator.master.schedule import stages
+from orchestrator.master.schedule import gathered, stages
 from orchestrator.system.component import Component
-from orchestrator.system.graph import has_feedthrough
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.unpacking import unpacked
@@ -85,17 +84,9 @@ def plan(system: System, experiment: Experiment, library: Library = library_of) 
     lines += copies("connect", system.connections)
     number = dict(zip(system.components, count()))
     parts = stages(system, experiment.order)
-    for i, names in enumerate(parts):
-        gathered = [c for c in system.connections if _stage(system, c, parts) == i]
-        lines += ["stage", *copies("gather", gathered), *(f"member {number[n]}" for n in names)]
+    for names, taken in zip(parts, gathered(system, parts), strict=True):
+        lines += ["stage", *copies("gather", taken), *(f"member {number[n]}" for n in names)]
     return "\n".join(lines) + "\n"
-
-
-def _stage(system: System, connection: Connection, parts: Sequence[Sequence[str]]) -> int:
-    """Which stage begins with this value: a state must be taken before anybody advances."""
-    if len(parts) == 1 or not has_feedthrough(system, connection):
-        return 0
-    return next(i for i, names in enumerate(parts) if connection.target.component in names)
 
 
 def _fmu(component: Component, library: Path, values: dict[str, Value]) -> Iterator[str]:

@@ -26,8 +26,9 @@ from orchestrator.experiments.bill_of_materials import (
     checksums,
     digest_of,
 )
-from orchestrator.experiments.folder import replaced, to_disk
+from orchestrator.experiments.folder import replaced
 from orchestrator.experiments.wiring import closed_loop
+from orchestrator.system.atomic import to_disk
 from orchestrator.system.children import run_module
 from orchestrator.system.component import WRITABLE
 from orchestrator.system.leftovers import claimed, remove_left

@@ -6,7 +6,8 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from orchestrator.errors import InputError, did_you_mean, shortened
+from orchestrator.errors import did_you_mean, shortened
+from orchestrator.findings import Findings
 
 
 class Entry(NamedTuple):
@@ -35,18 +36,20 @@ def check_entries(where: object, content: Mapping[str, Any], entries: Mapping[st
         entries: that it may have.
 
     Raises:
-        InputError: it holds something else.
+        Refused: it holds something else.
 
     """
+    findings = Findings()
     for key, value in content.items():
         if key not in entries:
             hint = did_you_mean(key, entries) or f"; use {', '.join(entries)}"
-            raise InputError(f"{where}: unknown entry {key!r}{hint}")
-        if not entries[key].fits(value):
+            findings.problem(f"{where}: unknown entry {key!r}{hint}")
+        elif not entries[key].fits(value):
             shown = shortened(repr(value))
-            raise InputError(
+            findings.problem(
                 f"{where}: {key} = {shown} is of the wrong type, not a {entries[key].kind}"
             )
+    findings.refuse()
 
 
 def is_text(value: Any) -> bool:

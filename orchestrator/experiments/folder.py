@@ -1,4 +1,4 @@
-"""A folder of results that changes all at once, and files that do.
+"""A folder of results that changes all at once.
 
 Files are written into a hidden folder within it. When all are whole and on the disk, that folder
 gets another name: from then on its files are the result. They take the places of those of an
@@ -10,7 +10,6 @@ beside it.
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 from collections.abc import Callable, Iterator
@@ -20,10 +19,10 @@ from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
 from typing import Any
-from uuid import uuid4
 
 from orchestrator.errors import InputError, reason
-from orchestrator.system.leftovers import claimed, remove_left
+from orchestrator.system.atomic import to_disk
+from orchestrator.system.leftovers import claimed
 
 #: The record of a run: what is there when everything is.
 RECORD = "run.json"
@@ -36,12 +35,6 @@ _UNFINISHED, _WHOLE = ".unfinished-", ".whole"
 
 #: The record of the result whose place is being taken.
 _EARLIER = ".earlier.json"
-
-#: How the name of a file begins that is being written.
-_PARTIAL = ".partial-"
-
-#: What file systems answer that know no fsync.
-_CANNOT = (errno.EINVAL, errno.ENOTSUP)
 
 
 @contextmanager
@@ -106,46 +99,6 @@ def settle(folder: Path) -> None:
                 _settle(folder)
         except OSError as error:
             raise InputError(_cannot_write(folder, error)) from error
-
-
-@contextmanager
-def whole(path: Path) -> Iterator[Path]:
-    """A file to write instead of another, whose place it takes at the end.
-
-    An exception in the context leaves the other as it was.
-    """
-    remove_left(path.parent, f"{_PARTIAL}*")
-    # Ends as the other does: some writers tell the format by that.
-    partial = path.with_name(f"{_PARTIAL}{uuid4().hex}{path.suffix}")
-    try:
-        partial.touch()
-        with claimed(partial):
-            yield partial
-            to_disk(partial)
-            partial.replace(path)
-        to_disk(path.parent)
-    finally:
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
-
-
-def to_disk(path: Path) -> None:
-    """Have a file, or the names in a folder, outlast a power cut.
-
-    Raises:
-        OSError: it is not all there; some file systems say so only now.
-
-    """
-    if os.name != "posix":
-        return
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    except OSError as error:
-        if error.errno not in _CANNOT:
-            raise
-    finally:
-        os.close(descriptor)
 
 
 @contextmanager

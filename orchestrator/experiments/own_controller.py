@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 from orchestrator.errors import InputError, reason
 from orchestrator.experiments.bundle import run_fmus
-from orchestrator.experiments.folder import whole
+from orchestrator.system.atomic import whole
 from orchestrator.system.leftovers import process_folder
 
 _TEMPLATES = Path(__file__).with_name("templates")

@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, TypeVar
 
 from auv_fmu.euler import STEP
 from orchestrator.analysis.figures import check_figure
 from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import FMI, PYTHON, current_fmus
+from orchestrator.experiments.events import check_events, read_events, shared_events
+from orchestrator.experiments.inputs import Inputs, read_inputs
 from orchestrator.experiments.scenario import Scenario, read_scenario
 from orchestrator.experiments.wiring import closed_loop
-from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.findings import Findings
+from orchestrator.master.attendant import Attendant
+from orchestrator.master.events import Event, Events
+from orchestrator.master.experiment import ORDERS, Experiment, Order
 from orchestrator.master.isolated import Isolation
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
+from orchestrator.master.observer import Ending
+from orchestrator.master.paces import paces, with_common_step
+from orchestrator.master.playback import Course, Playback
+from orchestrator.master.real_time import check_factor
+from orchestrator.master.schedule import delays, stages
 from orchestrator.system.component import RUNNABLE, WRITABLE
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.reading import read_ssp
 from orchestrator.system.structure import System
+
+T = TypeVar("T")
 
 #: Communication step of the paper [s], for systems that name none.
 DEFAULT_STEP = STEP
@@ -30,46 +45,85 @@ class Request:
 
     Attributes:
         stop_time, step: experiment [s]; None: the scenario's or the system's own.
-        order: of evaluation.
+        order: of evaluation; None: the scenario's own, or else the first of :data:`ORDERS`.
         parameters: values that win over the scenario's.
         kind: of the bundle's FMUs, one of :data:`orchestrator.experiments.bundle.KINDS`.
         isolation: of the FMUs in processes of their own; None: they run in this one.
         loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
+        strict: whether what is not as it should be is refused, even if it is harmless.
+        steps: of components that take longer ones of their own [s]; they win over the scenario's.
+        real_time: simulated seconds in a second; None: as many as can be had.
+        events: in the place of the scenario's, as a scenario file writes them; None: its own.
+        inputs: in the place of the scenario's.
 
     """
 
     stop_time: float | None = None
     step: float | None = None
-    order: str = ORDERS[0]
+    order: Order | None = None
     parameters: Mapping[PortName, object] = field(default_factory=dict)
     isolation: Isolation | None = None
     kind: str = PYTHON
     loop: str = LOOPS[0]
+    strict: bool = False
+    steps: Mapping[str, float] = field(default_factory=dict)
+    real_time: float | None = None
+    events: Sequence[Mapping[str, Any]] | None = None
+    inputs: Inputs | None = None
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A system that is ready to be run, the scenario that it comes from, and how it is stepped."""
+    """A system that is ready to be run, the scenario that it comes from, and how it is stepped.
+
+    Attributes:
+        events: that happen to it.
+        course: of inputs over time; None: they keep their values.
+
+    """
 
     scenario: Scenario
     system: System
     experiment: Experiment
     isolation: Isolation | None = None
     loop: Loop = PYTHON_LOOP
+    real_time: float | None = None
+    events: tuple[Event, ...] = ()
+    course: Course | None = None
+
+    def attendants(self) -> list[Attendant]:
+        """Who acts on one run of it between its steps."""
+        playing: list[Attendant] = [] if self.course is None else [Playback(self.course)]
+        return playing + ([Events(self.events)] if self.events else [])
+
+    def missed(self, ending: Ending) -> list[Event]:
+        """The events that have not happened in a run of it."""
+        happened = {occurrence.event for occurrence in ending.events}
+        return [event for i, event in enumerate(self.events) if i not in happened]
 
 
-def load(name: str | Path, kind: str = PYTHON) -> System:
+def load(
+    name: str | Path, kind: str = PYTHON, *, variant: str | None = None, strict: bool = False
+) -> System:
     """The system of a scenario, or of an SSP, with its experiment.
+
+    What is not as it should be and does no harm is a warning.
 
     Args:
         name: of a scenario of the bundle, or path of a .toml or .ssp file.
         kind: of the bundle's FMUs, `python` or `native`.
+        variant: which of the descriptions in an SSP; None: the default.
+        strict: refuse what otherwise is a warning.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.
 
     """
-    scenario, system = loaded(str(name), kind)
+    with warned(strict) as findings:
+        scenario, system = loaded(str(name), kind, variant=variant, findings=findings)
+        if left := left_behind(scenario):
+            findings.note(left)
+            findings.refuse()
     return replace(
         system,
         name=scenario.name,
@@ -78,13 +132,30 @@ def load(name: str | Path, kind: str = PYTHON) -> System:
     )
 
 
-def loaded(name: str, kind: str = PYTHON, fmi: str = FMI[0]) -> tuple[Scenario, System]:
+@contextmanager
+def warned(strict: bool = False) -> Iterator[Findings]:
+    """Findings whose notes become warnings, as Python has them."""
+    findings = Findings(strict)
+    yield findings
+    for note in findings.notes:
+        warnings.warn(note, stacklevel=4)
+
+
+def loaded(
+    name: str,
+    kind: str = PYTHON,
+    fmi: str = FMI[0],
+    variant: str | None = None,
+    findings: Findings | None = None,
+) -> tuple[Scenario, System]:
     """A scenario and its system.
 
     Args:
         name: of a scenario of the bundle, or path of a .toml or .ssp file.
         kind: of the bundle's FMUs, `python` or `native`; FMUs that a file names are as they are.
         fmi: their version of FMI. The master can step those of the first.
+        variant: which of the descriptions in an SSP; None: the default.
+        findings: takes what is wrong with it; None: nobody asks for what does no harm.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.
@@ -92,11 +163,21 @@ def loaded(name: str, kind: str = PYTHON, fmi: str = FMI[0]) -> tuple[Scenario, 
     """
     if name.endswith(".ssp"):
         check_brings_its_own(name, kind, fmi)
-        return Scenario(Path(name).stem, title=Path(name).name), read_ssp(Path(name))
+        system = read_ssp(Path(name), variant, findings)
+        return Scenario(Path(name).stem, title=Path(name).name), system
+    if variant is not None:
+        raise InputError(f"{name}: has no variants; an SSP may have")
     scenario = read_scenario(name)
     check_figure(scenario.figure)
     versions = RUNNABLE if fmi == FMI[0] else WRITABLE
     return scenario, closed_loop(current_fmus(kind, fmi), scenario, versions)
+
+
+def left_behind(scenario: Scenario) -> str | None:
+    """What of a scenario a system by itself does not have, in words."""
+    has = {"events": bool(scenario.events), "inputs": scenario.inputs is not None}
+    names = " and ".join(name for name, there in has.items() if there)
+    return f"{scenario.name}: the system comes without the scenario's {names}" if names else None
 
 
 def check_brings_its_own(name: str, kind: str, fmi: str = FMI[0]) -> None:
@@ -118,16 +199,48 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
 
     """
     system = system.with_parameters(request.parameters)
+    course, inputs = None, _first_given(request.inputs, scenario.inputs)
+    if inputs is not None:
+        given = set(request.parameters)
+        if request.inputs is None:
+            given |= set(scenario.parameters)
+        system, course = read_inputs(inputs, system, given)
     system.check()
+    events = scenario.events
+    if request.events is not None:
+        events = request.events
+        check_events("events", events)
     stop_time = _first_given(request.stop_time, scenario.stop_time, system.stop_time)
     if stop_time is None:
         raise InputError(f"{scenario.name}: names no stop time; give one with --stop-time")
+    system = replace(system, steps={**system.steps, **request.steps})
     step = _first_given(request.step, scenario.step, system.step)
     if step is None:
-        step = DEFAULT_STEP
-    experiment = Experiment(stop_time, step, request.order)
+        system = with_common_step(system)
+        step = _first_given(system.step, DEFAULT_STEP)
+        assert step is not None
+    order = request.order or scenario.order or ORDERS[0]
+    experiment = Experiment(stop_time, step, order, system.start_time or 0.0)
+    paces(system, step)
+    stages(system, order)
+    findings = Findings(request.strict)
+    for delay in delays(system, order):
+        findings.note(delay)
+    findings.refuse()
     loop = chosen(request.loop, experiment, request.isolation)
-    return Prepared(scenario, system, experiment, request.isolation, loop)
+    if request.real_time is not None:
+        check_factor(request.real_time)
+    happening = read_events(scenario.name, events, replace(system, step=step))
+    return Prepared(
+        scenario,
+        system,
+        experiment,
+        request.isolation,
+        loop,
+        request.real_time,
+        happening,
+        course,
+    )
 
 
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
@@ -143,14 +256,31 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     if not scenario.compare:
         return [prepared]
     companion, system = loaded(scenario.compare, request.kind)
+    played = prepared.course.targets if prepared.course else ()
     shared = {
         target: value
         for target, value in {**scenario.parameters, **request.parameters}.items()
-        if system.has(target)
+        if system.has(target) and target not in played
     }
-    same = replace(companion, stop_time=scenario.stop_time, step=scenario.step)
-    return [prepared, prepare(same, system, replace(request, parameters=shared))]
+    steps = {
+        name: step
+        for name, step in {**scenario.steps, **request.steps}.items()
+        if name in system.components
+    }
+    events = request.events
+    if events is None:
+        events = companion.events or scenario.events
+    same = replace(
+        companion,
+        stop_time=scenario.stop_time,
+        step=scenario.step,
+        order=scenario.order,
+        events=shared_events(events, system),
+        inputs=companion.inputs or scenario.inputs,
+    )
+    wanted = replace(request, parameters=shared, steps=steps, events=None)
+    return [prepared, prepare(same, system, wanted)]
 
 
-def _first_given(*values: float | None) -> float | None:
+def _first_given(*values: T | None) -> T | None:
     return next((value for value in values if value is not None), None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -14,10 +14,11 @@ from typing import Any
 
 from orchestrator.experiments.bill_of_materials import digest_of
 from orchestrator.experiments.bundle import NATIVE, PYTHON
-from orchestrator.experiments.folder import RECORD, whole
+from orchestrator.experiments.folder import RECORD
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.observer import Ending, Header
+from orchestrator.master.observer import Ending, Header, Occurrence
+from orchestrator.system.atomic import whole
 from orchestrator.system.names import port_name
 from orchestrator.system.unpacking import runs_python, unpacked
 
@@ -48,6 +49,7 @@ def write_record(
     ending: Ending,
     command: Sequence[str],
     clock: Clock,
+    remarks: Mapping[str, object] | None = None,
 ) -> None:
     """Write the record of a run into the folder of its files.
 
@@ -57,6 +59,7 @@ def write_record(
         header, ending: of its table.
         command: that has run it.
         clock: started with it.
+        remarks: what else there is to say of it.
 
     """
     experiment = header.experiment
@@ -68,12 +71,17 @@ def write_record(
         "command": list(command),
         **clock.times(),
         "failure": ending.failure,
+        "remark": ending.remark,
         "experiment": {
             "stop_time": experiment.stop_time,
             "step": experiment.step,
             "order": experiment.order,
+            "start_time": experiment.start_time,
+            "steps": dict(prepared.system.steps),
         },
         "loop": header.loop,
+        **(remarks or {}),
+        "events": [occurrence._asdict() for occurrence in ending.events],
         "fmus": {
             component.name: {
                 "file": component.fmu.name,
@@ -110,12 +118,27 @@ def add_to_record(file: Path) -> None:
         partial.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
 
 
+def read_ending(record: dict[str, Any]) -> Ending:
+    """How a run has ended, from its record."""
+    events = record.get("events", ())
+    return Ending(
+        record.get("failure"),
+        record.get("remark"),
+        events=tuple(Occurrence(float(e["time"]), str(e["text"]), str(e["label"])) for e in events),
+    )
+
+
 def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
     """The header of a table, from the record beside it."""
     experiment = record["experiment"]
     return Header(
         columns,
-        Experiment(experiment["stop_time"], experiment["step"], experiment["order"]),
+        Experiment(
+            experiment["stop_time"],
+            experiment["step"],
+            experiment["order"],
+            experiment.get("start_time", 0.0),
+        ),
         {port_name(name): value for name, value in record["parameters"].items()},
         record.get("loop", "python"),
     )

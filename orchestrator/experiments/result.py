@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,24 +13,28 @@ from typing import TYPE_CHECKING, Any
 
 from orchestrator.analysis.metrics import metrics_of
 from orchestrator.analysis.plot import plot
-from orchestrator.errors import InputError, did_you_mean
+from orchestrator.errors import InputError, did_you_mean, reason
 from orchestrator.experiments.bundle import PYTHON
-from orchestrator.experiments.folder import replaced
+from orchestrator.experiments.checkpoints import checkpoints_of, leave
+from orchestrator.experiments.folder import locked, replaced
+from orchestrator.experiments.inputs import inputs_of
 from orchestrator.experiments.preparation import (
     Prepared,
     Request,
     check_brings_its_own,
     loaded,
     prepare,
+    warned,
 )
 from orchestrator.experiments.record import Clock, write_record
 from orchestrator.experiments.run import metrics_json, write_metrics
 from orchestrator.experiments.scenario import Scenario
-from orchestrator.master.experiment import ORDERS
+from orchestrator.master.checkpoint import Checkpoints
+from orchestrator.master.experiment import Order, written_order
 from orchestrator.master.files import FORMATS
 from orchestrator.master.isolated import isolation_of
 from orchestrator.master.loop import LOOPS
-from orchestrator.master.observer import Observer
+from orchestrator.master.observer import Observer, Occurrence
 from orchestrator.master.progress import Progress
 from orchestrator.master.simulation import simulate as run
 from orchestrator.master.table import Table
@@ -78,6 +83,10 @@ class Result(Table):
     `result["plant.eta.x"]` is a column as a numpy array; an unknown name is a KeyError with a
     suggestion. `result.time` holds the times, `result.columns` the names of all columns,
     `result.failure` why the run ended early, or None.
+
+    Attributes:
+        resumed_at: where it went on with a checkpoint of an earlier process [s]; None: it did not.
+
     """
 
     def __init__(self, prepared: Prepared) -> None:
@@ -85,14 +94,15 @@ class Result(Table):
         super().__init__()
         self._prepared = prepared
         self._clock = Clock()
+        self.resumed_at: float | None = None
 
     def __repr__(self) -> str:
         """One line: what was run, and how far it came."""
         end = f", {self.failure}" if self.failure else ""
-        last = self.time[-1] if len(self) else 0.0
+        first, last = (self.time[0], self.time[-1]) if len(self) else (0.0, 0.0)
         return (
             f"<Result {self._prepared.scenario.name}: {len(self)} rows of {len(self.columns)} "
-            f"columns, 0 to {last:g} s, {self.header.experiment.order}{end}>"
+            f"columns, {first:g} to {last:g} s, {written_order(self.header.experiment.order)}{end}>"
         )
 
     @cached_property
@@ -104,6 +114,11 @@ class Result(Table):
     def system(self) -> System:
         """What was run."""
         return self._prepared.system
+
+    @property
+    def events(self) -> tuple[Occurrence, ...]:
+        """What has happened during the run: each has a time [s], a text and a label."""
+        return self.ending.events
 
     def metrics(self) -> dict[str, Any]:
         """What the command line writes into metrics.json."""
@@ -171,12 +186,20 @@ def simulate(
     *,
     stop_time: float | None = None,
     step: float | None = None,
-    order: str = ORDERS[0],
+    order: Order | None = None,
     kind: str = PYTHON,
     progress: bool = False,
     isolate: bool = False,
     step_timeout: float | None = None,
     loop: str = LOOPS[0],
+    variant: str | None = None,
+    strict: bool = False,
+    steps: Mapping[str, float] | None = None,
+    events: Sequence[Mapping[str, Any]] | None = None,
+    inputs: str | Path | None = None,
+    checkpoint: str | Path | None = None,
+    checkpoint_every: float | None = None,
+    resume: bool = False,
 ) -> Result:
     """Run a scenario, an SSP or a system.
 
@@ -188,8 +211,11 @@ def simulate(
         parameters: values that win over the scenario's, by `component.parameter`: numbers, truth
             values, names, or text as it stands on the command line.
         stop_time: end of the run [s]; None: the scenario's own.
-        step: communication step [s]; None: the scenario's own, else 0.02.
-        order: `gauss-seidel`, as the paper's scheme has it, or `jacobi`, as most tools step.
+        step: communication step [s]; None: the scenario's own, else the longest that fits into
+            the steps that the FMUs were made for, else 0.02.
+        order: `gauss-seidel`, as the paper's scheme has it, `jacobi`, as most tools step, or the
+            names of all components, one stepped after the other; None: the scenario's own, else
+            `gauss-seidel`.
         kind: of the bundle's FMUs, `python` or `native`: translated to C, with the same numbers.
         progress: show a bar on runs that take longer than some seconds.
         isolate: run each FMU in a process of its own, whose end, whatever it does, is no more than
@@ -197,6 +223,20 @@ def simulate(
         step_timeout: how long an isolated FMU may take for one call [s]; None: 60.
         loop: what makes the steps: `python`, `compiled`, or `auto`, the compiled loop where it is
             to be had; the rows are the same.
+        variant: which of the descriptions in an SSP; None: the default.
+        strict: refuse what otherwise is a warning.
+        steps: of components that take longer ones of their own [s], multiples of the communication
+            step; they win over the scenario's.
+        events: what happens during the run, in the place of the scenario's own: tables as a
+            scenario file has them, such as `{"at": 20.0, "lose": "controller.tau.r"}`.
+        inputs: a table of inputs over time, in the place of the scenario's own: a .csv or .parquet
+            file.
+        checkpoint: folder for what it takes to go on after the process has ended, whatever ended
+            it; removed when the run has come to its end.
+        checkpoint_every: how often that is written, in simulated seconds; None: as often as
+            before, if the run is resumed.
+        resume: go on from there. The result has all rows, as if nothing had happened, and says in
+            `resumed_at` where it went on.
 
     Returns:
         The rows that were computed: all of them, or those before a failure, which
@@ -209,21 +249,65 @@ def simulate(
     """
     if isinstance(system, System):
         check_brings_its_own(str(system), kind)
+        if variant is not None:
+            raise InputError(f"{system}: has no variants; give it to load")
         scenario = Scenario(system.name)
     else:
-        scenario, system = loaded(str(system), kind)
+        with warned(strict) as findings:
+            scenario, system = loaded(str(system), kind, variant=variant, findings=findings)
     if not isinstance(parameters, Mapping | None):
         raise InputError(f"parameters: a mapping by component.parameter, not {parameters!r}")
     changes: dict[PortName, object] = {
         port_name(str(name)): value for name, value in (parameters or {}).items()
     }
     isolation = isolation_of(isolate, step_timeout)
-    request = Request(stop_time, step, order, changes, isolation, kind, loop)
+    request = Request(
+        stop_time,
+        step,
+        order,
+        changes,
+        isolation,
+        kind,
+        loop,
+        strict,
+        steps or {},
+        events=events,
+        inputs=inputs_of(inputs),
+    )
     prepared = prepare(scenario, system, request)
     result = Result(prepared)
     observers: list[Observer] = [result, *([Progress(scenario.name)] * progress)]
-    ending = run(prepared.system, prepared.experiment, observers, prepared.isolation, prepared.loop)
+    with _checkpoints(prepared, checkpoint, checkpoint_every, resume) as kept:
+        result.resumed_at = next((checkpoints.time for checkpoints in kept), None)
+        ending = run(
+            prepared.system,
+            prepared.experiment,
+            [*observers, *kept],
+            prepared.isolation,
+            prepared.loop,
+            [*kept, *prepared.attendants()],
+        )
+        leave(kept, ending.failure is None)
     for number in ending.signals:
         # Held back while the FMUs computed; now it does what it does elsewhere.
         signal.raise_signal(number)
     return result
+
+
+@contextmanager
+def _checkpoints(
+    prepared: Prepared, folder: str | Path | None, every: float | None, resume: bool
+) -> Iterator[Sequence[Checkpoints]]:
+    """The checkpoints of a run in a folder that is kept from others; none, if none are wanted."""
+    if folder is None and every is None and not resume:
+        yield ()
+        return
+    if folder is None or (every is None and not resume):
+        raise InputError("checkpoints need checkpoint=, and checkpoint_every= or resume=")
+    place = Path(folder)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        with locked(place):
+            yield checkpoints_of([prepared], place, every, resume)
+    except OSError as error:
+        raise InputError(f"cannot write into {place}: {reason(error)}") from error

@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from pathlib import Path
 from shutil import rmtree
 from tempfile import TemporaryDirectory
@@ -21,14 +22,18 @@ from orchestrator.analysis.sensors import velocities_reaching
 from orchestrator.analysis.signals import CONTROLLER, THETA_HAT
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError, reason
+from orchestrator.experiments.checkpoints import FOLDER, checkpoints_of, leave
 from orchestrator.experiments.folder import place_of, publish, replaced
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.experiments.record import Clock, write_record
 from orchestrator.experiments.scenario import Scenario
+from orchestrator.master.attendant import Attendant
+from orchestrator.master.checkpoint import Checkpoints
 from orchestrator.master.files import FORMATS
 from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.observer import Ending, Observer
 from orchestrator.master.progress import Progress
+from orchestrator.master.real_time import RealTime
 from orchestrator.master.selection import Selection, check_interval, matches, matching
 from orchestrator.master.simulation import simulate
 from orchestrator.master.transfer import KINDS
@@ -52,6 +57,8 @@ class Files:
         columns: of the table: `all`, `outputs`, or patterns with commas between them.
         format: of the table, a key of :data:`orchestrator.master.files.FORMATS`.
         figures: whether to draw them.
+        checkpoint_every: a checkpoint for so many simulated seconds [s]; None: none.
+        resume: go on from the one that an earlier process has left.
 
     """
 
@@ -59,16 +66,28 @@ class Files:
     columns: str = "all"
     format: str = "csv"
     figures: bool = True
+    checkpoint_every: float | None = None
+    resume: bool = False
 
 
 @dataclass(frozen=True)
 class Finished:
-    """A run whose files are written: where, what metrics.json holds, and how it has ended."""
+    """A run whose files are written.
+
+    Attributes:
+        folder: of its files.
+        name: of the scenario.
+        metrics: what metrics.json holds.
+        ending: how it has ended.
+        notes: what else there is to say of it, in lines.
+
+    """
 
     folder: Path
     name: str
     metrics: dict[str, Any]
     ending: Ending
+    notes: Sequence[str] = ()
 
 
 @dataclass
@@ -80,6 +99,21 @@ class _Done:
     metrics: dict[str, Any]
     seen: VisibleRows
     ending: Ending
+    real_time: RealTime | None
+    resumed_at: float | None
+
+    @property
+    def remarks(self) -> dict[str, object]:
+        """What else the record says."""
+        return {
+            **({} if self.real_time is None else {"real_time": self.real_time.record()}),
+            **({} if self.resumed_at is None else {"resumed_at": self.resumed_at}),
+        }
+
+    @property
+    def notes(self) -> list[str]:
+        """What else the user is told, in lines."""
+        return [] if self.real_time is None else [str(self.real_time)]
 
 
 def run_into(
@@ -117,16 +151,17 @@ def run_into(
         held_interrupts() as interrupts,
         replaced(folder, keep=lambda: bool(done)) as unfinished,
     ):
+        kept = checkpoints_of(runs, folder / FOLDER, files.checkpoint_every, files.resume, say)
         spare = unfinished / _SPARE
         # No zeros: some file systems need no room for them.
         spare.write_bytes(os.urandom(_SPARE_BYTES))
         try:
-            for prepared, columns in zip(runs, tables, strict=True):
+            for prepared, columns, checkpoints in zip_longest(runs, tables, kept):
                 for caution in cautions(prepared.system, prepared.experiment):
                     say(f"warning: {prepared.scenario.name}: {caution}")
                 target = unfinished / prepared.scenario.name if done else unfinished
                 target.mkdir(exist_ok=True)
-                run = _Running(target, prepared, files, columns)
+                run = _Running(target, prepared, files, columns, checkpoints)
 
                 def give_up(run: _Running = run) -> None:
                     _give_up(run, done, unfinished, folder, command, clock, say)
@@ -138,8 +173,11 @@ def run_into(
                         run.observers,
                         prepared.isolation,
                         prepared.loop,
+                        run.attendants,
                     )
                 done.append(run.ended(ending))
+                for event in () if ending.failure else prepared.missed(ending):
+                    say(f"warning: {prepared.scenario.name}: did not happen: {event}")
                 for caution in cautions_after(done[-1].seen):
                     say(f"warning: {prepared.scenario.name}: {caution}")
                 if interrupts:
@@ -162,14 +200,24 @@ def run_into(
         spare.unlink()
         _write_ends(done, command, clock)
         place = place_of(unfinished, folder)
-    return [Finished(place, run.prepared.scenario.name, run.metrics, run.ending) for run in done]
+    is_whole = len(done) == len(runs) and all(run.ending.failure is None for run in done)
+    leave(kept, is_whole, say)
+    return [
+        Finished(place, run.prepared.scenario.name, run.metrics, run.ending, run.notes)
+        for run in done
+    ]
 
 
 class _Running:
     """A run and the observers of its rows."""
 
     def __init__(
-        self, folder: Path, prepared: Prepared, files: Files, columns: Sequence[str] | None
+        self,
+        folder: Path,
+        prepared: Prepared,
+        files: Files,
+        columns: Sequence[str] | None,
+        checkpoints: Checkpoints | None,
     ) -> None:
         self._folder, self._prepared = folder, prepared
         self._metrics = Metrics()
@@ -183,18 +231,39 @@ class _Running:
             self._seen,
             Progress(prepared.scenario.name),
         ]
+        self.attendants: list[Attendant] = []
+        self._resumed_at = None
+        if checkpoints is not None:
+            self.observers.append(checkpoints)
+            self.attendants.append(checkpoints)
+            self._resumed_at = checkpoints.time
+        self._real_time = None if prepared.real_time is None else RealTime(prepared.real_time)
+        if self._real_time is not None:
+            self.attendants.append(self._real_time)
+        self.attendants += prepared.attendants()
 
     def ended(self, ending: Ending) -> _Done:
         """When its observers have been told the end."""
         values = metrics_json(self._metrics, self._prepared)
-        return _Done(self._folder, self._prepared, values, self._seen, ending)
+        return self._done(values, ending)
 
     def given_up(self) -> _Done:
         """Without what else can end it."""
         ending = Ending("was ended: an FMU did not return from its step")
         self._table.end(ending)
         values = {"scenario": self._prepared.scenario.name, "failure": ending.failure}
-        return _Done(self._folder, self._prepared, values, self._seen, ending)
+        return self._done(values, ending)
+
+    def _done(self, metrics: dict[str, Any], ending: Ending) -> _Done:
+        return _Done(
+            self._folder,
+            self._prepared,
+            metrics,
+            self._seen,
+            ending,
+            self._real_time,
+            self._resumed_at,
+        )
 
 
 def _give_up(
@@ -221,7 +290,8 @@ def _write_ends(done: Sequence[_Done], command: Sequence[str], clock: Clock) -> 
     """Write what is written last; the record of the first names the files of all."""
     for run in reversed(done):
         write_metrics(run.folder, run.metrics)
-        write_record(run.folder, run.prepared, run.seen.header, run.ending, command, clock)
+        header = run.seen.header
+        write_record(run.folder, run.prepared, header, run.ending, command, clock, run.remarks)
 
 
 def _draw(

@@ -19,8 +19,13 @@ from orchestrator.experiments.entries import (
     is_table,
     is_text,
 )
+from orchestrator.experiments.events import check_events
+from orchestrator.experiments.inputs import ENTRIES as INPUTS
+from orchestrator.experiments.inputs import Inputs
 from orchestrator.experiments.named import names_in, path_of
-from orchestrator.experiments.waypoints import path_parameters
+from orchestrator.experiments.waypoints import ENTRIES as PATH
+from orchestrator.experiments.waypoints import PLANNER, path_parameters
+from orchestrator.master.experiment import Order
 from orchestrator.reading import explained, text_of
 from orchestrator.system.names import PortName, port_name
 
@@ -47,12 +52,16 @@ class Scenario:
     compare: str = ""
     stop_time: float | None = None
     step: float | None = None
+    steps: Mapping[str, float] = field(default_factory=dict)
+    order: Order | None = None
     only: Sequence[str] = ()
     remark: str = ""
     components: Mapping[str, str] = field(default_factory=dict)
     wires: Mapping[str, str | bool] = field(default_factory=dict)
     parameters: Mapping[PortName, Any] = field(default_factory=dict)
     ours: Mapping[str, str] = field(default_factory=dict)
+    events: Sequence[Mapping[str, Any]] = ()
+    inputs: Inputs | None = None
     digest: str = ""
 
     @property
@@ -65,12 +74,16 @@ def _is_table_of_names(value: Any) -> bool:
     return is_table(value) and all(map(is_text, value.values()))
 
 
+def _are_tables(value: Any) -> bool:
+    return isinstance(value, list) and all(map(is_table, value))
+
+
 def _is_table_of_wires(value: Any) -> bool:
     return is_table(value) and all(is_text(v) or v is False for v in value.values())
 
 
-def _is_path(value: Any) -> bool:
-    return _is_table_of_names(value) and {"file"} <= value.keys() <= {"file", "component"}
+def _is_table_of_numbers(value: Any) -> bool:
+    return is_table(value) and all(map(is_number, value.values()))
 
 
 #: What a scenario file may hold, in the order of the reference page.
@@ -97,7 +110,25 @@ ENTRIES: dict[str, Entry] = {
         "none",
     ),
     "stop_time": Entry("number", is_number, "End of the run [s].", "100 s"),
-    "step": Entry("number", is_number, "Communication step [s].", "0.02 s"),
+    "step": Entry(
+        "number",
+        is_number,
+        "Communication step [s].",
+        "the longest that fits into the steps of all components, which are 0.02 s",
+    ),
+    "steps": Entry(
+        "table of numbers",
+        _is_table_of_numbers,
+        "Components that take longer steps of their own, as `component = step` [s], a multiple of "
+        "the communication step. Meanwhile they hold their inputs.",
+        "those that the FMUs were made for, where there is no `step`",
+    ),
+    "order": Entry(
+        "name, or list of names",
+        lambda value: is_text(value) or are_names(value),
+        "In which components are stepped: `gauss-seidel`, `jacobi`, or the names of all of them.",
+        "`gauss-seidel`",
+    ),
     "only": Entry(
         "list of names",
         are_names,
@@ -129,12 +160,22 @@ ENTRIES: dict[str, Entry] = {
         "the FMUs' own",
     ),
     "path": Entry(
-        "table with file, and component if it is not planner",
-        _is_path,
-        "Waypoints of a [PathPlanner](components/PathPlanner.md): `file` is a table in CSV, "
-        "relative to this one, with the columns `x,y,z` or `t,x,y,z` and a line a waypoint. They "
-        "become parameters of the component.",
+        "table",
+        is_table,
+        "Waypoints of a PathPlanner, from a table: [see below](#path).",
         "none",
+    ),
+    "events": Entry(
+        "list of tables",
+        _are_tables,
+        "What happens during the run, each as `[[events]]`: [see below](#events).",
+        "nothing",
+    ),
+    "inputs": Entry(
+        "table",
+        is_table,
+        "A table of inputs over time: [see below](#inputs).",
+        "inputs keep their values",
     ),
     "ours": Entry(
         "table of texts",
@@ -171,8 +212,7 @@ def _scenario(path: Path, text: str) -> Scenario:
         port_name(key): value for key, value in flattened(content.get("parameters", {}))
     }
     if "path" in content:
-        parameters = content["parameters"]
-        parameters |= _path_parameters(path, parameters, **content.pop("path"))
+        content["parameters"] |= _path_parameters(path, content.pop("path"), content["parameters"])
     content["ours"] = {key: str(why) for key, why in flattened(content.get("ours", {}))}
     content["components"] = {
         component: str(path.parent / fmu) if fmu.endswith(".fmu") else fmu
@@ -180,14 +220,23 @@ def _scenario(path: Path, text: str) -> Scenario:
     }
     if content.get("compare", "").endswith(".toml"):
         content["compare"] = str(path.parent / content["compare"])
+    check_events(path, content.get("events", ()))
+    if inputs := content.get("inputs"):
+        check_entries(f"{path}: inputs", inputs, INPUTS)
+        if "file" not in inputs:
+            raise InputError(f"{path}: inputs: name a file")
+        content["inputs"] = Inputs(**{**inputs, "file": path.parent / inputs["file"]})
     return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
 
 
 def _path_parameters(
-    path: Path, others: Mapping[PortName, Any], file: str, component: str = "planner"
+    path: Path, said: Mapping[str, str], others: Mapping[PortName, Any]
 ) -> dict[PortName, Any]:
     """What a path comes to, in a scenario with other parameters."""
-    found = path_parameters(path.parent / file, component)
+    check_entries(f"{path}: path", said, PATH)
+    if "file" not in said:
+        raise InputError(f"{path}: path: name a file")
+    found = path_parameters(path.parent / said["file"], said.get("component", PLANNER))
     for name in found.keys() & others.keys():
-        raise InputError(f"{path}: {name} is given by {file} already")
+        raise InputError(f"{path}: {name} is given by {said['file']} already")
     return found

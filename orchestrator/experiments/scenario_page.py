@@ -6,7 +6,10 @@ from collections.abc import Iterable
 from string import Template
 
 from orchestrator.analysis.figures import FIGURES
+from orchestrator.experiments.events import ENTRIES as EVENT
+from orchestrator.experiments.inputs import ENTRIES as INPUTS
 from orchestrator.experiments.scenario import ENTRIES, names, read_scenario
+from orchestrator.experiments.waypoints import ENTRIES as PATH
 from orchestrator.experiments.wiring import read_wiring
 
 _PAGE = Template("""\
@@ -22,6 +25,21 @@ This page is written by `auv-fmu docs`, from the declarations; a test runs its e
 ## Entries
 
 $entries
+
+### Path
+
+$path
+
+### Events
+
+What an event does is one of the last entries from `set` on; [the guide](events.md) says what names
+mean, and when an event acts.
+
+$events
+
+### Inputs
+
+$inputs
 
 A file with any other entry, or with a value of another kind, is refused in one line that names it.
 
@@ -123,6 +141,16 @@ def scenario_page() -> str:
     entries = (
         (f"`{name}`", entry.kind, entry.meaning, entry.default) for name, entry in ENTRIES.items()
     )
+    path, events, inputs = (
+        table(
+            ("entry", "value", "meaning", "without it"),
+            (
+                (f"`{name}`", entry.kind, entry.meaning, entry.default)
+                for name, entry in declared.items()
+            ),
+        )
+        for declared in (PATH, EVENT, INPUTS)
+    )
     components = (
         (f"`{name}`", f"[{fmu}](components/{fmu}.md)") for name, fmu in wiring["components"].items()
     )
@@ -133,6 +161,9 @@ def scenario_page() -> str:
     figures = ((f"`{kind}`", ", ".join(used)) for kind, used in drawn.items())
     return _PAGE.substitute(
         entries=table(("entry", "value", "meaning", "without it"), entries),
+        path=path,
+        events=events,
+        inputs=inputs,
         components=table(("component", "FMU"), components),
         wires=table(("inputs", "are fed by"), wires),
         figures=table(("`figure`", "as drawn for"), figures),

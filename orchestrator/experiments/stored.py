@@ -13,10 +13,10 @@ import numpy as np
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
 from orchestrator.experiments.folder import RECORD, settle
-from orchestrator.experiments.record import read_header
+from orchestrator.experiments.record import read_ending, read_header
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.files import FORMATS, read_columns, read_rows
-from orchestrator.master.observer import Ending, Header
+from orchestrator.master.observer import Header
 from orchestrator.master.table import Table
 from orchestrator.reading import explained, text_of
 
@@ -50,7 +50,7 @@ def read_result(path: Path, watched: Choice | None = None) -> tuple[str, Table]:
     table.take(first)
     for rows in blocks:
         table.take(rows)
-    table.end(Ending(record.get("failure")))
+    table.end(read_ending(record))
     return str(record.get("label") or record.get("scenario") or file.stem), table
 
 
@@ -84,7 +84,7 @@ def read_record(table: Path) -> dict[str, Any]:
         try:
             if table.name not in record["files"]:
                 return {}
-            header = read_header(record, ())
+            header, _ = read_header(record, ()), read_ending(record)
         except (KeyError, TypeError, AttributeError):
             raise ValueError("it lacks what a run writes") from None
         if not all(map(_is_value, header.parameters.values())):

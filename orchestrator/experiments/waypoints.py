@@ -9,9 +9,30 @@ from pathlib import Path
 from typing import Any
 
 from auv_fmu.path_planner import MOST
+from orchestrator.experiments.entries import Entry, is_text
 from orchestrator.reading import explained, lines_of
 from orchestrator.system.names import PortName
 from orchestrator.system.values import finite
+
+#: The planner of the closed loop.
+PLANNER = "planner"
+
+#: What `[path]` may hold.
+ENTRIES: dict[str, Entry] = {
+    "file": Entry(
+        "text",
+        is_text,
+        "A table in CSV, its path relative to this file, with the columns `x,y,z` [m] or `t,x,y,z` "
+        "and a line for each waypoint.",
+        "",
+    ),
+    "component": Entry(
+        "text",
+        is_text,
+        "The [PathPlanner](components/PathPlanner.md) whose parameters they become.",
+        f"`{PLANNER}`",
+    ),
+}
 
 #: The columns of a table, without times and with them, and what may separate them.
 _PLACE, _TIMED = ("x", "y", "z"), ("t", "x", "y", "z")

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import InputError, did_you_mean
 from orchestrator.experiments.scenario import Scenario
+from orchestrator.findings import Findings
 from orchestrator.system.component import RUNNABLE, Component, read_component
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import Connection, System
@@ -33,60 +35,77 @@ def closed_loop(
         versions: of FMI that its FMUs may have.
 
     Raises:
-        InputError: a component or group of ports that the scenario names does not exist.
+        Refused: a component or group of ports that the scenario names does not exist.
 
     """
+    findings = Findings()
     wiring = read_wiring()
     chosen, wires = wiring["components"], wiring["wires"]
     if scenario is not None:
-        chosen = chosen | scenario.components
-        for name in chosen:
-            if not re.fullmatch(r"\w+", name):
-                raise InputError(
-                    f"{scenario.name}: component {name!r}: write letters, digits and _ alone"
-                )
-        for target in scenario.wires.keys() - wires.keys():
-            if scenario.wires[target] is False:
-                raise InputError(
-                    f"{scenario.name}: there is no wire {target!r} to remove"
-                    f"{did_you_mean(target, wires)}"
-                )
-        wires = {
-            target: source
-            for target, source in (wires | scenario.wires).items()
-            if source is not False
-        }
-        missing = set(scenario.only) - chosen.keys()
-        if missing:
-            raise InputError(
-                f"{scenario.name}: only = {', '.join(sorted(missing))}: no such component; "
-                f"there are {', '.join(chosen)}"
-            )
-        if scenario.only:
-            chosen = {name: fmu for name, fmu in chosen.items() if name in scenario.only}
-            wires = {
-                target: source
-                for target, source in wires.items()
-                if {target.split(".")[0], source.split(".")[0]} <= chosen.keys()
-            }
-    components = {
-        name: read_component(
-            name, Path(fmu) if fmu.endswith(".fmu") else folder / f"{fmu}.fmu", versions
-        )
-        for name, fmu in chosen.items()
-    }
+        chosen, wires = _changed(scenario, chosen, wires, findings)
+    components = {}
+    for name, fmu in chosen.items():
+        with findings.collecting():
+            path = Path(fmu) if fmu.endswith(".fmu") else folder / f"{fmu}.fmu"
+            components[name] = read_component(name, path, versions)
+    findings.refuse()
+    connections: list[Connection] = []
+    for target, source in wires.items():
+        with findings.collecting():
+            connections += _wire(components, target, source)
     system = System(
         name=wiring["name"],
         components=components,
-        connections=tuple(
-            connection
-            for target, source in wires.items()
-            for connection in _wire(components, target, source)
-        ),
+        connections=tuple(connections),
         stop_time=wiring["experiment"]["stop_time"],
         step=wiring["experiment"]["step"],
     )
-    return system if scenario is None else system.with_parameters(scenario.parameters)
+    if scenario is not None:
+        for name, value in scenario.parameters.items():
+            with findings.collecting():
+                system = system.with_parameters({name: value})
+        system = replace(system, steps=scenario.steps)
+    findings.refuse()
+    return system
+
+
+def _changed(
+    scenario: Scenario,
+    chosen: Mapping[str, str],
+    wires: Mapping[str, str],
+    findings: Findings,
+) -> tuple[dict[str, str], dict[str, str]]:
+    """The components and wires of a scenario."""
+    there = {**chosen, **scenario.components}
+    for name in there:
+        if not re.fullmatch(r"\w+", name):
+            findings.problem(
+                f"{scenario.name}: component {name!r}: write letters, digits and _ alone"
+            )
+    for target in scenario.wires.keys() - wires.keys():
+        if scenario.wires[target] is False:
+            findings.problem(
+                f"{scenario.name}: there is no wire {target!r} to remove"
+                f"{did_you_mean(target, wires)}"
+            )
+    wired = {
+        target: str(source)
+        for target, source in {**wires, **scenario.wires}.items()
+        if source is not False
+    }
+    if missing := set(scenario.only) - there.keys():
+        findings.problem(
+            f"{scenario.name}: only = {', '.join(sorted(missing))}: no such component; "
+            f"there are {', '.join(there)}"
+        )
+    if scenario.only:
+        there = {name: fmu for name, fmu in there.items() if name in scenario.only}
+        wired = {
+            target: source
+            for target, source in wired.items()
+            if {target.split(".")[0], source.split(".")[0]} <= there.keys()
+        }
+    return there, wired
 
 
 def _wire(components: Mapping[str, Component], target: str, source: str) -> list[Connection]:

@@ -6,17 +6,26 @@ module                  what it holds
 :mod:`.experiment`      start, stop and step of a run: t_k = k h
 :mod:`.simulation`      a run from the first exchange to the last step
 :mod:`.instance`        what a run asks of a component
+:mod:`.binary`          the library of an FMU, loaded once a process
 :mod:`.loaded`          an FMU loaded into this process
 :mod:`.isolated`        an FMU in a process of its own, from this side
+:mod:`.placing`         in which process each FMU runs
 :mod:`.channel`         messages between the two
 :mod:`.serving`         what that process does
 :mod:`.keeper`          the process that starts such processes, and leaves none behind
 :mod:`.log`             what FMUs have to say
 :mod:`.row`             the row of all values
+:mod:`.texts`           texts, for which numbers stand in the row
 :mod:`.transfer`        the FMI calls that move them
+:mod:`.paces`           which components take longer steps of their own
 :mod:`.schedule`        which components are stepped when, and on whose outputs
 :mod:`.signals`         what is done to values on their way from outputs to inputs
 :mod:`.attendant`       who acts on a run between two steps
+:mod:`.events`          what happens to a run: at a time, or at a condition
+:mod:`.playback`        inputs that follow a table
+:mod:`.checkpoint`      what a run needs to go on in another process
+:mod:`.spool`           rows in a file that grows, to be read again
+:mod:`.real_time`       a run that goes no faster than a clock
 :mod:`.loop`            the steps in Python, one by one, and which loop makes them
 :mod:`.stepper`         the steps compiled, some hundred in one call of stepper.c
 :mod:`.layout`          what stepper.c works on

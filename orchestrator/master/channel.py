@@ -1,15 +1,16 @@
 """Messages between this process and that of an FMU.
 
-A message is a frame of numbers, whose size both sides know, and a note, which is JSON; the first
-number of the frame is the note's length. In a step there is nothing to note, so that a message is
-one write and one read. Numbers and JSON are all that is read: whoever runs an FMU cannot be made
-to run anything else by its process.
+A message is a frame of numbers, whose size both sides know, and a note, which is JSON, with bytes
+in base64; the first number of the frame is the note's length. In a step there is nothing to note,
+so that a message is one write and one read. Numbers and JSON are all that is read: whoever runs an
+FMU cannot be made to run anything else by its process.
 """
 
 from __future__ import annotations
 
 import json
 import socket
+from base64 import b64decode, b64encode
 from collections.abc import Callable
 from typing import Any
 
@@ -18,8 +19,11 @@ import numpy as np
 from orchestrator.master.transfer import KINDS
 from orchestrator.system.component import Component
 
-#: Bytes beyond which a note is none.
-_LONGEST_NOTE = 1 << 26
+#: Bytes beyond which a note is none: the state of an FMU may be large.
+_LONGEST_NOTE = 1 << 30
+
+#: What stands for bytes in a note: an object with this key alone, which is no variable's name.
+_BYTES = "\0base64"
 
 
 class Channel:
@@ -59,7 +63,7 @@ class Channel:
             OSError: the other end is closed.
 
         """
-        text = b"" if note is None else json.dumps(note).encode()
+        text = b"" if note is None else json.dumps(note, default=_as_text).encode()
         self._sent[0] = len(text)
         self._move(self._connection.send, self._sent_bytes)
         if text:
@@ -81,7 +85,7 @@ class Channel:
             raise ValueError("no message")
         text = bytearray(int(length))
         self._move(self._connection.recv_into, memoryview(text))
-        return json.loads(text)
+        return json.loads(text, object_hook=_from_text)
 
     def close(self) -> None:
         """Let the other end know that there is no more."""
@@ -102,6 +106,14 @@ class Channel:
             if n == 0:
                 raise EOFError
             data = data[n:]
+
+
+def _as_text(value: bytes) -> dict[str, str]:
+    return {_BYTES: b64encode(value).decode("ascii")}
+
+
+def _from_text(read: dict[str, Any]) -> Any:
+    return b64decode(read[_BYTES], validate=True) if read.keys() == {_BYTES} else read
 
 
 def sizes(component: Component) -> tuple[int, int]:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import floor, isfinite, ulp
+from math import ceil, floor, isfinite, ulp
 from numbers import Real
+from typing import TypeAlias
 
 from orchestrator.errors import InputError
 
 #: Orders in which components are stepped; the first is the default.
-ORDERS = ("gauss-seidel", "jacobi")
+ORDERS = GAUSS_SEIDEL, JACOBI = "gauss-seidel", "jacobi"
+
+#: One of these, or the names of all components, one stepped after the other.
+Order: TypeAlias = str | Sequence[str]
 
 #: A rest shorter than this share of the run, and than that of a step, is a rounding error.
 ROUNDING, _MOST_OF_A_STEP = 1e-9, 1e-3
@@ -19,44 +23,65 @@ ROUNDING, _MOST_OF_A_STEP = 1e-9, 1e-3
 MOST_STEPS = 1_000_000_000
 
 
+def order_of(text: str) -> Order:
+    """An order as a command line has it: one of :data:`ORDERS`, or names with commas."""
+    return tuple(name.strip() for name in text.split(",")) if "," in text else text
+
+
+def written_order(order: Order) -> str:
+    """An order as a command line has it."""
+    return order if isinstance(order, str) else ",".join(order)
+
+
 @dataclass(frozen=True)
 class Experiment:
-    """What to run a system for, from t = 0.
+    """What to run a system for.
 
     Attributes:
-        stop_time: end [s]; the last step is shorter if it is no multiple of the step.
+        stop_time: end [s]; the last step is shorter if the run is no multiple of the step.
         step: communication step [s].
-        order: in which components are stepped, one of :data:`ORDERS`.
+        order: in which components are stepped, one of :data:`ORDERS` or the names of all of them.
+        start_time: begin [s].
 
     """
 
     stop_time: float
     step: float
-    order: str = ORDERS[0]
+    order: Order = ORDERS[0]
+    start_time: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what cannot be run."""
-        for name in ("stop_time", "step"):
+        for name in ("start_time", "stop_time", "step"):
             value = getattr(self, name)
             if not isinstance(value, Real) or isinstance(value, bool):
-                raise InputError(f"stop time and step must be numbers, not {value!r}")
+                raise InputError(f"times and step must be numbers, not {value!r}")
             # numpy's numbers do not go into JSON.
             try:
                 object.__setattr__(self, name, float(value))
             except OverflowError:
-                raise InputError("stop time and step must be smaller than 1e308 s") from None
-        if not all(isfinite(value) and value > 0.0 for value in (self.stop_time, self.step)):
+                raise InputError("times and step must be smaller than 1e308 s") from None
+        if not all(isfinite(value) and value > 0.0 for value in (self._length, self.step)):
+            after = f" after {self.start_time:g} s" if self.start_time else ""
             raise InputError(
-                f"stop time {self.stop_time:g} s and step {self.step:g} s must be positive, and "
-                "finite"
+                f"stop time {self.stop_time:g} s{after} and step {self.step:g} s must be positive, "
+                "and finite"
             )
-        if self.stop_time / self.step > MOST_STEPS:
+        if self._length / self.step > MOST_STEPS:
             raise InputError(
-                f"{self.stop_time:g} s in steps of {self.step:g} s are more than "
-                f"{MOST_STEPS:,} steps"
+                f"{self._length:g} s in steps of {self.step:g} s are more than {MOST_STEPS:,} steps"
             )
-        if self.order not in ORDERS:
-            raise InputError(f"order {self.order!r}: use one of {', '.join(ORDERS)}")
+        if not isinstance(self.order, str):
+            object.__setattr__(self, "order", tuple(self.order))
+        elif self.order not in ORDERS:
+            raise InputError(
+                f"order {self.order!r}: use one of {', '.join(ORDERS)}, or name every component"
+            )
+
+    @property
+    def _length(self) -> float:
+        """How long it lasts [s]."""
+        return self.stop_time - self.start_time
 
     @property
     def full_steps(self) -> int:
@@ -70,11 +95,13 @@ class Experiment:
 
     @property
     def _in_steps(self) -> float:
-        """The stop time in steps; a whole number where it is one but for rounding."""
+        """The run in steps; a whole number where it is one but for rounding."""
         # However small its share of a step, a run is not empty.
-        n = max(self.stop_time / self.step, ulp(0.0))
-        nearest = round(n)
-        return nearest if abs(n - nearest) <= min(ROUNDING * nearest, _MOST_OF_A_STEP) else n
+        return _rounded(max(self._length / self.step, ulp(0.0)))
+
+    def reaching(self, time: float) -> int:
+        """After how many steps a time [s] has come: the first t_k that is not before it."""
+        return max(ceil(_rounded((time - self.start_time) / self.step)), 0)
 
     @property
     def rows(self) -> int:
@@ -83,19 +110,33 @@ class Experiment:
 
     def time(self, k: int) -> float:
         """The time after k steps [s]."""
-        return k * self.step if k <= self.full_steps else self.stop_time
+        return self.start_time + k * self.step if k <= self.full_steps else self.stop_time
+
+    def length(self, k: int, n: int) -> float:
+        """How long n steps after the k-th last [s], or as many of them as are left."""
+        if k + n > self.full_steps and self.has_short_step:
+            return self.stop_time - self.time(k)
+        return (min(k + n, self.full_steps) - k) * self.step
 
     def steps(self, made: int = 0) -> Iterator[tuple[int, float, float, float]]:
-        """Number, beginning, length and end of every step [s]: t_k = k h, never accumulated.
+        """Number, beginning, length and end of every step [s].
+
+        It ends at t_k = t_0 + k h, which is never accumulated.
 
         Args:
             made: how many steps have been made.
 
         """
-        step, t = self.step, self.time(made)
+        start, step, t = self.start_time, self.step, self.time(made)
         for k in range(made + 1, self.full_steps + 1):
-            end = k * step
+            end = start + k * step
             yield k, t, step, end
             t = end
         if self.has_short_step and made < self.rows - 1:
             yield self.rows - 1, t, self.stop_time - t, self.stop_time
+
+
+def _rounded(n: float) -> float:
+    """A number of steps; a whole number where it is one but for rounding."""
+    nearest = round(n)
+    return nearest if abs(n - nearest) <= min(ROUNDING * nearest, _MOST_OF_A_STEP) else n

@@ -23,8 +23,8 @@ from orchestrator.reading import lines_of
 _ROWS = 8192
 
 #: What Parquet needs at most: bytes of a value, and bytes that describe a column of the rows that
-#: are written at once, of which there may be a block too many.
-_BYTES, _CHUNK_BYTES, _MOST_ROWS = 9, 1024, _ROWS + 1024
+#: are written at once.
+_BYTES, _CHUNK_BYTES = 9, 1024
 
 
 class CsvLines:
@@ -70,10 +70,15 @@ class CsvFile:
     def begin(self, header: Header) -> None:
         """Write the names of the columns."""
         self._lines = CsvLines(self._path, ("time", *header.columns))
+        self._texts = header.text_places()
 
     def take(self, rows: np.ndarray) -> None:
         """Write some rows."""
-        self._lines.write(rows.tolist())
+        lines = rows.tolist()
+        for place, texts in self._texts:
+            for line in lines:
+                line[place] = texts.text(line[place])
+        self._lines.write(lines)
 
     def end(self, ending: Ending) -> None:
         """Close the file."""
@@ -81,7 +86,7 @@ class CsvFile:
 
 
 class ParquetFile:
-    """An observer that writes Apache Parquet, all columns as doubles.
+    """An observer that writes Apache Parquet, all columns as doubles but for those of texts.
 
     Without what is written last, nothing of such a file can be read: there is always room for that,
     and for the rows that wait.
@@ -100,34 +105,40 @@ class ParquetFile:
     def begin(self, header: Header) -> None:
         """Make the file and its schema."""
         self._arrow: Any = import_module("pyarrow")
-        double = self._arrow.float64()
-        self._schema = self._arrow.schema([(name, double) for name in ("time", *header.columns)])
+        self._texts = header.text_places()
+        kinds = [self._arrow.float64()] * (1 + len(header.columns))
+        for place, _ in self._texts:
+            kinds[place] = self._arrow.string()
+        self._schema = self._arrow.schema(list(zip(("time", *header.columns), kinds, strict=True)))
         self._file = self._path.open("wb")
         self._writer = import_module("pyarrow.parquet").ParquetWriter(self._file, self._schema)
-        self._waiting: list[np.ndarray] = []
-        self._n, self._room = 0, min(header.experiment.rows, _MOST_ROWS)
+        self._waiting = [np.empty((0, len(self._schema)))]
+        self._n, self._room = 0, min(header.experiment.rows, _ROWS)
         self._take_room()
 
     def take(self, rows: np.ndarray) -> None:
-        """Write some rows, when there are enough of them."""
+        """Write some rows, when there are enough of them: always as many at once."""
         self._waiting.append(rows.copy())
-        if sum(map(len, self._waiting)) >= _ROWS:
-            self._write()
+        while sum(map(len, self._waiting)) >= _ROWS:
+            waiting = np.vstack(self._waiting)
+            self._waiting = [waiting[_ROWS:]]
+            self._write(waiting[:_ROWS])
             self._take_room()
 
     def end(self, ending: Ending) -> None:
         """Write the rest and close the file."""
-        self._write()
+        if len(rest := np.vstack(self._waiting)):
+            self._write(rest)
         self._writer.close()
         self._file.truncate()
         self._file.close()
 
-    def _write(self) -> None:
-        if self._waiting:
-            columns = [self._arrow.array(column) for column in np.vstack(self._waiting).T]
-            self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))
-            self._waiting.clear()
-            self._n += 1
+    def _write(self, rows: np.ndarray) -> None:
+        columns = [self._arrow.array(column) for column in rows.T]
+        for place, texts in self._texts:
+            columns[place] = self._arrow.array([texts.text(number) for number in rows[:, place]])
+        self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))
+        self._n += 1
 
     def _take_room(self) -> None:
         """Take the room that the file needs until the next time, if it can be had.

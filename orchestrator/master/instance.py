@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from orchestrator.master import layout
+from orchestrator.master.texts import Texts
 from orchestrator.system.values import Value
+
+#: What a component is asked for in every step, one after the other.
+CALLS = SET_INPUTS, DO_STEP, GET_OUTPUTS = "setting inputs", "fmi2DoStep", "getting outputs"
 
 
 class ComponentFailed(Exception):
@@ -52,9 +56,15 @@ class Instance(Protocol):
     In every step the calls of `set_inputs`, then `do_step` with time and step size, then those of
     `get_outputs` are made; those of `get_outputs` once all components of a stage have been stepped.
     Each returns FMI's status: `failed` is for one that is worse than a warning.
+
+    Attributes:
+        name: of the component.
+        is_here: whether its FMU is in this process, so that there are pointers to its functions.
+
     """
 
     name: str
+    is_here: bool
     set_inputs: list[Callable[[], int]]
     get_outputs: list[Callable[[], int]]
 
@@ -65,14 +75,31 @@ class Instance(Protocol):
     def pointers(self) -> layout.Member:
         """The same calls as pointers, for an FMU in this process."""
 
-    def failed(self, status: int, function: str) -> ComponentFailed:
-        """What to raise after a call that has ended with a status."""
+    def failed(self, status: int, function: str) -> ComponentFailed | Ended:
+        """What to raise after a call that has ended with a status.
 
-    def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
-        """Say where its values are: a view of the row, with the inputs first, and its parts."""
+        Args:
+            status: worse than a warning.
+            function: one of :data:`CALLS`.
 
-    def enter_initialization(self, values: Mapping[str, Value], stop_time: float) -> None:
-        """Set start values and parameters, set up the experiment, and enter that mode."""
+        """
+
+    def tie(self, values: np.ndarray, parts: Sequence[Part], texts: Texts) -> None:
+        """Say where its values are: a view of the row, with the inputs first, and its parts.
+
+        Args:
+            values: of the row, from its first on.
+            parts: of them.
+            texts: for which numbers stand there.
+
+        """
+
+    def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
+        """Set start values and parameters, set up the experiment, and enter that mode.
+
+        What may be set in that mode is set there once more: some FMUs take on their own values
+        when they enter it.
+        """
 
     def exit_initialization(self) -> None:
         """Get ready for the first step."""
@@ -80,8 +107,25 @@ class Instance(Protocol):
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
 
-    def parameters(self) -> dict[str, Any]:
-        """Values of all parameters, as the FMU reports them."""
+    def read(self, ports: Sequence[str]) -> dict[str, Value]:
+        """Values of some variables, as the FMU holds them."""
+
+    def tune(self, values: Mapping[str, Value]) -> None:
+        """Set tunable parameters between two steps."""
+
+    def reset(self) -> None:
+        """Be what it was before the initialisation, which can then be entered again."""
+
+    def state(self) -> bytes:
+        """The FMU's whole state between two steps, from which another instance can go on.
+
+        Raises:
+            ComponentFailed: it cannot be had; see :attr:`.component.Component.gives_state`.
+
+        """
+
+    def restore(self, state: bytes) -> None:
+        """Take on a state; what the row holds of this instance is left as it is."""
 
     def terminate(self) -> None:
         """Let the FMU end what it has begun."""

@@ -24,10 +24,11 @@ from fmpy.fmi2 import fmi2Warning
 from orchestrator.errors import InputError, StartError, reason
 from orchestrator.master import layout
 from orchestrator.master.channel import Channel, sizes
-from orchestrator.master.instance import ComponentFailed, Instance, Part
+from orchestrator.master.instance import ComponentFailed, Ended, Instance, Part
 from orchestrator.master.interrupts import Interrupts
 from orchestrator.master.keeper import END
 from orchestrator.master.log import Log
+from orchestrator.master.texts import Texts
 from orchestrator.system.component import Component
 from orchestrator.system.unpacking import unpacked
 from orchestrator.system.values import Value
@@ -93,6 +94,8 @@ class IsolatedInstance:
     A step is one message there, with the inputs, and one back, with the outputs.
     """
 
+    is_here = False
+
     def __init__(
         self,
         component: Component,
@@ -118,9 +121,13 @@ class IsolatedInstance:
         self.get_outputs: list[Callable[[], int]] = [self._take_outputs]
         self._status, self._log = status, log
         self._timeout, self._interrupts = timeout, interrupts
-        self._doing, self._hangs = "start", False
+        self._doing, self._hangs, self._steps = "start", False, False
         connection.settimeout(min(timeout, _GLANCE))
         self._inputs, self._outputs = np.zeros(0), np.zeros(0)
+        self._text_inputs: list[int] = []
+        self._text_outputs: list[int] = []
+        # Those of the run, and those of the process there, which numbers its own.
+        self._texts, self._theirs, self._told = Texts(), Texts(), len(Texts())
         inputs, outputs = sizes(component)
         self._channel = Channel(connection, 2 + inputs, outputs, self._waited)
 
@@ -136,14 +143,23 @@ class IsolatedInstance:
         self._doing = "instantiate"
         self._receive()
 
-    def tie(self, values: np.ndarray, _: Sequence[Part]) -> None:
+    def tie(self, values: np.ndarray, parts: Sequence[Part], texts: Texts) -> None:
         """Say where its values are."""
         inputs, outputs = len(self._channel.outgoing) - 2, len(self._channel.incoming)
-        self._inputs, self._outputs = values[:inputs], values[inputs : inputs + outputs]
+        first = next((part.place.start for part in parts if part.causality == "output"), inputs)
+        self._inputs, self._outputs = values[:inputs], values[first : first + outputs]
+        self._texts = texts
+        for part in parts:
+            if part.kind == "String":
+                places = range(part.place.start, part.place.stop)
+                if part.causality == "input":
+                    self._text_inputs += places
+                else:
+                    self._text_outputs += [place - first for place in places]
 
-    def enter_initialization(self, values: Mapping[str, Value], stop_time: float) -> None:
+    def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
-        self._ask("enter_initialization", values, stop_time)
+        self._ask("enter_initialization", values, start_time)
 
     def exit_initialization(self) -> None:
         """Get ready for the first step."""
@@ -151,16 +167,38 @@ class IsolatedInstance:
 
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
-        self._channel.outgoing[2:] = self._inputs
+        self._put_inputs()
         self._ask("exchange")
-        self._outputs[:] = self._channel.incoming
+        self._read_outputs()
 
-    def parameters(self) -> dict[str, Any]:
-        """Values of all parameters, as the FMU reports them."""
-        values = self._ask("parameters")
-        if not isinstance(values, dict):
+    def read(self, ports: Sequence[str]) -> dict[str, Value]:
+        """Values of some variables, as the FMU holds them."""
+        if not ports:
+            return {}
+        values = self._ask("read", list(ports))
+        answers = isinstance(values, dict) and values.keys() == set(ports)
+        if not (answers and all(isinstance(value, Value) for value in values.values())):
             raise self._nonsense()
-        return values
+        return dict(values)
+
+    def tune(self, values: Mapping[str, Value]) -> None:
+        """Set tunable parameters between two steps."""
+        self._ask("tune", dict(values))
+
+    def reset(self) -> None:
+        """Be what it was before the initialisation."""
+        self._ask("reset")
+
+    def state(self) -> bytes:
+        """The FMU's whole state between two steps."""
+        state = self._ask("state")
+        if not isinstance(state, bytes):
+            raise self._nonsense()
+        return state
+
+    def restore(self, state: bytes) -> None:
+        """Take on a state."""
+        self._ask("restore", state)
 
     def pointers(self) -> layout.Member:
         """There are none: its calls are messages to another process."""
@@ -175,9 +213,9 @@ class IsolatedInstance:
         outgoing = self._channel.outgoing
         outgoing[0] = t
         outgoing[1] = h
-        outgoing[2:] = self._inputs
-        self._doing = "doStep"
-        self._send()
+        self._put_inputs()
+        self._doing, self._steps = "doStep", True
+        self._send({})
         return 0
 
     def terminate(self) -> None:
@@ -206,18 +244,43 @@ class IsolatedInstance:
             self._status(min(self._timeout, _FAREWELL))
 
     def _take_outputs(self) -> int:
+        self._steps = False
         self._receive()
-        self._outputs[:] = self._channel.incoming
+        self._read_outputs()
         return 0
 
+    def _put_inputs(self) -> None:
+        """Have the inputs go with the next message."""
+        inputs = self._channel.outgoing[2:]
+        inputs[:] = self._inputs
+        for i in self._text_inputs:
+            inputs[i] = self._theirs.number(self._texts.text(inputs[i]))
+
+    def _read_outputs(self) -> None:
+        """Take the outputs that have come with a message."""
+        self._outputs[:] = outputs = self._channel.incoming
+        try:
+            for i in self._text_outputs:
+                self._outputs[i] = self._texts.number(self._theirs.text(outputs[i]))
+        except ValueError as error:
+            raise self._nonsense() from error
+
     def _ask(self, call: str, *arguments: Any) -> Any:
+        if self._steps:
+            # Another component has ended the run in this step, and its outputs are not wanted.
+            with suppress(ComponentFailed, Ended):
+                self._take_outputs()
         self._doing = call
         self._send({"call": call, "arguments": arguments})
         return self._receive()
 
-    def _send(self, note: Any = None) -> None:
+    def _send(self, note: dict[str, Any]) -> None:
+        """Send a note, with the texts that are new there."""
+        if news := self._theirs.since(self._told):
+            note["texts"] = news
+            self._told += len(news)
         try:
-            self._channel.send(note)
+            self._channel.send(note or None)
         except OSError as error:
             raise self._lost() from error
 
@@ -240,11 +303,18 @@ class IsolatedInstance:
         failed: str | None = None,
         fatal: bool = False,
         refused: str | None = None,
+        ended: str | None = None,
+        texts: Sequence[str] = (),
     ) -> Any:
+        for text in texts:
+            self._theirs.number(str(text))
+        self._told = len(self._theirs)
         for status, text in messages:
             self._log.take(int(status), str(text))
         if refused is not None:
             raise InputError(str(refused))
+        if ended is not None:
+            raise Ended(str(ended))
         if failed is not None:
             raise ComponentFailed(str(failed), bool(fatal))
         return value

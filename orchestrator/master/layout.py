@@ -30,6 +30,17 @@ class Member(Structure):
     )
 
 
+class Mapping(Structure):
+    """Values that become others on their way through one connection."""
+
+    _fields_ = (
+        ("connection", c_size_t),
+        ("n", c_size_t),
+        ("from_values", POINTER(c_double)),
+        ("to_values", POINTER(c_double)),
+    )
+
+
 class Stage(Structure):
     """Inputs to gather, and the components to step then."""
 
@@ -38,9 +49,13 @@ class Stage(Structure):
         ("sources", c_void_p),
         ("factors", c_void_p),
         ("offsets", c_void_p),
+        ("mappings", POINTER(Mapping)),
         ("members", POINTER(Member)),
         ("n_connections", c_size_t),
+        ("n_mappings", c_size_t),
         ("n_members", c_size_t),
+        ("every", c_size_t),
+        ("at_end", c_int),
     )
 
 
@@ -51,10 +66,12 @@ class Run(Structure):
         ("stages", POINTER(Stage)),
         ("values", c_void_p),
         ("n_stages", c_size_t),
-        ("n_values", c_size_t),
+        ("n_shown", c_size_t),
+        ("start_time", c_double),
         ("step", c_double),
         ("stop_time", c_double),
         ("full_steps", c_size_t),
+        ("steps", c_size_t),
     )
 
 

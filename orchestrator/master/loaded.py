@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import ctypes
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from copy import copy
 from functools import partial
 from itertools import count
 from pathlib import Path
-from shutil import copytree
-from tempfile import mkdtemp
-from threading import Lock
-from typing import Any
+from time import sleep
+from typing import Any, TypeAlias
 
 import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
-    FMU2Slave,
     fmi2Boolean,
     fmi2CallbackAllocateMemoryTYPE,
     fmi2CallbackFreeMemoryTYPE,
@@ -26,80 +24,50 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
     fmi2Component,
     fmi2Discard,
+    fmi2DoStepStatus,
+    fmi2Error,
     fmi2Fatal,
+    fmi2LastSuccessfulTime,
+    fmi2Pending,
     fmi2Real,
     fmi2Status,
+    fmi2Terminated,
     fmi2Warning,
 )
 from fmpy.logging import addLoggerProxy
-from fmpy.model_description import ModelDescription, ModelVariable
+from fmpy.model_description import ModelVariable
 
 from orchestrator.errors import InputError, reason
 from orchestrator.master import layout
-from orchestrator.master.instance import ComponentFailed, Instance, Part
+from orchestrator.master.binary import Library, library_of, named
+from orchestrator.master.instance import DO_STEP, ComponentFailed, Ended, Instance, Part
 from orchestrator.master.log import Listener
-from orchestrator.master.transfer import Block
+from orchestrator.master.texts import Texts
+from orchestrator.master.transfer import Block, text_of
 from orchestrator.system.component import Component
-from orchestrator.system.unpacking import check_place, unpacked
+from orchestrator.system.unpacking import runs_python, unpacked
 from orchestrator.system.values import Value
 
+#: FMI's categories of messages about what goes wrong (FMI 2.0.4, section 2.2.4).
+_LOGGED = {f"logStatus{status}" for status in ("Warning", "Discard", "Error", "Fatal")}
 
-class Library:
-    """A loaded FMU, which serves all its instances in this process.
+_DoStep: TypeAlias = Callable[[float, float, int], int]
 
-    Attributes:
-        fmu: fmpy's view of it.
-        corrupted: whether one of them has ended with fmi2Fatal: FMI then forbids every further
-            call, also for the others, even to free them.
+#: FMI's doStep, as the compiled loop calls it.
+_DO_STEP = (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean)
+_CALLBACK = ctypes.CFUNCTYPE(fmi2Status, *_DO_STEP)
 
-    """
+#: Messages that are remembered, to say why something has failed.
+_MOST_COMPLAINTS = 3
 
-    def __init__(self, archive: Path, description: ModelDescription, folder: Path) -> None:
-        """Load what has been unpacked into a folder.
-
-        Raises:
-            InputError: it cannot be loaded.
-
-        """
-        check_place(folder)
-        try:
-            self.fmu = FMU2Slave(
-                guid=description.guid,
-                modelIdentifier=description.coSimulation.modelIdentifier,
-                unzipDirectory=str(folder),
-            )
-        except Exception as error:
-            raise InputError(f"{archive}: cannot be loaded: {reason(error)}") from error
-        self.corrupted = False
-
-
-#: Libraries by the folders into which their FMUs are unpacked, for runs in several threads.
-_libraries: dict[Path, Library] = {}
-_LOCK = Lock()
-
-
-def _library(component: Component, folder: Path) -> Library:
-    """The library of an unpacked FMU, loaded once a process, or a copy of a corrupted one."""
-    with _LOCK:
-        found = _libraries.get(folder)
-        if found is None:
-            found = Library(component.fmu, component.description, folder)
-        elif found.corrupted:
-            # It stays loaded, with all that it has in memory; under another name it is a new one.
-            found = Library(component.fmu, component.description, _copied(folder))
-        _libraries[folder] = found
-        return found
-
-
-def _copied(folder: Path) -> Path:
-    try:
-        return Path(copytree(folder, mkdtemp(dir=folder.parent), dirs_exist_ok=True))
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be copied: {reason(error)}") from error
+#: How often is looked whether a step has ended that goes on after its call [s].
+_GLANCE = 1e-3
 
 
 class LoadedInstance:
     """An instance whose FMU is called directly: see :class:`.instance.Instance`."""
+
+    is_here = True
 
     def __init__(self, component: Component, library: Library, listener: Listener) -> None:
         """Instantiate an FMU.
@@ -114,9 +82,15 @@ class LoadedInstance:
         self._inputs: list[Block] = []
         self._outputs: list[Block] = []
         self._variables = component.variables
+        self._gives_state = component.gives_state
+        self._logged = [
+            category.name
+            for category in component.description.logCategories
+            if category.name in _LOGGED
+        ]
         self._library = library
         self._listener = listener
-        self._complaint = ""
+        self._complaints: deque[str] = deque(maxlen=_MOST_COMPLAINTS)
         self._worst = 0
         self._environment = next(_environments)
         _instances[self._environment] = self
@@ -127,9 +101,31 @@ class LoadedInstance:
             self._fmu.instantiate(callbacks=_callbacks(self._environment), loggingOn=True)
         except Exception as error:
             del _instances[self._environment]
-            why = self._complaint or reason(error)
-            raise InputError(f"{component.fmu}: {why}") from error
-        self.do_step = self.function("DoStep", (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean))
+            heard = [text.removeprefix(f"{self.name}: ") for text in self._complaints]
+            why = " ".join(heard) or reason(error)
+            needs = component.description.coSimulation.needsExecutionTool
+            tool = "; it needs the tool that it was made with" * needs
+            text = f"{named(component)} cannot be instantiated: {why}{tool}"
+            raise InputError(text) from error
+        self.do_step = self.function("DoStep", _DO_STEP)
+        self._called_back: Any = None
+        if component.description.coSimulation.canRunAsynchronuously:
+            self.do_step = do_step = self._awaited(self.do_step)
+            self._called_back = _CALLBACK(lambda _, *step: do_step(*step))
+
+    def _awaited(self, do_step: _DoStep) -> _DoStep:
+        """Steps that the FMU may go on with after the call, as calls that end when they do."""
+        ask = self.function("GetStatus", (fmi2Component, ctypes.c_int, ctypes.POINTER(fmi2Status)))
+
+        def awaited(t: float, h: float, no_rollback: int) -> int:
+            status = fmi2Status(do_step(t, h, no_rollback))
+            while status.value == fmi2Pending:
+                sleep(_GLANCE)
+                if ask(fmi2DoStepStatus, ctypes.byref(status)) > fmi2Warning:
+                    return int(fmi2Error)
+            return int(status.value)
+
+        return awaited
 
     def function(self, name: str, types: Sequence[Any] | None = None) -> Callable[..., Any]:
         """One of the FMU's functions, for calls of every step.
@@ -146,10 +142,10 @@ class LoadedInstance:
         called.argtypes, called.restype = types, fmi2Status
         return partial(called, fmi2Component(self._fmu.component))
 
-    def tie(self, values: np.ndarray, parts: Sequence[Part]) -> None:
+    def tie(self, values: np.ndarray, parts: Sequence[Part], texts: Texts) -> None:
         """Say where its values are."""
         for part in parts:
-            block = Block(*part[:3], values[part.place])
+            block = Block(*part[:3], values[part.place], texts)
             function = self.function(block.function)
             if part.causality == "input":
                 self._inputs.append(block)
@@ -166,7 +162,7 @@ class LoadedInstance:
         )
         return layout.Member(
             self._fmu.component,
-            self._address("DoStep"),
+            _address(self._called_back) if self._called_back else self._address("DoStep"),
             (layout.Move * len(inputs))(*inputs),
             (layout.Move * len(outputs))(*outputs),
             len(inputs),
@@ -175,19 +171,28 @@ class LoadedInstance:
 
     def _address(self, name: str) -> int | None:
         """Of one of the FMU's functions, without fmi2."""
-        return ctypes.cast(self._fmu.dll[f"fmi2{name}"], ctypes.c_void_p).value
+        return _address(self._fmu.dll[f"fmi2{name}"])
 
-    def enter_initialization(self, values: Mapping[str, Value], stop_time: float) -> None:
+    def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
-        for port, value in values.items():
-            variable = self._variables[port]
-            self._call(f"set{_fmi_type(variable)}", [variable.valueReference], [value])
-        self._call("setupExperiment", startTime=0.0, stopTime=stop_time)
+        self._set(values)
+        # No stop time: k h ends beyond it by a rounding error, which many FMUs refuse.
+        self._call("setupExperiment", startTime=start_time)
         self._call("enterInitializationMode")
+        # FMI has it that guesses are set before alone.
+        variables = self._variables
+        self._set({port: v for port, v in values.items() if variables[port].initial == "exact"})
 
     def exit_initialization(self) -> None:
-        """Get ready for the first step."""
+        """Get ready for the first step, in which no FMU is to log more than what goes wrong.
+
+        To log every step may take longer than the step. PythonFMU, which logs nothing on its own,
+        gives the reasons of a failure no category.
+        """
         self._call("exitInitializationMode")
+        if not runs_python(Path(self._fmu.unzipDirectory)):
+            with suppress(FMICallException):
+                self._fmu.setDebugLogging(bool(self._logged), self._logged)
 
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
@@ -195,13 +200,45 @@ class LoadedInstance:
             if (status := call()) > fmi2Warning:
                 raise self.failed(status, "exchanging values")
 
-    def parameters(self) -> dict[str, Any]:
-        """Values of all parameters, as the FMU reports them."""
-        return {
-            name: self._get(variable)
-            for name, variable in self._variables.items()
-            if variable.causality == "parameter"
-        }
+    def read(self, ports: Sequence[str]) -> dict[str, Value]:
+        """Values of some variables, as the FMU holds them."""
+        return {port: self._get(self._variables[port]) for port in ports}
+
+    def tune(self, values: Mapping[str, Value]) -> None:
+        """Set tunable parameters between two steps."""
+        self._set(values)
+
+    def reset(self) -> None:
+        """Be what it was before the initialisation."""
+        self._call("reset")
+
+    def state(self) -> bytes:
+        """The FMU's whole state between two steps."""
+        with self._held("getFMUstate") as state:
+            serialised: bytes = self._call("serializeFMUstate", state)
+        return serialised
+
+    def restore(self, state: bytes) -> None:
+        """Take on a state."""
+        self._complaints.clear()
+        self._worst = 0
+        with self._held("deSerializeFMUstate", state) as read:
+            self._call("setFMUstate", read)
+        # Some say in a message alone that it is none of theirs.
+        if self._worst >= fmi2Discard:
+            raise ComponentFailed(self._complaints[-1])
+
+    @contextmanager
+    def _held(self, method: str, *arguments: Any) -> Iterator[Any]:
+        """A state that one of fmpy's methods gives, in the FMU's memory, freed at the end."""
+        if not self._gives_state:
+            raise ComponentFailed(f"{self.name}: its FMU does not give its state away")
+        state = self._call(method, *arguments)
+        try:
+            yield state
+        finally:
+            if not self._library.corrupted:
+                self._call("freeFMUstate", state)
 
     def terminate(self) -> None:
         """Let the FMU end what it has begun."""
@@ -221,14 +258,23 @@ class LoadedInstance:
         """Take a message of the FMU; the latest explains a failure, a refusal before a warning."""
         text = f"{self.name}: {'; '.join(message.splitlines())}"
         if status >= min(self._worst, fmi2Discard):
-            self._complaint, self._worst = text, status
+            if self._worst < min(status, fmi2Discard):
+                self._complaints.clear()
+            self._complaints.append(text)
+            self._worst = status
         self._listener.take(status, text)
 
-    def _get(self, variable: ModelVariable) -> Any:
-        value = self._call(f"get{_fmi_type(variable)}", [variable.valueReference])[0]
-        if variable.type == "Boolean":
-            return bool(value)
-        return value.decode(errors="replace") if isinstance(value, bytes) else value
+    def _set(self, values: Mapping[str, Value]) -> None:
+        for port, value in values.items():
+            variable = self._variables[port]
+            self._call(f"set{_fmi_type(variable)}", [variable.valueReference], [value])
+
+    def _get(self, variable: ModelVariable) -> Value:
+        value: Value | bytes | None
+        (value,) = self._call(f"get{_fmi_type(variable)}", [variable.valueReference])
+        if value is None or isinstance(value, bytes):
+            return text_of(value)
+        return bool(value) if variable.type == "Boolean" else value
 
     def _call(self, method: str, *arguments: Any, **named: Any) -> Any:
         """One of fmpy's methods, which are slow and convenient."""
@@ -237,15 +283,30 @@ class LoadedInstance:
         except FMICallException as error:
             raise self._failed(error) from error
 
-    def failed(self, status: int, function: str) -> ComponentFailed:
+    def failed(self, status: int, function: str) -> ComponentFailed | Ended:
         """What to raise after a call that has ended with a status."""
+        if (function, status) == (DO_STEP, fmi2Discard) and not self._library.is_akin:
+            with suppress(FMICallException):
+                if self._fmu.getBooleanStatus(fmi2Terminated):
+                    time = self._fmu.getRealStatus(fmi2LastSuccessfulTime)
+                    return Ended(f"{self.name} has ended the simulation, at {time:.12g} s")
+        if status == fmi2Pending:
+            return ComponentFailed(
+                f"{self.name}: its step goes on after {function}, and its description does not "
+                "say so (canRunAsynchronuously)"
+            )
         return self._failed(FMICallException(function=function, status=status))
 
     def _failed(self, error: FMICallException) -> ComponentFailed:
         fatal = error.status == fmi2Fatal
         if fatal:
             self._library.corrupted = True
-        return ComponentFailed(self._complaint or f"{self.name}: {error}", fatal)
+        last = self._complaints[-1] if self._complaints else f"{self.name}: {error}"
+        return ComponentFailed(last, fatal)
+
+
+def _address(function: Any) -> int | None:
+    return ctypes.cast(function, ctypes.c_void_p).value
 
 
 def _fmi_type(variable: ModelVariable) -> str:
@@ -268,11 +329,12 @@ def loaded(
 
     """
     folder = unpacked(component.fmu) if folder is None else folder
-    instance = LoadedInstance(component, _library(component, folder), listener)
-    try:
-        yield instance
-    finally:
-        instance.free()
+    with library_of(component, folder) as library:
+        instance = LoadedInstance(component, library, listener)
+        try:
+            yield instance
+        finally:
+            instance.free()
 
 
 @contextmanager
@@ -294,11 +356,17 @@ _environments = count(1)
 
 @fmi2CallbackLoggerTYPE  # type: ignore[untyped-decorator]
 def _log(
-    environment: int | None, _: bytes, status: int, _category: bytes, message: bytes | None
+    environment: int | None, name: bytes, status: int, _: bytes, message: bytes | None
 ) -> None:
-    instance = _instances.get(environment or 0)
+    instance = _instances.get(environment or 0) or _bearing(name)
     if instance is not None:
         instance.hear(status, (message or b"").decode(errors="replace"))
+
+
+def _bearing(name: bytes | None) -> LoadedInstance | None:
+    """The instance with a name: some FMUs do not hand the environment back."""
+    text = (name or b"").decode(errors="replace")
+    return next((found for found in _instances.values() if found.name == text), None)
 
 
 def _shared_callbacks() -> fmi2CallbackFunctions:

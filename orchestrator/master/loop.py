@@ -53,16 +53,25 @@ class Loop(NamedTuple):
 
 def interpreted(run: Run) -> Iterator[None]:
     """Make the steps in Python, and look after each."""
-    values, append = run.row.values, run.blocks.append
+    values, shown, append = run.row.values, run.row.shown, run.blocks.append
+    experiment, stages, steps = run.experiment, run.stages, run.experiment.rows - 1
     # Times zero, what is finite is zero and what is not is nan: the cheapest way to see it.
-    is_not_finite = partial(np.vdot, values, np.zeros_like(values))
-    for k, t, h, end in run.experiment.steps(run.made):
-        for gather, members in run.stages:
-            gather(values)
-            step(members, t, h)
+    is_not_finite = partial(np.vdot, shown, np.zeros_like(shown))
+    for k, t, h, end in experiment.steps(run.made):
+        for gather, members, pace in stages:
+            if pace is None:
+                # What most stages are costs no call.
+                if gather.is_plain:
+                    values[gather.targets] = values[gather.sources]
+                else:
+                    gather(values)
+                step(members, t, h)
+            elif pace.is_due(k - 1, steps):
+                gather(values)
+                step(members, t, experiment.length(k - 1, pace.every))
         if is_not_finite():
             return
-        append(end, values)
+        append(end, shown)
         run.made = k
         yield
 

@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from time import monotonic
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from orchestrator.errors import reason
 from orchestrator.master import layout
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.texts import Texts
 from orchestrator.system.names import PortName
 
 #: Rows in a block, and the longest time until observers are told of them [s].
@@ -31,6 +32,7 @@ class Header:
         experiment: that is run.
         parameters: of all components, as the FMUs reported them after initialisation.
         loop: which one makes the steps, `python` or `compiled`: the rows are the same.
+        texts: for which numbers stand in the rows, by the columns that have them.
 
     """
 
@@ -38,6 +40,34 @@ class Header:
     experiment: Experiment
     parameters: Mapping[PortName, Any] = field(default_factory=dict)
     loop: str = field(default="python", compare=False)
+    texts: Mapping[str, Texts] = field(default_factory=dict, compare=False)
+
+    def text_places(self) -> list[tuple[int, Texts]]:
+        """Where numbers of texts stand in a row, time first, and whose they are."""
+        names = enumerate(self.columns, start=1)
+        return [(i, self.texts[name]) for i, name in names if name in self.texts]
+
+
+class Occurrence(NamedTuple):
+    """Something that has happened during a run.
+
+    Attributes:
+        time: at which it did [s].
+        text: what it was.
+        label: its name in a figure; empty: it has none, as the end of something.
+        event: its number among those that may happen.
+
+    """
+
+    time: float
+    text: str
+    label: str = ""
+    event: int = 0
+
+    def __str__(self) -> str:
+        """In one line."""
+        label = f" ({self.label})" if self.label and self.label != self.text else ""
+        return f"t = {self.time:.12g} s: {self.text}{label}"
 
 
 @dataclass(frozen=True)
@@ -49,6 +79,7 @@ class Ending:
         remark: why it ended early though it has not failed, or None.
         messages: what the FMUs logged with status warning or worse.
         signals: to stop that have come meanwhile.
+        events: that have happened, in their order.
 
     """
 
@@ -56,6 +87,7 @@ class Ending:
     remark: str | None = None
     messages: tuple[str, ...] = ()
     signals: tuple[int, ...] = ()
+    events: tuple[Occurrence, ...] = ()
 
 
 class NotKept(Exception):
@@ -115,15 +147,28 @@ class Blocks:
             NotKept: one of them failed; the others were told.
 
         """
-        failures: list[Exception] = []
         if n := self.block.n:
             # Counted as told before they are told: an observer that fails is not told twice.
-            rows, self.block.n = self._rows[:n], 0
-            for observer in self._observers:
-                try:
-                    observer.take(rows)
-                except (OSError, MemoryError) as error:
-                    failures.append(error)
-            if failures:
-                raise NotKept(f"stopped at t = {rows[-1, 0]:g} s: {reason(failures[0])}")
+            self.block.n = 0
+            self._tell(self._rows[:n])
         self.due = monotonic() + _PATIENCE
+
+    def tell(self, rows: np.ndarray) -> None:
+        """Tell the observers of rows that an earlier process has computed.
+
+        Raises:
+            NotKept: one of them failed; the others were told.
+
+        """
+        self.hand_over()
+        self._tell(rows)
+
+    def _tell(self, rows: np.ndarray) -> None:
+        failures: list[Exception] = []
+        for observer in self._observers:
+            try:
+                observer.take(rows)
+            except (OSError, MemoryError) as error:
+                failures.append(error)
+        if failures:
+            raise NotKept(f"stopped at t = {rows[-1, 0]:g} s: {reason(failures[0])}")

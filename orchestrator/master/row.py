@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from math import isfinite
 
 import numpy as np
 from fmpy.model_description import ModelVariable
 
+from orchestrator.errors import InputError
 from orchestrator.master.instance import Instance, Part
+from orchestrator.master.texts import Texts
 from orchestrator.master.transfer import KINDS
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
+from orchestrator.system.values import Value
+
+#: A change so small, or so small a share of the value, is a rounding error.
+_ROUNDING = 1e-12
 
 
 class Row:
@@ -21,14 +28,28 @@ class Row:
     The ports of a component that have the same causality and kind are neighbours, in the order
     of its description, so that one FMI call moves them all.
 
+    Outputs of some components have a hidden place behind all columns, into which their instance
+    writes them; they are shown in their columns when somebody copies them there.
+
     Attributes:
-        values: of all ports.
+        values: of all ports, and the hidden ones.
+        shown: a view of the columns alone.
         columns: where the value of a port is.
+        texts: for which numbers stand in it, and the ports of which that is so.
 
     """
 
-    def __init__(self, system: System, instances: Mapping[str, Instance]) -> None:
-        """Lay out the row, tie the instances to it, and enter the inputs' values at the start."""
+    def __init__(
+        self, system: System, instances: Mapping[str, Instance], hidden: Collection[str] = ()
+    ) -> None:
+        """Lay out the row, tie the instances to it, and enter the inputs' values at the start.
+
+        Args:
+            system: whose ports these are.
+            instances: of its components.
+            hidden: the components whose outputs are hidden at first.
+
+        """
         groups = [
             (name, causality, kind, ports)
             for name in instances
@@ -36,14 +57,26 @@ class Row:
             for kind in KINDS
             if (ports := _ports(system.components[name], causality, kind))
         ]
-        self.values = np.zeros(sum(len(ports) for *_, ports in groups))
+        n = sum(len(ports) for *_, ports in groups)
+        more = sum(
+            len(ports) for name, causality, _, ports in groups if _hides(name, causality, hidden)
+        )
+        self.values = np.zeros(n + more)
+        self.shown = self.values[:n]
         self.columns: dict[PortName, int] = {}
+        self.texts, self.text_ports = Texts(), set[PortName]()
+        self._hidden: dict[PortName, int] = {}
         self._outputs: list[PortName] = []
         firsts: dict[str, int] = {}
         parts: dict[str, list[Part]] = {name: [] for name in instances}
         for component, causality, kind, ports in groups:
             column = len(self.columns)
-            first = column - firsts.setdefault(component, column)
+            where = column
+            if _hides(component, causality, hidden):
+                where = n + len(self._hidden)
+                for i, port in enumerate(ports, start=where):
+                    self._hidden[PortName(component, port.name)] = i
+            first = where - firsts.setdefault(component, column)
             references = [port.valueReference for port in ports]
             place = slice(first, first + len(ports))
             parts[component].append(Part(causality, kind, references, place))
@@ -51,13 +84,24 @@ class Row:
                 name = PortName(component, port.name)
                 self.columns[name] = i
                 self._outputs += [name] * (causality == "output")
-                start = system.components[component].start(port.name)
-                self.values[i] = 0.0 if start is None else float(start)
+                self.text_ports |= {name} if kind == "String" else set()
+                # A description may have nonsense there, which is of no use to anybody.
+                with suppress(InputError):
+                    self.enter({name: system.components[component].start(port.name) or 0.0})
         for component, instance in instances.items():
-            instance.tie(self.values[firsts.get(component, 0) :], parts[component])
-        for target, value in system.parameters.items():
-            if target in self.columns:
-                self.values[self.columns[target]] = float(value)
+            part = self.values[firsts.get(component, 0) :]
+            instance.tie(part, parts[component], self.texts)
+        self.enter(system.parameters)
+
+    def enter(self, values: Mapping[PortName, Value]) -> None:
+        """Take values of ports, but for those that are no finite numbers."""
+        for port, value in values.items():
+            if port in self.columns and isfinite(number := self.number(value)):
+                self.values[self.columns[port]] = number
+
+    def number(self, value: Value) -> float:
+        """What stands for a value in the row."""
+        return self.texts.number(value) if isinstance(value, str) else float(value)
 
     def not_finite(self, components: Iterable[str]) -> str | None:
         """The first output that is no number or infinite, in words; None: all are finite.
@@ -73,12 +117,34 @@ class Row:
                     return f"{port} is {value:g}"
         return None
 
+    def moving(self, before: np.ndarray) -> list[PortName]:
+        """The ports whose values are not what they were, but for rounding."""
+        near = np.isclose(self.values, before, rtol=_ROUNDING, atol=_ROUNDING)
+        return [port for port, column in self.columns.items() if not near[column]]
+
     def places(self, connections: Sequence[Connection]) -> tuple[np.ndarray, np.ndarray]:
         """Where the targets and the sources of some connections are."""
         return (
             np.array([self.columns[c.target] for c in connections], dtype=np.intp),
             np.array([self.columns[c.source] for c in connections], dtype=np.intp),
         )
+
+    def hidden(self, ports: Sequence[PortName]) -> tuple[np.ndarray, np.ndarray]:
+        """Where the columns and the hidden places of some outputs are, as far as they have any."""
+        known = [port for port in ports if port in self._hidden]
+        return (
+            np.array([self.columns[port] for port in known], dtype=np.intp),
+            np.array([self._hidden[port] for port in known], dtype=np.intp),
+        )
+
+    def show(self) -> None:
+        """Copy all that is hidden into its columns."""
+        targets, sources = self.hidden(list(self._hidden))
+        self.values[targets] = self.values[sources]
+
+
+def _hides(component: str, causality: str, hidden: Collection[str]) -> bool:
+    return causality == "output" and component in hidden
 
 
 def _ports(component: Component, causality: str, kind: str) -> list[ModelVariable]:

@@ -6,7 +6,14 @@ outputs of a component are read as soon as it was stepped.
 - `jacobi`: one stage. All inputs are outputs of t_k.
 - `gauss-seidel`: a component whose output has direct feedthrough is stepped in an earlier
   stage than those it feeds, so they receive without delay what follows from t_k. Outputs
-  without feedthrough are states: everybody takes them at t_k.
+  without feedthrough are states: everybody takes them at t_k. A ring is opened before the one of
+  its components that stands first in the system, which takes what feeds it at t_k.
+- the names of all components: the same in the order that they stand in.
+
+A component may take n communication steps in one of its own. It is stepped at every n-th t_k, with
+the inputs of that time, which it holds. What it computes waits in hidden columns of the row: from
+there outputs with direct feedthrough, which hold from t_k on, are shown at once, unless the order
+is `jacobi`; all others when the time has come that they belong to.
 """
 
 from __future__ import annotations
@@ -16,14 +23,16 @@ from typing import NamedTuple
 
 from fmpy.fmi2 import fmi2Warning
 
-from orchestrator.master.instance import Instance
+from orchestrator.errors import InputError, shortened
+from orchestrator.master.experiment import JACOBI, Experiment, Order
+from orchestrator.master.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
+from orchestrator.master.paces import paces
 from orchestrator.master.row import Row
 from orchestrator.master.signals import Gathering
-from orchestrator.system.graph import feedthrough_stages, has_feedthrough
+from orchestrator.system.component import Component
+from orchestrator.system.graph import delayed, derived_order, has_feedthrough, in_stages
+from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-
-#: What a component is asked for in every step, one after the other.
-CALLS = SET_INPUTS, DO_STEP, GET_OUTPUTS = "setting inputs", "fmi2DoStep", "getting outputs"
 
 
 class Member(NamedTuple):
@@ -35,45 +44,156 @@ class Member(NamedTuple):
     instance: Instance
 
 
+class Pace(NamedTuple):
+    """When a slow component is stepped, or what it has computed is shown.
+
+    Attributes:
+        every: how many communication steps one of its own takes.
+        at_end: whether in the last of them, not in the first.
+
+    """
+
+    every: int
+    at_end: bool = False
+
+    def is_due(self, k: int, steps: int) -> bool:
+        """Whether in the communication step behind the k-th of so many."""
+        if self.at_end:
+            return (k + 1) % self.every == 0 or k + 1 == steps
+        return k % self.every == 0
+
+
 class Stage(NamedTuple):
-    """Inputs to gather, and the components to step then."""
+    """Inputs to gather, and the components to step then.
+
+    Attributes:
+        gather: moves values within the row.
+        members: the components.
+        pace: in which communication steps; None: in all of them.
+
+    """
 
     gather: Gathering
     members: list[Member]
+    pace: Pace | None = None
 
 
-def stages(system: System, order: str) -> list[list[str]]:
+def stages(system: System, order: Order) -> list[list[str]]:
     """Components in the order in which they are stepped; those of one stage are independent.
 
     Raises:
-        InputError: direct feedthroughs form a loop.
+        InputError: an order that does not name each component once.
 
     """
-    return [list(system.components)] if order == "jacobi" else feedthrough_stages(system)
+    if order == JACOBI:
+        return [list(system.components)]
+    if isinstance(order, str):
+        return in_stages(system, derived_order(system))
+    _check_names(system, order)
+    return in_stages(system, order)
+
+
+def _check_names(system: System, order: Sequence[str]) -> None:
+    for name in order:
+        system.component(name)
+    twice = [name for i, name in enumerate(order) if name in order[:i]]
+    missing = [name for name in system.components if name not in order]
+    for names, what in ((twice, "twice"), (missing, "not at all")):
+        if names:
+            raise InputError(
+                f"order {','.join(order)}: names {', '.join(names)} {what}; it takes every "
+                "component once"
+            )
+
+
+def delays(system: System, order: Order) -> list[str]:
+    """Where an order that follows from the feedthroughs opens a ring of them, in words."""
+    if not isinstance(order, str) or order == JACOBI:
+        return []
+    late = delayed(system, derived_order(system))
+    return [
+        f"{name} takes {shortened(', '.join(str(c.source) for c in late if _feeds(c, name)))} one "
+        "step late: direct feedthroughs form a ring"
+        for name in dict.fromkeys(connection.target.component for connection in late)
+    ]
+
+
+def _feeds(connection: Connection, component: str) -> bool:
+    return connection.target.component == component
+
+
+def gathered(system: System, plan: Sequence[Sequence[str]]) -> list[list[Connection]]:
+    """The connections along which values are gathered before each stage.
+
+    Args:
+        system: whose connections say what feeds what.
+        plan: its components in :func:`stages`.
+
+    """
+    stage_of = {name: i for i, names in enumerate(plan) for name in names}
+    found: list[list[Connection]] = [[] for _ in plan]
+    for connection in system.connections:
+        source, target = (stage_of[end.component] for end in (connection.source, connection.target))
+        # What is no feedthrough is a state, and must be taken before anybody advances.
+        late = has_feedthrough(system, connection) and source < target
+        found[target if late else 0].append(connection)
+    return found
 
 
 def schedule(
-    system: System, plan: Sequence[Sequence[str]], instances: Mapping[str, Instance], row: Row
+    system: System,
+    experiment: Experiment,
+    plan: Sequence[Sequence[str]],
+    instances: Mapping[str, Instance],
+    row: Row,
 ) -> list[Stage]:
     """The stages of every step.
 
     Args:
-        system: whose connections say what feeds what.
+        system: whose connections say what feeds what, and whose steps which components are slow.
+        experiment: whose step is the communication step.
         plan: its components in :func:`stages`.
         instances: of all components.
         row: that they are tied to.
 
     """
-    stage_of = {name: i for i, names in enumerate(plan) for name in names}
-    gathered: list[list[Connection]] = [[] for _ in plan]
-    for connection in system.connections:
-        # What is no feedthrough is a state, and must be taken before anybody advances.
-        late = len(plan) > 1 and has_feedthrough(system, connection)
-        gathered[stage_of[connection.target.component] if late else 0].append(connection)
-    return [
-        Stage(Gathering(row, connections), [member(instances[name]) for name in names])
-        for names, connections in zip(plan, gathered, strict=True)
-    ]
+    pace = paces(system, experiment.step)
+    found: list[Stage] = []
+    shown: list[Stage] = []
+    for names, connections in zip(plan, gathered(system, plan), strict=True):
+        taken: dict[int, list[Connection]] = {1: []}
+        for connection in connections:
+            taken.setdefault(pace[connection.target.component], []).append(connection)
+        fast = Stage(
+            Gathering.along(row, taken.pop(1)),
+            [member(instances[name]) for name in names if pace[name] == 1],
+        )
+        # All inputs are gathered before anybody is stepped.
+        found += [Stage(Gathering.along(row, some), [], Pace(n)) for n, some in taken.items()]
+        found.append(fast)
+        for name in names:
+            if (n := pace[name]) > 1:
+                nothing = Gathering.along(row, ())
+                early, later = (
+                    Gathering(*row.hidden(ports))
+                    for ports in _shown(system.components[name], experiment.order)
+                )
+                found += [
+                    Stage(nothing, [member(instances[name])], Pace(n)),
+                    Stage(early, [], Pace(n)),
+                ]
+                shown.append(Stage(later, [], Pace(n, at_end=True)))
+    return [stage for stage in found + shown if stage.members or len(stage.gather.targets)]
+
+
+def _shown(component: Component, order: Order) -> tuple[list[PortName], list[PortName]]:
+    """The outputs of a slow component: those shown when it was stepped, and the others."""
+    early: list[PortName] = []
+    later: list[PortName] = []
+    for output in component.having("output"):
+        at_once = order != JACOBI and component.has_feedthrough(output.name)
+        (early if at_once else later).append(PortName(component.name, output.name))
+    return early, later
 
 
 def member(instance: Instance) -> Member:

@@ -9,16 +9,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import fmpy
-
 from orchestrator.errors import InputError, reason
 from orchestrator.master.channel import Channel, sizes
-from orchestrator.master.instance import ComponentFailed
+from orchestrator.master.instance import ComponentFailed, Ended
 from orchestrator.master.loaded import LoadedInstance, loaded
 from orchestrator.master.log import Letters
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import member, step
+from orchestrator.master.texts import Texts
 from orchestrator.system.component import Component
+from orchestrator.system.description import read_description
 from orchestrator.system.structure import System
 
 
@@ -32,7 +32,7 @@ def serve(name: str, fmu: Path, folder: Path, connection: socket.socket) -> None
         connection: to whom wants it simulated.
 
     """
-    component = Component(name, fmu, fmpy.read_model_description(folder))
+    component = Component(name, fmu, read_description(folder).description)
     inputs, outputs = sizes(component)
     # Before the inputs: time and step size.
     channel, letters = Channel(connection, outputs, 2 + inputs), Letters()
@@ -48,8 +48,9 @@ def serve(name: str, fmu: Path, folder: Path, connection: socket.socket) -> None
 class _Served:
     """An instance and whom it answers.
 
-    A request without a note is a step. An answer without a note says that all is well; else the
+    A request without a call is a step. An answer without a note says that all is well; else the
     note has messages of the FMU, the value that a call has given, or why it has failed.
+    Both ends number texts alike: each tells the other those that are new, and has its turn.
     """
 
     def __init__(
@@ -57,21 +58,25 @@ class _Served:
     ) -> None:
         self._instance, self._channel, self._letters = instance, channel, letters
         system = System(component.name, {component.name: component}, ())
-        values = Row(system, {component.name: instance}).values
+        row = Row(system, {component.name: instance})
         self._member = member(instance)
         n = len(channel.incoming) - 2
-        self._inputs, self._outputs = values[:n], values[n:]
+        self._inputs, self._outputs = row.values[:n], row.values[n:]
+        self._texts, self._told = row.texts, len(Texts())
 
     def answer_all(self) -> None:
         """Answer until the other end closes, or the FMU must not be called again."""
         going_on = self._answered(lambda: None)
         while going_on:
-            request = self._channel.receive()
+            request = self._channel.receive() or {}
+            for text in request.get("texts", ()):
+                self._texts.number(text)
+            self._told = len(self._texts)
             self._inputs[:] = self._channel.incoming[2:]
             going_on = self._answered(
-                self._step
-                if request is None
-                else partial(getattr(self._instance, request["call"]), *request["arguments"])
+                partial(getattr(self._instance, request["call"]), *request["arguments"])
+                if "call" in request
+                else self._step
             )
 
     def _step(self) -> None:
@@ -84,12 +89,16 @@ class _Served:
             value = call()
             if value is not None:
                 note["value"] = value
+        except Ended as end:
+            note["ended"] = str(end)
         except ComponentFailed as error:
             note |= {"failed": str(error), "fatal": error.fatal}
         except Exception as error:
             note |= {"failed": f"{self._instance.name}: {reason(error)}", "fatal": True}
         if messages := self._letters.handed_over():
             note["messages"] = messages
+        if news := self._texts.since(self._told):
+            note["texts"] = news
         self._channel.outgoing[:] = self._outputs
         self._channel.send(note or None)
         return not note.get("fatal")

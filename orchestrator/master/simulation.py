@@ -4,25 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
+from math import lcm
 from time import monotonic
 
 import numpy as np
 
-from orchestrator.errors import InputError, StartError, reason
+from orchestrator.errors import InputError, StartError, reason, shortened
 from orchestrator.master.attendant import Attendance, Attendant, Run
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.instance import ComponentFailed, Ended, Instance
-from orchestrator.master.interrupts import Interrupts, held_interrupts
-from orchestrator.master.isolated import Isolation, isolated
-from orchestrator.master.loaded import all_loaded
+from orchestrator.master.interrupts import held_interrupts
+from orchestrator.master.isolated import Isolation
 from orchestrator.master.log import Log
 from orchestrator.master.loop import PYTHON_LOOP, Loop
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
+from orchestrator.master.paces import paces
+from orchestrator.master.placing import placed
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import schedule, stages
-from orchestrator.master.signals import Signals
+from orchestrator.master.schedule import delays, schedule, stages
+from orchestrator.master.signals import Gathering, Signals
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+from orchestrator.system.values import literal, same
+
+#: In a ring initial values are exchanged so often, until they rest.
+_MOST_ROUNDS = 1000
 
 
 def simulate(
@@ -33,7 +40,7 @@ def simulate(
     loop: Loop = PYTHON_LOOP,
     attendants: Sequence[Attendant] = (),
 ) -> Ending:
-    """Run a system from t = 0.
+    """Run a system.
 
     Args:
         system: what to run.
@@ -53,30 +60,43 @@ def simulate(
     """
     system.check()
     plan = stages(system, experiment.order)
+    slow = {name for name, n in paces(system, experiment.step).items() if n > 1}
     log = Log()
+    for delay in delays(system, experiment.order):
+        log.remark(delay)
+    experiment = _whole_steps(system, experiment, log)
     with held_interrupts() as interrupts, ExitStack() as stack:
         with _explained():
-            components = system.components
-            instances = stack.enter_context(
-                isolated(components, log, isolation, interrupts)
-                if isolation
-                else all_loaded(components, log)
-            )
-            row = Row(system, instances)
+            instances = stack.enter_context(placed(system.components, log, isolation, interrupts))
+            loop = _possible_loop(loop, instances, log)
+            row = Row(system, instances, slow)
             _initialise(system, instances, row, experiment, log)
             names = tuple(map(str, row.columns))
-            header = Header(names, experiment, _parameters(instances), loop.name)
-        scheduled = schedule(system, plan, instances, row)
+            parameters = _parameters(system, instances, log)
+            texts = dict.fromkeys(map(str, row.text_ports), row.texts)
+            header = Header(names, experiment, parameters, loop.name, texts)
+        scheduled = schedule(system, experiment, plan, instances, row)
         with _told(header, observers) as tell:
-            blocks = Blocks(len(row.values), observers)
+            blocks = Blocks(len(row.shown), observers)
             interrupts.hand_over = blocks.hand_over
-            blocks.append(0.0, row.values)
+            blocks.append(experiment.start_time, row.shown)
             signals = Signals(row, [stage.gather for stage in scheduled], system.connections)
-            run = Run(system, experiment, instances, row, scheduled, signals, blocks)
+            run = Run(
+                system,
+                experiment,
+                instances,
+                row,
+                scheduled,
+                signals,
+                blocks,
+                log,
+                interrupts,
+                attendants,
+            )
             order = [name for names in plan for name in names]
             remark = None
             try:
-                failure = _advance(run, loop, Attendance(run, attendants), order, interrupts)
+                failure = _advance(run, loop, Attendance(run), order)
             except NotKept as error:
                 # Rows that cannot be kept need not be computed.
                 failure = str(error)
@@ -84,7 +104,9 @@ def simulate(
                 failure, remark = None, str(end)
             if failure is None:
                 _terminate(instances)
-            ending = Ending(failure, remark, log.messages, tuple(interrupts.signals))
+            ending = Ending(
+                failure, remark, log.messages, tuple(interrupts.signals), tuple(run.happened)
+            )
             tell(ending)
         return ending
 
@@ -104,6 +126,40 @@ def completed(system: System, experiment: Experiment, observers: Sequence[Observ
         raise InputError(f"{system.name} {ending.failure}")
 
 
+def _whole_steps(system: System, experiment: Experiment, log: Log) -> Experiment:
+    """An experiment without its last, shorter step where an FMU takes none of another length.
+
+    Raises:
+        InputError: no step is left.
+
+    """
+    rigid = [name for name, component in system.components.items() if not component.takes_any_step]
+    pace = paces(system, experiment.step)
+    period = lcm(*(pace[name] for name in rigid))
+    whole = experiment.full_steps // period * period
+    if not rigid or whole == experiment.rows - 1:
+        return experiment
+    why = f"{', '.join(rigid)}: takes steps of one length alone, so"
+    if whole == 0:
+        shortest = period * experiment.step
+        raise InputError(f"{why} the run must last at least one step, {shortest:g} s")
+    end = experiment.time(whole)
+    log.remark(f"{why} the run ends with the last whole step, at t = {end:.12g} s")
+    return replace(experiment, stop_time=end)
+
+
+def _possible_loop(loop: Loop, instances: Mapping[str, Instance], log: Log) -> Loop:
+    """The loop, or the one in Python where the other has nothing to call."""
+    apart = [name for name, instance in instances.items() if not instance.is_here]
+    if not apart or loop == PYTHON_LOOP:
+        return loop
+    log.remark(
+        f"{', '.join(apart)}: runs in a process of its own, for the FMU allows one instance a "
+        "process; steps are made in Python"
+    )
+    return PYTHON_LOOP
+
+
 def _initialise(
     system: System,
     instances: Mapping[str, Instance],
@@ -119,39 +175,61 @@ def _initialise(
 
     """
     for name, instance in instances.items():
-        instance.enter_initialization(system.parameters_of(name), experiment.stop_time)
+        instance.enter_initialization(system.parameters_of(name), experiment.start_time)
+        held = instance.read(system.open_inputs(name))
+        row.enter({PortName(name, port): value for port, value in held.items()})
     values = row.values
-    targets, sources = row.places(system.connections)
+    gather = Gathering.along(row, system.connections)
     # Through a chain of all, once more for what its end feeds, and once to see it at rest.
-    for _ in range(len(instances) + 2):
+    for _ in range(max(len(instances) + 2, _MOST_ROUNDS)):
         before = values.copy()
-        values[targets] = values[sources]
-        _exchange(instances, row)
+        gather(values)
+        _exchange(instances, row, experiment)
         if np.array_equal(before, values):
             break
     else:
-        raise InputError("initial values do not come to rest: an algebraic loop")
+        if restless := row.moving(before):
+            raise InputError(
+                f"initial values do not come to rest: {shortened(', '.join(map(str, restless)))} "
+                "in an algebraic loop"
+            )
     for instance in instances.values():
         instance.exit_initialization()
-    values[targets] = values[sources]
-    _exchange(instances, row)
+    gather(values)
+    _exchange(instances, row, experiment)
     if log.refusals:
         raise InputError("; ".join(log.refusals))
 
 
-def _exchange(instances: Mapping[str, Instance], row: Row) -> None:
+def _exchange(instances: Mapping[str, Instance], row: Row, experiment: Experiment) -> None:
     for instance in instances.values():
         instance.exchange()
+    row.show()
     if not_finite := row.not_finite(instances):
-        raise StartError(f"stopped at t = 0 s: {not_finite}")
+        raise StartError(f"stopped at t = {experiment.start_time:g} s: {not_finite}")
 
 
-def _parameters(instances: Mapping[str, Instance]) -> dict[PortName, object]:
-    return {
-        PortName(name, parameter): value
-        for name, instance in instances.items()
-        for parameter, value in instance.parameters().items()
-    }
+def _parameters(
+    system: System, instances: Mapping[str, Instance], log: Log
+) -> dict[PortName, object]:
+    """Values of all parameters as the FMUs hold them; where one is not what was set, the log says.
+
+    Some FMUs overwrite values without a word.
+    """
+    parameters: dict[PortName, object] = {}
+    for name, instance in instances.items():
+        component, wanted = system.components[name], system.parameters_of(name)
+        own = [variable.name for variable in component.having("parameter")]
+        lasting = [port for port in wanted if component.variables[port].initial == "exact"]
+        held = instance.read(list(dict.fromkeys((*own, *lasting))))
+        for port in lasting:
+            if not same(wanted[port], held[port]):
+                log.remark(
+                    f"{name}.{port} was set to {literal(wanted[port])}, and the FMU holds "
+                    f"{literal(held[port])}"
+                )
+        parameters |= {PortName(name, port): held[port] for port in own}
+    return parameters
 
 
 def _terminate(instances: Mapping[str, Instance]) -> None:
@@ -166,7 +244,6 @@ def _advance(
     loop: Loop,
     attendance: Attendance,
     order: Sequence[str],
-    interrupts: Interrupts,
 ) -> str | None:
     """Step to the end, or to the first failure, and say what it was."""
     blocks, failure = run.blocks, None
@@ -177,7 +254,7 @@ def _advance(
                 attendance.attend()
             if monotonic() > blocks.due:
                 blocks.hand_over()
-            if interrupts.signals:
+            if run.interrupts.signals:
                 failure = f"interrupted at t = {run.time:.12g} s"
                 break
     except ComponentFailed as error:

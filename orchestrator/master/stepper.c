@@ -46,20 +46,29 @@ typedef struct {
     size_t n_inputs, n_outputs;
 } member;
 
+/* Values that become others on their way through one connection; others stay what they are. */
+typedef struct {
+    size_t connection, n;
+    const double *from, *to;
+} mapping;
+
 /* Inputs to gather, and the components to step then. */
 typedef struct {
     const size_t *targets, *sources;
     const double *factors, *offsets;
+    const mapping *mappings; /* in the order of their connections */
     const member *members;
-    size_t n_connections, n_members;
+    size_t n_connections, n_mappings, n_members;
+    size_t every; /* how many steps one of its components takes in one of its own */
+    int at_end;   /* whether it belongs to the last of these steps, not to the first */
 } stage;
 
 typedef struct {
     const stage *stages;
-    double *values; /* the row of all values */
-    size_t n_stages, n_values;
-    double step, stop_time;
-    size_t full_steps; /* and, if there are more steps, a shorter one */
+    double *values; /* the row of all values, behind those that are shown more */
+    size_t n_stages, n_shown;
+    double start_time, step, stop_time;
+    size_t full_steps, steps; /* if there is one more of all steps, it is shorter */
 } run;
 
 /* Rows, each with the time in front; Python reads their number meanwhile. */
@@ -134,16 +143,50 @@ static int stage_failed(const stage *this, double t, double h, failure *why) {
     return 0;
 }
 
-/* Make a step from t to t + h; whether a component failed. */
-static int step_failed(const run *this, double t, double h, failure *why) {
+static double mapped(const mapping *this, double value) {
     size_t i;
+    for (i = 0; i < this->n; i++) {
+        if (this->from[i] == value) return this->to[i];
+    }
+    return value;
+}
+
+static void gather(const stage *this, double values[]) {
+    const mapping *map = this->mappings, *const end = map + this->n_mappings;
+    size_t i;
+    for (i = 0; i < this->n_connections; i++) {
+        double value = values[this->sources[i]];
+        if (map < end && map->connection == i) value = mapped(map++, value);
+        values[this->targets[i]] = this->factors[i] * value + this->offsets[i];
+    }
+}
+
+/* Whether the components of a stage are stepped, or what they have computed is shown. */
+static int is_due(const stage *this, size_t k, size_t steps) {
+    if (this->at_end) return (k + 1) % this->every == 0 || k + 1 == steps;
+    return k % this->every == 0;
+}
+
+static double time_after(const run *this, size_t k) {
+    return k <= this->full_steps ? this->start_time + (double)k * this->step : this->stop_time;
+}
+
+/* How long n steps after the k-th last, or as many of them as are left. */
+static double length_of(const run *this, size_t k, size_t n) {
+    if (k + n <= this->full_steps) return (double)n * this->step;
+    if (this->steps > this->full_steps) return this->stop_time - time_after(this, k);
+    return (double)(this->full_steps - k) * this->step;
+}
+
+/* Make the step after the k-th; whether a component failed. */
+static int step_failed(const run *this, size_t k, failure *why) {
+    const double t = time_after(this, k), h = length_of(this, k, 1);
     for (why->stage = 0; why->stage < this->n_stages; why->stage++) {
         const stage *it = &this->stages[why->stage];
-        for (i = 0; i < it->n_connections; i++) {
-            this->values[it->targets[i]] =
-                it->factors[i] * this->values[it->sources[i]] + it->offsets[i];
-        }
-        if (stage_failed(it, t, h, why)) return 1;
+        const int slow = it->every > 1;
+        if (slow && !is_due(it, k, this->steps)) continue;
+        gather(it, this->values);
+        if (stage_failed(it, t, slow ? length_of(this, k, it->every) : h, why)) return 1;
     }
     return 0;
 }
@@ -165,14 +208,11 @@ EXPORTED int advance(const run *this, size_t k, size_t until, double patience, b
                      failure *why) {
     const double due = now() + patience;
     for (; k < until && rows->n < rows->most; k++) {
-        const int full = k < this->full_steps;
-        const double t = (double)k * this->step;
-        const double end = full ? (double)(k + 1) * this->step : this->stop_time;
-        double *row = rows->rows + rows->n * (1 + this->n_values);
-        if (step_failed(this, t, full ? this->step : end - t, why)) return FAILED;
-        if (!all_finite(this->values, this->n_values)) return NOT_FINITE;
-        row[0] = end;
-        memcpy(row + 1, this->values, this->n_values * sizeof *row);
+        double *row = rows->rows + rows->n * (1 + this->n_shown);
+        if (step_failed(this, k, why)) return FAILED;
+        if (!all_finite(this->values, this->n_shown)) return NOT_FINITE;
+        row[0] = time_after(this, k + 1);
+        memcpy(row + 1, this->values, this->n_shown * sizeof *row);
         rows->n++;
         if (now() >= due) break;
     }

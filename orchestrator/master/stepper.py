@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from ctypes import CDLL, POINTER, c_double, c_int, c_size_t
 
 from orchestrator.master import layout
 from orchestrator.master.attendant import Run
-from orchestrator.master.schedule import CALLS, Stage
+from orchestrator.master.instance import CALLS
+from orchestrator.master.schedule import Pace, Stage
 
 #: Longest time until Python looks whether somebody wants the run to stop [s].
 _GLANCE = 0.02
@@ -21,17 +22,19 @@ def stepped(library: CDLL, run: Run) -> Iterator[None]:
         POINTER(layout.Run), c_size_t, c_size_t, c_double, POINTER(layout.Block),
         POINTER(layout.Failure),
     )  # fmt: skip
-    stages, values, experiment, blocks = run.stages, run.row.values, run.experiment, run.blocks
+    stages, row, experiment, blocks = run.stages, run.row, run.experiment, run.blocks
+    steps = experiment.rows - 1
     plan = layout.Run(
         (layout.Stage * len(stages))(*map(_laid_out, stages)),
-        values.ctypes.data,
+        row.values.ctypes.data,
         len(stages),
-        len(values),
+        len(row.shown),
+        experiment.start_time,
         experiment.step,
         experiment.stop_time,
         experiment.full_steps,
+        steps,
     )
-    steps = experiment.rows - 1
     block, failure = blocks.block, layout.Failure()
     outcome = layout.DUE
     while outcome == layout.DUE and run.made < steps:
@@ -48,10 +51,19 @@ def stepped(library: CDLL, run: Run) -> Iterator[None]:
 
 def _laid_out(stage: Stage) -> layout.Stage:
     gather, members = stage.gather, [member.instance.pointers() for member in stage.members]
+    mappings = [_mapping(place, gather.mapped[place]) for place in sorted(gather.mapped)]
     return layout.Stage(
         *(array.ctypes.data for array in (gather.targets, gather.sources)),
         *(array.ctypes.data for array in (gather.factors, gather.offsets)),
+        (layout.Mapping * len(mappings))(*mappings),
         (layout.Member * len(members))(*members),
         len(gather.targets),
+        len(mappings),
         len(members),
+        *(stage.pace or Pace(1)),
     )
+
+
+def _mapping(place: int, pairs: Mapping[float, float]) -> layout.Mapping:
+    n = len(pairs)
+    return layout.Mapping(place, n, (c_double * n)(*pairs), (c_double * n)(*pairs.values()))

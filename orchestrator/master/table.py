@@ -11,7 +11,7 @@ import numpy as np
 from orchestrator.errors import InputError, did_you_mean
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observer import Ending, Header
-from orchestrator.system.names import PortName, port_name
+from orchestrator.system.names import PortName
 
 #: More rows than this are not kept in memory.
 MOST_ROWS = 10_000_000
@@ -83,7 +83,7 @@ class Table:
         return column == "time" or column in self._index
 
     def __getitem__(self, column: str) -> np.ndarray:
-        """The values of one column.
+        """The values of one column; those of a String are texts.
 
         Raises:
             KeyError: there is no such column; the text has a suggestion.
@@ -93,7 +93,10 @@ class Table:
             return self.time
         if column not in self._index:
             raise KeyError(f"no column {column!r}{did_you_mean(str(column), self._index)}")
-        return self.rows[:, self._index[column]]
+        values = self.rows[:, self._index[column]]
+        if column not in self.header.texts:
+            return values
+        return np.array([self.header.texts[column].text(number) for number in values])
 
     @property
     def rows(self) -> np.ndarray:
@@ -126,8 +129,9 @@ class Table:
 
     def missing(self, columns: Iterable[str], parameters: Iterable[str] = ()) -> list[str]:
         """Those of some columns and parameters, `component.name`, that are not there."""
+        known = {*map(str, self.parameters)}
         return [column for column in columns if column not in self] + [
-            name for name in parameters if port_name(name) not in self.parameters
+            name for name in parameters if name not in known
         ]
 
     @cached_property

@@ -22,16 +22,16 @@ from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
 from orchestrator.experiments.bill_of_materials import digest_of
 from orchestrator.experiments.bundle import PYTHON
-from orchestrator.experiments.folder import whole
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.experiments.record import PACKAGES
 from orchestrator.experiments.run import metrics_json
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.observer import Ending, Header
+from orchestrator.master.observer import Ending, Header, Occurrence
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
 from orchestrator.paper.runs import Run
 from orchestrator.paper.workers import Workers
+from orchestrator.system.atomic import whole
 from orchestrator.system.names import port_name
 
 #: Rooms whose code says what is kept of a run.
@@ -137,6 +137,8 @@ def key_of(prepared: Prepared) -> str:
             if value != system.component(name.component).start(name.port)
         ),
         "experiment": asdict(prepared.experiment),
+        "events": repr(prepared.events),
+        "inputs": prepared.course.digest if prepared.course else "",
         "versions": [sys.version, *map(version, PACKAGES)],
         "code": _code(),
     }
@@ -160,7 +162,13 @@ def _make(run: Run, file: Path) -> Outcome:
     try:
         prepared = run.prepared()
         metrics, seen = Metrics(), VisibleRows()
-        simulate(prepared.system, prepared.experiment, [metrics, seen], loop=prepared.loop)
+        simulate(
+            prepared.system,
+            prepared.experiment,
+            [metrics, seen],
+            loop=prepared.loop,
+            attendants=prepared.attendants(),
+        )
     except InputError as error:
         return Outcome({"failure": str(error)}, Table())
     outcome = Outcome(
@@ -179,6 +187,7 @@ def _write(file: Path, outcome: Outcome) -> None:
         "experiment": asdict(header.experiment),
         "parameters": {str(name): value for name, value in header.parameters.items()},
         "messages": outcome.table.ending.messages,
+        "events": outcome.table.ending.events,
     }
     file.parent.mkdir(parents=True, exist_ok=True)
     with whole(file) as partial:
@@ -198,5 +207,6 @@ def _read(file: Path) -> Outcome | None:
     except (OSError, EOFError, ValueError, KeyError, BadZipFile, zlib.error):
         # Not there, or not whole.
         return None
-    ending = Ending(messages=tuple(text["messages"]))
+    events = tuple(Occurrence(*event) for event in text["events"])
+    ending = Ending(messages=tuple(text["messages"]), events=events)
     return Outcome(text["metrics"], Table.of(header, rows, ending))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from orchestrator.experiments.bundle import PYTHON
+from orchestrator.experiments.inputs import inputs_of
 from orchestrator.experiments.preparation import (
     Prepared,
     Request,
@@ -15,7 +16,8 @@ from orchestrator.experiments.preparation import (
     prepare,
     with_companion,
 )
-from orchestrator.master.experiment import ORDERS
+from orchestrator.experiments.scenario import read_scenario
+from orchestrator.master.experiment import ORDERS, Order, written_order
 from orchestrator.system.names import port_name
 from orchestrator.system.values import Value, literal
 
@@ -30,15 +32,19 @@ class Run:
         order: of evaluation.
         stop_time, step: experiment [s]; None: the scenario's own.
         kind: of the bundle's FMUs.
+        events: the scenario whose events happen; empty: its own.
+        inputs: the table that inputs follow; empty: the scenario's own.
 
     """
 
     scenario: str
     parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
-    order: str = ORDERS[0]
+    order: Order = ORDERS[0]
     stop_time: float | None = None
     step: float | None = None
     kind: str = PYTHON
+    events: str = ""
+    inputs: str = ""
 
     @property
     def label(self) -> str:
@@ -46,8 +52,10 @@ class Run:
         options = [
             *(("--stop-time", _text(self.stop_time)) if self.stop_time is not None else ()),
             *(("--step", _text(self.step)) if self.step is not None else ()),
-            *(("--order", self.order) if self.order != ORDERS[0] else ()),
+            *(("--order", written_order(self.order)) if self.order != ORDERS[0] else ()),
             *(("--kind", self.kind) if self.kind != PYTHON else ()),
+            *(("--events", self.events) if self.events else ()),
+            *(("--inputs", self.inputs) if self.inputs else ()),
         ]
         for name, value in self.parameters.items():
             options += ["--set", f"{name}={_text(value)}"]
@@ -57,7 +65,15 @@ class Run:
     def request(self) -> Request:
         """The changes."""
         parameters = {port_name(name): value for name, value in self.parameters.items()}
-        return Request(self.stop_time, self.step, self.order, parameters, kind=self.kind)
+        return Request(
+            self.stop_time,
+            self.step,
+            self.order,
+            parameters,
+            kind=self.kind,
+            events=read_scenario(self.events).events if self.events else None,
+            inputs=inputs_of(self.inputs or None),
+        )
 
     def prepared(self) -> Prepared:
         """What is run.
@@ -77,29 +93,32 @@ class Run:
         """
         prepared = self.prepared()
         return [
-            _as_run(prepared.scenario.compare, companion, self.kind)
+            self._as_run(prepared.scenario.compare, companion)
             for companion in with_companion(prepared, self.request)[1:]
         ]
+
+    def _as_run(self, scenario: str, prepared: Prepared) -> Run:
+        """What was prepared from a scenario as its companion, by the least changes to it."""
+        own = Run(scenario, kind=self.kind).prepared()
+        experiment, course = prepared.experiment, prepared.course
+        played = course.targets if course else ()
+        inputs = prepared.scenario.inputs
+        return Run(
+            scenario,
+            {
+                str(name): value
+                for name, value in prepared.system.parameters.items()
+                if own.system.value(name) != value and name not in played
+            },
+            experiment.order,
+            None if experiment.stop_time == own.experiment.stop_time else experiment.stop_time,
+            None if experiment.step == own.experiment.step else experiment.step,
+            self.kind,
+            "" if prepared.events == own.events else self.events or self.scenario,
+            str(inputs.file) if inputs and inputs != own.scenario.inputs else "",
+        )
 
 
 def _text(value: Value) -> str:
     """A value that is read back as the same, and no longer than it must be."""
     return literal(value).removesuffix(".0") if isinstance(value, float) else literal(value)
-
-
-def _as_run(scenario: str, prepared: Prepared, kind: str) -> Run:
-    """What was prepared from a scenario, by the least changes to it."""
-    own = Run(scenario, kind=kind).prepared()
-    experiment = prepared.experiment
-    return Run(
-        scenario,
-        {
-            str(name): value
-            for name, value in prepared.system.parameters.items()
-            if own.system.value(name) != value
-        },
-        experiment.order,
-        None if experiment.stop_time == own.experiment.stop_time else experiment.stop_time,
-        None if experiment.step == own.experiment.step else experiment.step,
-        kind,
-    )

@@ -157,6 +157,8 @@ def _job(system: System, run: Run) -> _Job:
     if not all(_is_parameter(system, name) for name in changes):
         system.check()
     experiment = Experiment(run.stop_time, run.step, run.order)
+    if run.order not in ORDERS:
+        raise InputError(f"the batch engine has the orders {' and '.join(ORDERS)}; {_OTHER}")
     fmus = {name: part.description.modelName for name, part in system.components.items()}
     setting = setting_of(fmus, system.parameters, experiment.step)
     if misfit(setting):

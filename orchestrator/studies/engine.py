@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from orchestrator.analysis.signals import ACTUATORS, AXES
-from orchestrator.master.experiment import ORDERS
+from orchestrator.master.experiment import ORDERS, Order
 
 #: An error of tracking that counts as having reached the reference [m].
 REACHED = 1.0
@@ -71,7 +71,7 @@ class Run(NamedTuple):
     parameters: Mapping[str, Any]
     stop_time: float
     step: float
-    order: str = ORDERS[0]
+    order: Order = ORDERS[0]
 
 
 class Outcome(NamedTuple):

@@ -10,6 +10,7 @@ from typing import Any
 
 from orchestrator.errors import InputError
 from orchestrator.experiments.bill_of_materials import digest_of
+from orchestrator.master.events import Event, Events
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.loop import LOOPS, chosen
 from orchestrator.master.simulation import simulate
@@ -23,15 +24,21 @@ from orchestrator.system.structure import System
 class FmuEngine:
     """Makes runs with FMUs in the process that it is called in; it takes them along."""
 
-    def __init__(self, systems: Mapping[str, System], loop: str = LOOPS[0]) -> None:
+    def __init__(
+        self,
+        systems: Mapping[str, System],
+        loop: str = LOOPS[0],
+        events: Mapping[str, tuple[Event, ...]] | None = None,
+    ) -> None:
         """Take systems.
 
         Args:
             systems: by the names that runs have for their scenarios.
             loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
+            events: that happen in their runs.
 
         """
-        self._systems, self._loop = dict(systems), loop
+        self._systems, self._loop, self._events = dict(systems), loop, dict(events or {})
 
     @property
     def digest(self) -> str:
@@ -42,6 +49,7 @@ class FmuEngine:
                 [(part.name, digest_of(part.fmu)) for part in system.components.values()],
                 system.connections,
                 system.parameters,
+                self._events.get(name, ()),
             )
             for name, system in self._systems.items()
         ]
@@ -64,9 +72,16 @@ class FmuEngine:
         system = self._systems[run.scenario].with_parameters(
             {port_name(name): value for name, value in run.parameters.items()}
         )
-        experiment = Experiment(run.stop_time, run.step, run.order)
+        experiment = Experiment(run.stop_time, run.step, run.order, system.start_time or 0.0)
         indices = Indices()
-        ending = simulate(system, experiment, [indices], loop=chosen(self._loop, experiment))
+        events = self._events.get(run.scenario)
+        ending = simulate(
+            system,
+            experiment,
+            [indices],
+            loop=chosen(self._loop, experiment),
+            attendants=[Events(events)] if events else (),
+        )
         if ending.signals:
             raise KeyboardInterrupt
         if ending.failure is not None:
@@ -80,12 +95,17 @@ class FmuEngine:
             for system in self._systems.values()
             for part in system.components.values()
         }
-        return {"systems": self._systems, "loop": self._loop, "archives": archives}
+        return {
+            "systems": self._systems,
+            "loop": self._loop,
+            "events": self._events,
+            "archives": archives,
+        }
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         """Put the FMUs where this process keeps what is temporary."""
         places = {fmu: _place(*content) for fmu, content in state["archives"].items()}
-        self._loop = state["loop"]
+        self._loop, self._events = state["loop"], state["events"]
         self._systems = {
             name: replace(
                 system,

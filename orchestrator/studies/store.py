@@ -21,9 +21,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orchestrator.errors import InputError, did_you_mean, reason
-from orchestrator.experiments.folder import locked, whole
+from orchestrator.experiments.folder import locked
 from orchestrator.studies.engine import INDICES, Outcome
 from orchestrator.studies.space import Space
+from orchestrator.system.atomic import whole
 
 if TYPE_CHECKING:
     import pandas as pd

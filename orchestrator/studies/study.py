@@ -110,7 +110,7 @@ class Study:
     engine: str = FMU
     stop_time: StopTime | None = None
     step: float | None = None
-    order: str = ORDERS[0]
+    order: str | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     sample: Sample | None = None
@@ -167,7 +167,9 @@ ENTRIES: dict[str, Entry] = {
         "the scenario's",
     ),
     "step": Entry("number", is_finite, "Communication step [s].", "the scenario's"),
-    "order": _one_of(ORDERS)._replace(meaning="In which components are stepped."),
+    "order": _one_of(ORDERS)._replace(
+        meaning="In which components are stepped.", default="the scenario's"
+    ),
     "parameters": Entry(
         "table of values", is_table, "Parameters of all runs, as in a scenario.", "the scenario's"
     ),

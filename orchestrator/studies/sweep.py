@@ -18,6 +18,7 @@ from tqdm import tqdm
 
 from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import PYTHON
+from orchestrator.experiments.events import read_events
 from orchestrator.experiments.preparation import loaded
 from orchestrator.experiments.scenario import Scenario
 from orchestrator.master.loop import LOOPS
@@ -186,8 +187,17 @@ def check_installed() -> None:
 
 def _engine(name: str, systems: Mapping[str, tuple[Scenario, System]], means: Means) -> Engine:
     alone = {scenario: system for scenario, (_, system) in systems.items()}
+    events = {
+        scenario: read_events(scenario, told.events, system)
+        for scenario, (told, system) in systems.items()
+    }
+    for scenario, (told, _) in systems.items():
+        if told.inputs is not None:
+            raise InputError(f"{scenario}: has a table of inputs, which no study can follow")
+        if events[scenario] and name == BATCH:
+            raise InputError(f"{scenario}: has events, which engine {BATCH!r} cannot have happen")
     if name == FMU:
-        return FmuEngine(alone, means.loop)
+        return FmuEngine(alone, means.loop, events)
     if name == BATCH:
         return BatchEngine(alone, means.kind)
     raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")

@@ -6,13 +6,17 @@ module                  what it holds
 :mod:`.names`           `component.port`, and a component's own ports
 :mod:`.values`          values in the types of FMI's variables, from text and to text
 :mod:`.component`       an FMU and what its description says about it
+:mod:`.description`     that description, read leniently
 :mod:`.transformation`  what happens to a value on its way through a connection
+:mod:`.units`           units by their definitions, and from one to another
 :mod:`.structure`       components, connections and parameters: a system
 :mod:`.graph`           what depends on what: feedthrough, and what reaches a component
+:mod:`.atomic`          files that appear whole or not at all
 :mod:`.leftovers`       what only one process may have, and what it leaves when it is killed
 :mod:`.children`        modules run in processes that do not outlive this one
 :mod:`.unpacking`       archives unpacked, once a process and version
 :mod:`.ssp`             systems as SSP 1.0 archives, read and written
+:mod:`.examination`     an FMU examined without loading it
 :mod:`.osp`             systems as libcosim's own configuration
 :mod:`.container`       a system as one FMU
 ======================  ==============================================================

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 
-import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from orchestrator.errors import InputError, did_you_mean, reason
-from orchestrator.system.unpacking import Version, unpacked, version_of
+from orchestrator.errors import InputError, did_you_mean
+from orchestrator.findings import Findings
+from orchestrator.system.description import described
+from orchestrator.system.unpacking import version_of
 from orchestrator.system.values import Value, typed
 
 #: The versions of FMI that a system can be written with, and those that the master can step.
@@ -38,6 +38,22 @@ class Component:
     def variables(self) -> dict[str, ModelVariable]:
         """The FMU's variables by name."""
         return {variable.name: variable for variable in self.description.modelVariables}
+
+    @property
+    def is_once_per_process(self) -> bool:
+        """Whether a process may hold one instance of the FMU only."""
+        return bool(self.description.coSimulation.canBeInstantiatedOnlyOncePerProcess)
+
+    @property
+    def takes_any_step(self) -> bool:
+        """Whether its steps may differ in length."""
+        return bool(self.description.coSimulation.canHandleVariableCommunicationStepSize)
+
+    @property
+    def gives_state(self) -> bool:
+        """Whether its whole state can be had as bytes, and taken on from them."""
+        of = self.description.coSimulation
+        return bool(of.canGetAndSetFMUstate and of.canSerializeFMUstate)
 
     def variable(self, name: str) -> ModelVariable:
         """One variable of the FMU.
@@ -67,6 +83,18 @@ class Component:
             return None
         return typed(f"{self.name}.{name}", variable, variable.start)
 
+    def is_settable(self, name: str) -> bool:
+        """Whether a variable takes a value before the first step (FMI 2.0.4, section 2.2.7).
+
+        Raises:
+            InputError: there is no such variable.
+
+        """
+        variable = self.variable(name)
+        return variable.causality == "input" or (
+            variable.variability != "constant" and variable.initial in ("exact", "approx")
+        )
+
     def has_feedthrough(self, output: str) -> bool:
         """Whether an output depends on an input of the same instant.
 
@@ -79,33 +107,25 @@ class Component:
         return False
 
 
-def read_component(name: str, fmu: Path, versions: Sequence[str] = RUNNABLE) -> Component:
+def read_component(
+    name: str,
+    fmu: Path,
+    versions: Sequence[str] = RUNNABLE,
+    findings: Findings | None = None,
+) -> Component:
     """An FMU as a component.
 
     Args:
         name: of the instance.
         fmu: the file.
         versions: of FMI that it may have.
+        findings: take note of what is wrong with its description, and does no harm.
 
     Raises:
         InputError: the file is missing or is no such FMU for co-simulation.
 
     """
-    return Component(name, fmu, _description(fmu, version_of(fmu), tuple(versions)))
-
-
-@lru_cache(maxsize=256)
-def _description(fmu: Path, _: Version, versions: tuple[str, ...]) -> ModelDescription:
-    folder = unpacked(fmu)
-    try:
-        description = fmpy.read_model_description(folder)
-    except Exception as error:
-        raise InputError(f"{fmu}: not a readable FMU: {reason(error)}") from error
-    if description.fmiVersion not in versions or description.coSimulation is None:
-        raise InputError(f"{fmu}: not an FMI {' or '.join(versions)} co-simulation FMU")
-    if not re.fullmatch(r"[A-Za-z_]\w*", description.coSimulation.modelIdentifier, re.ASCII):
-        raise InputError(
-            f"{fmu}: its model identifier {description.coSimulation.modelIdentifier!r} names no "
-            "library"
-        )
-    return description
+    found = described(fmu, version_of(fmu), tuple(versions))
+    if findings is not None and (remark := found.remark()):
+        findings.note(f"{name}: the description of {fmu.name} is not valid: {remark}")
+    return Component(name, fmu, found.description)

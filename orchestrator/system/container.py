@@ -21,9 +21,12 @@ def write_container(system: System, folder: Path) -> list[Path]:
     """Write `NAME.fmu`, one FMU that contains the whole system and shows all its outputs.
 
     Raises:
-        InputError: the FMU manipulation toolbox is not installed, or fails.
+        InputError: the FMU manipulation toolbox is not installed, or fails, or the system has what
+            a container has not.
 
     """
+    if any(connection.transformation for connection in system.connections) or system.steps:
+        raise InputError("a container has no transformations and one step; write an SSP")
     if find_spec(_TOOLBOX) is None:
         raise InputError(
             "a container needs the FMU manipulation toolbox: pip install 'auv-fmu[hosts]'"

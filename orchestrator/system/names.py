@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from orchestrator.errors import InputError
@@ -22,6 +23,9 @@ class PortName:
 def port_name(text: str) -> PortName:
     """`component.port`, taken apart at the first dot.
 
+    A component's name may have dots as well: which of them it is that parts it from the port, the
+    system knows (:meth:`.structure.System.named`).
+
     Raises:
         InputError: there is no dot.
 
@@ -30,3 +34,11 @@ def port_name(text: str) -> PortName:
     if not (component and dot and port):
         raise InputError(f"{text!r}: write component.port")
     return PortName(component, port)
+
+
+def splits(text: str) -> Iterator[tuple[str, str]]:
+    """The ways to take a name apart, the one with the longest name of a component first."""
+    dot = text.rfind(".")
+    while dot >= 0:
+        yield text[:dot], text[dot + 1 :]
+        dot = text.rfind(".", 0, dot)

@@ -20,9 +20,15 @@ def write_osp(system: System, folder: Path) -> list[Path]:
     """Write `OspSystemStructure.xml` and the FMUs beside it, for libcosim and its command line.
 
     Raises:
-        InputError: there is an FMU that libcosim cannot open.
+        InputError: there is an FMU that libcosim cannot open, or a connection that this format has
+            no words for.
 
     """
+    for connection in system.connections:
+        if connection.transformation is not None:
+            raise InputError(
+                f"{connection.source} -> {connection.target}: is transformed; write an SSP"
+            )
     for component in system.components.values():
         version = component.description.fmiVersion
         if version not in _TAKEN:
@@ -31,7 +37,10 @@ def write_osp(system: System, folder: Path) -> list[Path]:
                 "with --fmi 2"
             )
     root = ElementTree.Element("OspSystemStructure", xmlns=_OSP, version="0.1")
-    for tag, text in (("StartTime", "0.0"), ("BaseStepSize", str(system.step))):
+    for tag, text in (
+        ("StartTime", str(system.start_time or 0.0)),
+        ("BaseStepSize", str(system.step)),
+    ):
         ElementTree.SubElement(root, tag).text = text
     ElementTree.SubElement(root, "Algorithm").text = "fixedStep"
     simulators = ElementTree.SubElement(root, "Simulators")
@@ -44,7 +53,7 @@ def write_osp(system: System, folder: Path) -> list[Path]:
             "Simulator",
             name=component.name,
             source=component.fmu.name,
-            stepSize=str(system.step),
+            stepSize=str(system.steps.get(component.name, system.step)),
         )
         parameters = system.parameters_of(component.name)
         if parameters:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from orchestrator.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
-from orchestrator.system.names import PortName
+from orchestrator.system.names import PortName, splits
 from orchestrator.system.transformation import Transformation
+from orchestrator.system.units import conversion, unit_of_port
 from orchestrator.system.values import Value, type_of, typed, unit_of
+
+#: What can be fed from another type, besides from its own: no value is lost on the way.
+_FED_FROM = {"Real": ("Integer",), "Integer": ("Enumeration",), "Enumeration": ("Integer",)}
 
 
 @dataclass(frozen=True)
@@ -18,7 +22,8 @@ class Connection:
 
     Attributes:
         source, target: its ends.
-        transformation: what happens to the value on its way; None: it arrives bit for bit.
+        transformation: what happens to the value on its way; None: it arrives bit for bit, and the
+            units of its ends must be the same.
 
     """
 
@@ -65,18 +70,30 @@ class System:
             InputError: there is no such port, or the value is not of its type or out of range.
 
         """
-        new = {
-            target: typed(
-                str(target), self.component(target.component).variable(target.port), value
-            )
-            for target, value in values.items()
-        }
+        new = {}
+        for name, value in values.items():
+            target = self.named(name)
+            variable = self.component(target.component).variable(target.port)
+            new[target] = typed(str(target), variable, value)
         return replace(self, parameters={**self.parameters, **new})
+
+    def named(self, name: PortName) -> PortName:
+        """The port that a name means, which may have dots in its component's name as well.
+
+        It is one of the longest component that the text begins with and that has such a port; a
+        name that means none is left as it is.
+        """
+        components = self.components
+        for component, port in splits(str(name)):
+            if component in components and port in components[component].variables:
+                return PortName(component, port)
+        return name
 
     def has(self, name: PortName) -> bool:
         """Whether there is such a port or parameter."""
-        component = self.components.get(name.component)
-        return component is not None and name.port in component.variables
+        target = self.named(name)
+        component = self.components.get(target.component)
+        return component is not None and target.port in component.variables
 
     def parameters_of(self, component: str) -> dict[str, Value]:
         """Values that this system sets in one component, by the names of its variables."""
@@ -86,6 +103,15 @@ class System:
             if target.component == component
         }
 
+    def open_inputs(self, component: str) -> list[str]:
+        """Inputs of one component that nothing feeds, and for which no value is set."""
+        taken = {connection.target for connection in self.connections} | self.parameters.keys()
+        return [
+            variable.name
+            for variable in self.components[component].having("input")
+            if PortName(component, variable.name) not in taken
+        ]
+
     def value(self, name: PortName) -> Value | None:
         """The value of a parameter: the one that is set, or else the component's own.
 
@@ -93,9 +119,10 @@ class System:
             InputError: there is no such parameter.
 
         """
-        if name in self.parameters:
-            return self.parameters[name]
-        return self.component(name.component).start(name.port)
+        target = self.named(name)
+        if target in self.parameters:
+            return self.parameters[target]
+        return self.component(target.component).start(target.port)
 
     def component(self, name: str) -> Component:
         """One component of the system.
@@ -118,34 +145,67 @@ class System:
             InputError: a port does not exist, or two ports do not fit.
 
         """
+        for problem in self.problems():
+            raise InputError(problem)
+
+    def problems(self) -> Iterator[str]:
+        """All that is wrong with names, connections and parameters, a line each."""
+        yield from self._ambiguous()
         fed: dict[PortName, PortName] = {}
         for connection in self.connections:
-            self._check_connection(connection)
-            if connection.target in fed:
-                raise InputError(
-                    f"{connection.target} is fed by {fed[connection.target]} and by "
-                    f"{connection.source}; an input takes one connection"
+            try:
+                self._check_connection(connection)
+            except InputError as error:
+                yield str(error)
+            source, target = connection.source, connection.target
+            if target in fed:
+                yield (
+                    f"{target} is fed by {fed[target]} and by {source}; an input takes one "
+                    "connection"
                 )
-            fed[connection.target] = connection.source
+            fed.setdefault(target, source)
         for target in self.parameters:
-            causality = self.component(target.component).variable(target.port).causality
-            if causality == "input" and target in fed:
-                raise InputError(f"{target} is fed by {fed[target]} and cannot be set")
-            if causality not in ("parameter", "input"):
-                raise InputError(f"{target} is of causality {causality} and cannot be set")
+            try:
+                component = self.component(target.component)
+                causality = component.variable(target.port).causality
+                settable = component.is_settable(target.port)
+            except InputError as error:
+                yield str(error)
+                continue
+            if target in fed:
+                yield f"{target} is fed by {fed[target]} and cannot be set"
+            if not settable:
+                yield f"{target} is of causality {causality} and cannot be set"
+
+    def _ambiguous(self) -> Iterator[str]:
+        """Names that two ports have: of a component, and of one whose name is a part of its own."""
+        for name, component in self.components.items():
+            for outer, rest in splits(name):
+                if outer in self.components:
+                    others = self.components[outer].variables
+                    for port in component.variables:
+                        if f"{rest}.{port}" in others:
+                            yield f"two ports are named {name}.{port}"
 
     def _check_connection(self, connection: Connection) -> None:
         source, target = connection.source, connection.target
-        a = self.component(source.component).variable(source.port)
-        b = self.component(target.component).variable(target.port)
+        starts, ends = self.component(source.component), self.component(target.component)
+        a, b = starts.variable(source.port), ends.variable(target.port)
         for end, variable, wanted in ((source, a, "output"), (target, b, "input")):
             if variable.causality != wanted:
                 raise InputError(
                     f"{source} -> {target}: {end} is of causality {variable.causality}, "
                     f"not {wanted}"
                 )
-        if type_of(a) != type_of(b) or a.type == "String":
+        if type_of(a) not in (type_of(b), *_FED_FROM.get(type_of(b), ())):
             raise InputError(f"{source} -> {target}: cannot feed {a.type} into {b.type}")
-        unit_a, unit_b = unit_of(a), unit_of(b)
-        if unit_a and unit_b and unit_a != unit_b:
-            raise InputError(f"{source} -> {target}: units differ, {unit_a} and {unit_b}")
+        if connection.transformation is not None or unit_of(a) == unit_of(b):
+            return
+        units = unit_of_port(starts, source.port), unit_of_port(ends, target.port)
+        try:
+            converted = conversion(*units)
+        except InputError as error:
+            raise InputError(f"{source} -> {target}: {error}") from None
+        if converted is not None:
+            names = " and ".join(unit.name for unit in units if unit)
+            raise InputError(f"{source} -> {target}: units differ, {names}")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from orchestrator.errors import InputError
+
 
 @dataclass(frozen=True)
 class Linear:
@@ -13,10 +15,14 @@ class Linear:
     factor: float = 1.0
     offset: float = 0.0
 
+    def __call__(self, value: float) -> float:
+        """The value that arrives."""
+        return self.factor * value + self.offset
+
 
 @dataclass(frozen=True)
 class Mapped:
-    """The target takes what stands beside the source's value; another value ends the run.
+    """The target takes what stands beside the source's value; any other value stays as it is.
 
     Attributes:
         pairs: values of source and target, truth values as zero and one.
@@ -25,5 +31,26 @@ class Mapped:
 
     pairs: tuple[tuple[float, float], ...]
 
+    def __call__(self, value: float) -> float:
+        """The value that arrives."""
+        return dict(self.pairs).get(value, value)
+
 
 Transformation: TypeAlias = Linear | Mapped
+
+
+def chained(first: Transformation | None, then: Transformation | None) -> Transformation | None:
+    """Two transformations, one after the other, as one; None leaves a value as it is.
+
+    Raises:
+        InputError: one is linear, and the other a table.
+
+    """
+    if first is None or then is None:
+        return first or then
+    if isinstance(first, Linear) and isinstance(then, Linear):
+        return Linear(then.factor * first.factor, then(first.offset))
+    if isinstance(first, Mapped) and isinstance(then, Mapped):
+        sources = dict.fromkeys(source for table in (first, then) for source, _ in table.pairs)
+        return Mapped(tuple((source, then(first(source))) for source in sources))
+    raise InputError("a linear transformation and a mapping of single values follow each other")

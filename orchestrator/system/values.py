@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isclose, isfinite
 from typing import TypeAlias
 
 from fmpy.model_description import ModelVariable
@@ -17,6 +17,9 @@ _INTEGERS = -(2**31), 2**31 - 1
 
 #: What FMI 2.0 calls the types of FMI 3.0 that have a name there.
 _NAMES = {"Float64": "Real", "Int32": "Integer"}
+
+#: An FMU may keep a value in another unit, and round it by such a share.
+_ROUNDING = 1e-9
 
 BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 _KINDS = {
@@ -46,10 +49,13 @@ def typed(name: str, variable: ModelVariable, value: object) -> Value:
             return BOOLEANS[text.lower()]
         if type_of(variable) == "String":
             return _transferable(text)
+        if type_of(variable) == "Enumeration":
+            text = items_of(variable).get(text, text)
         number = real(text) if type_of(variable) == "Real" else int(_plain(text))
     except (KeyError, ValueError):
         # Python itself refuses to write and to read integers of very many digits.
-        kind = _KINDS.get(type_of(variable), "an integer")
+        items = ", ".join(items_of(variable))
+        kind = f"one of {items}" if items else _KINDS.get(type_of(variable), "an integer")
         raise InputError(f"{name}{shown}: not {kind}") from None
     if isinstance(number, float) and not isfinite(number):
         raise InputError(f"{name}{shown}: must be finite")
@@ -114,9 +120,22 @@ def type_of(variable: ModelVariable) -> str:
     return _NAMES.get(variable.type, str(variable.type))
 
 
+def items_of(variable: ModelVariable) -> dict[str, str]:
+    """The values of an Enumeration by their names, as its description writes them."""
+    declared = variable.declaredType
+    return {} if declared is None else {item.name: item.value for item in declared.items}
+
+
 def literal(value: Value) -> str:
     """A value as XML writes it."""
     return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def same(wanted: Value, held: Value) -> bool:
+    """Whether a value is the one that was set, but for rounding."""
+    if isinstance(wanted, float) and isinstance(held, float):
+        return isclose(wanted, held, rel_tol=_ROUNDING)
+    return wanted == held
 
 
 def unit_of(variable: ModelVariable) -> str | None:

@@ -103,11 +103,7 @@ def scene(setting: Setting, vehicles: Vehicles, t: float, n: Vector3) -> Scene:
 
     """
     seen = plant.outputs(
-        vehicles.plant,
-        vehicles.rotation,
-        setting.plant.ell,
-        setting.plant.roll.rolls,
-        setting.plant.current,
+        vehicles.plant, vehicles.rotation, setting.plant.ell, setting.plant.roll.rolls
     )
     return Scene(
         seen,

@@ -25,6 +25,7 @@ from auv_fmu.attitude import (
 )
 from auv_fmu.control_point import ELL, control_point, control_point_velocity
 from auv_fmu.types import Rotation, Vector3, Vector4, Vector6
+from auv_fmu.vectors import difference
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 
 #: Initial posture of section 4.1: x, y, z [m], phi, theta, psi [rad]; it does not give phi.
@@ -34,6 +35,7 @@ ETA_0: Vector6 = (2.0, 6.0, 0.0, 0.0, 0.0, 0.0)
 NU_0: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 _NO_FORCE = (0.0, 0.0, 0.0)
+_STILL = (0.0, 0.0, 0.0)
 
 
 class RollAxis(NamedTuple):
@@ -73,6 +75,7 @@ class PlantState(NamedTuple):
     quaternion: Vector4  #: attitude, body to earth, scalar first
     nu: Vector6  #: (u, v, w, p, q, r) through the water [m/s, rad/s], body frame
     tau: Vector3  #: (tau_u, tau_q, tau_r) that acts [N, N.m]
+    water: Vector3  #: velocity of the water that nu is through [m/s], earth frame
 
 
 class PlantOutputs(NamedTuple):
@@ -99,6 +102,26 @@ def over_ground(nu: Vector6, rotation: Rotation, current: Vector3) -> Vector6:
     u, v, w, p, q, r = nu
     u_c, v_c, w_c = rotate_back(rotation, current)
     return u + u_c, v + v_c, w + w_c, p, q, r
+
+
+def immersed(state: PlantState, rotation: Rotation, current: Vector3) -> PlantState:
+    """The same motion over ground, in water that moves with a current.
+
+    A current that changes at an instant changes the velocity through the water, as a vehicle with
+    a mass keeps its own.
+
+    Args:
+        state: of the vehicle, in whatever water it has been.
+        rotation: body to earth, of its quaternion.
+        current: velocity of the water from now on [m/s], earth frame.
+
+    """
+    change = difference(state.water, current)
+    c_x, c_y, c_z = change
+    if not (c_x or c_y or c_z):
+        return state
+    nu = over_ground(state.nu, rotation, change)
+    return PlantState(state.position, state.quaternion, nu, state.tau, current)
 
 
 def accelerations_6dof(
@@ -162,7 +185,6 @@ def turned_without_roll(rotation: Rotation, q: float, r: float, h: float) -> Vec
 def step(
     vehicle: Vehicle,
     roll: RollAxis,
-    current: Vector3,
     state: PlantState,
     rotation: Rotation,
     tau: Vector3,
@@ -173,7 +195,6 @@ def step(
 
     Args:
         vehicle, roll: parameters.
-        current: velocity of the water [m/s], earth frame.
         state: at the beginning of the step.
         rotation: body to earth, of its quaternion; its outputs need it too.
         tau: (tau_u, tau_q, tau_r) that acts [N, N.m].
@@ -181,21 +202,21 @@ def step(
         h: step [s].
 
     """
-    (x, y, z), quaternion, nu, _ = state
+    (x, y, z), quaternion, nu, _, water = state
     u, v, w, p, q, r = nu
     du, dv, dw, dp, dq, dr = accelerations_6dof(vehicle, roll, nu, rotation, tau, tau_w)
     dx, dy, dz = rotate(rotation, (u, v, w))
-    c_x, c_y, c_z = current
+    c_x, c_y, c_z = water
     position = x + h * dx, y + h * dy, z + h * dz
     if c_x or c_y or c_z:
         position = x + h * (dx + c_x), y + h * (dy + c_y), z + h * (dz + c_z)
     moved = u + h * du, v + h * dv, w + h * dw, p + h * dp, q + h * dq, r + h * dr
     if not roll.rolls:
-        return PlantState(position, turned_without_roll(rotation, q, r, h), moved, tau)
+        return PlantState(position, turned_without_roll(rotation, q, r, h), moved, tau, water)
     a, b, c, d = quaternion
     da, db, dc, dd = quaternion_rates(quaternion, (p, q, r))
     attitude = normalised((a + h * da, b + h * db, c + h * dc, d + h * dd))
-    return PlantState(position, attitude, moved, tau)
+    return PlantState(position, attitude, moved, tau, water)
 
 
 def begin(parameters: Parameters, tau: Vector3) -> tuple[PlantState, Rotation]:
@@ -207,14 +228,11 @@ def begin(parameters: Parameters, tau: Vector3) -> tuple[PlantState, Rotation]:
 
     """
     x, y, z, phi, theta, psi = parameters.eta0
-    c_x, c_y, c_z = parameters.current
     quaternion = quaternion_from_euler(phi, theta, psi)
     rotation = rotation_from_quaternion(quaternion)
-    nu = parameters.nu0
-    if c_x or c_y or c_z:
-        nu = over_ground(nu, rotation, (-c_x, -c_y, -c_z))
     acting = respond_all(_NO_FORCE, tau, parameters.T, 0.0)
-    return PlantState((x, y, z), quaternion, nu, acting), rotation
+    state = PlantState((x, y, z), quaternion, parameters.nu0, acting, _STILL)
+    return immersed(state, rotation, parameters.current), rotation
 
 
 def applied(parameters: Parameters, tau: Vector3) -> Vector3:
@@ -244,13 +262,13 @@ def steps(
     """
     T_u, T_q, T_r = parameters.T
     acting = tau
+    state = immersed(state, rotation, parameters.current)
     while n > 0:
         if T_u or T_q or T_r:
             acting = respond_all(state.tau, tau, parameters.T, h)
         state = step(
             parameters.vehicle,
             parameters.roll,
-            parameters.current,
             state,
             rotation,
             acting,
@@ -262,9 +280,7 @@ def steps(
     return state, rotation
 
 
-def outputs(
-    state: PlantState, rotation: Rotation, ell: float, rolls: bool, current: Vector3
-) -> PlantOutputs:
+def outputs(state: PlantState, rotation: Rotation, ell: float, rolls: bool) -> PlantOutputs:
     """Euler angles, control point (9), its velocity (10), and the velocity of the vehicle.
 
     Args:
@@ -272,13 +288,12 @@ def outputs(
         rotation: body to earth, of its quaternion.
         ell: distance of the control point [m].
         rolls: whether the vehicle does.
-        current: velocity of the water [m/s], earth frame.
 
     """
-    position, _, nu, _ = state
-    c_x, c_y, c_z = current
+    position, _, nu, _, water = state
+    c_x, c_y, c_z = water
     if c_x or c_y or c_z:
-        nu = over_ground(nu, rotation, current)
+        nu = over_ground(nu, rotation, water)
     euler = euler_from_rotation(rotation)
     if not rolls:
         euler = euler_without_roll(rotation)

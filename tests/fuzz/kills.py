@@ -5,7 +5,7 @@
 Each round writes into a folder with a whole result, by one of run, report, build and export, and
 kills the process with SIGKILL at some time. Then the folder must hold the result that was there or
 the new one, byte for byte, whatever a reader looks at; no child may stay; and the next command must
-leave nothing but its own.
+leave nothing but its own. So must the one that resumes a run that has left a checkpoint.
 """
 
 from __future__ import annotations
@@ -56,6 +56,19 @@ def _report(scenario: str) -> Callable[[Path], int]:
 #: By name: what writes the earlier result, and the new one.
 WRITERS: dict[str, tuple[Callable[[Path], int], Callable[[Path], int]]] = {
     "run": (_call("run", "fig5", "--stop-time", "0.5"), _call("run", "fig4", "--stop-time", "1")),
+    "resume": (
+        _call("run", "fig5", "--stop-time", "0.5"),
+        _call(
+            "run",
+            "fig5",
+            "--stop-time",
+            "1",
+            "--checkpoint-every",
+            "0.1",
+            "--resume",
+            "--no-figures",
+        ),
+    ),
     "report": (_report("fig3a"), _report("fig4")),
     "build": (_call("build", "--loader", "plain"), _call("build", "--loader", "native")),
     "export": (
@@ -66,11 +79,11 @@ WRITERS: dict[str, tuple[Callable[[Path], int], Callable[[Path], int]]] = {
 
 
 def visible(folder: Path) -> dict[str, bytes]:
-    """What counts in a folder: no hidden files, none of a report's own store, no times."""
+    """What counts in a folder: no hidden files, no checkpoint, no report's own store, no times."""
     return {
         name: b"" if Path(name).name == _RECORD else content
         for name, content in contents(folder).items()
-        if not name.startswith((".", "runs/"))
+        if not name.startswith((".", "checkpoint/", "runs/"))
     }
 
 
@@ -133,7 +146,8 @@ class Attack:
             self._lose(share, "the next one leaves something else")
 
     def _left(self) -> list[Path]:
-        return [path for path in self._place.rglob(".*") if path.name != "."]
+        hidden = [path for path in self._place.rglob(".*") if path.name != "."]
+        return hidden + list(self._place.glob("checkpoint"))
 
     def _lose(self, share: float, what: str) -> None:
         self.losses.append(f"{self._name}, killed after {share * self._seconds:.3f} s: {what}")

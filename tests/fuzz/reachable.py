@@ -176,18 +176,16 @@ def _is_unit(vector: Sequence[float]) -> bool:
 
 
 def _plant(said: dict[str, Any]) -> Iterator[str]:
-    position, quaternion, nu, acting = said["state"]
+    position, quaternion, nu, acting, _ = said["state"]
     if not _is_unit(quaternion):
         yield f"a quaternion that is no unit: {quaternion}"
         return
     yield from _generator(said["hidden"])
     parameters, outputs = said["parameters"], said["outputs"]
-    state = PlantState(tuple(position), tuple(quaternion), tuple(nu), tuple(acting))
+    state = PlantState(*map(tuple, said["state"]))
     rotation = rotation_from_quaternion(state.quaternion)
     known = OF_THE_PLANT.of(parameters)
-    euler, y, dy, over_ground = plant.outputs(
-        state, rotation, known.ell, known.roll.rolls, known.current
-    )
+    euler, y, dy, over_ground = plant.outputs(state, rotation, known.ell, known.roll.rolls)
     if not parameters["roll"] and (nu[3] or abs(rotation[1][2]) > TOLERANCE):
         yield "roll where there is none"
     eta, found_nu, found_y, found_dy, tau = (outputs[i:j] for i, j in pairwise(_PLANT_OUTPUTS))

@@ -30,7 +30,7 @@ ALLOWED = {
     "auv_fmu": set(),
     "fmus": {"auv_fmu", "markdown_it", "pythonfmu"},
     "orchestrator": {
-        "auv_fmu", "dask", "distributed", "fmpy", "libcosimpy", "markdown_it", "matplotlib",
+        "auv_fmu", "dask", "distributed", "fmpy", "libcosimpy", "lxml", "markdown_it", "matplotlib",
         "numba", "numpy", "pandas", "PIL", "platformdirs", "pyarrow", "scipy", "tqdm",
     },
 }  # fmt: skip

@@ -19,7 +19,7 @@ MAGIC = "FMU state 1"
 
 #: Lengths of the groups of numbers that a state consists of, 0: of a number in no group.
 _SHAPES = {
-    "AuvPlant": (3, 4, 6, 3),
+    "AuvPlant": (3, 4, 6, 3, 3),
     "DisturbanceGenerator": (),
     "MotionPlanner": (3, 0, 0, 5),
     "ObserverController": (3, 3, 4),

@@ -20,20 +20,26 @@ const char *fmi2GetVersion(void) { return "2.0"; }
 /* What a host may look for, and nobody here calls. */
 #define ABSENT(name) \
     Status name(void) { return Error; }
+#ifndef HAS_STRINGS
 ABSENT(fmi2GetString)
 ABSENT(fmi2SetString)
+#endif
 ABSENT(fmi2GetFMUstate)
 ABSENT(fmi2SetFMUstate)
 ABSENT(fmi2FreeFMUstate)
 ABSENT(fmi2SerializedFMUstateSize)
 ABSENT(fmi2SerializeFMUstate)
+#ifndef LACKS
 ABSENT(fmi2DeSerializeFMUstate)
+#endif
 ABSENT(fmi2GetDirectionalDerivative)
 ABSENT(fmi2SetRealInputDerivatives)
 ABSENT(fmi2GetRealOutputDerivatives)
 ABSENT(fmi2CancelStep)
+#ifndef HAS_STATUS
 ABSENT(fmi2GetStatus)
 ABSENT(fmi2GetRealStatus)
-ABSENT(fmi2GetIntegerStatus)
 ABSENT(fmi2GetBooleanStatus)
+#endif
+ABSENT(fmi2GetIntegerStatus)
 ABSENT(fmi2GetStringStatus)

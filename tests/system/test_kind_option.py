@@ -169,8 +169,8 @@ def test_export_with_fmi_3_is_an_ssp_2(workplace: Path, capsys):
     capsys.readouterr()
     assert main(["run", "out/fig4.ssp"]) == 2
     assert capsys.readouterr().err == (
-        "auv-fmu: out/fig4.ssp: not a readable SSP: it is an SSP 2.0; this master takes SSP 1.0 "
-        "with FMUs of FMI 2.0\n"
+        "auv-fmu: out/fig4.ssp: plant: resources/AuvPlant.fmu: is of FMI 3.0; only FMUs of FMI 2.0 "
+        "are supported (and 3 more: see `auv-fmu check`)\n"
     )
 
 

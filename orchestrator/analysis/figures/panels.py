@@ -47,6 +47,12 @@ _SMALLEST_ERROR = 1e-5
 #: The second of two runs: thin and solid, for dashes of a signal that swings are a smear.
 _THICK, _THIN = 1.4, 0.8
 
+#: Of the events of a run, so many are marked; names of those after this share stand before them.
+_MOST_MARKS, _LATE = 20, 0.6
+
+#: What a line of text needs of the height of a panel.
+_ROOM = 0.25
+
 #: Peaks from here on are written with an exponent [N, N.m].
 _MANY = 1e6
 
@@ -110,13 +116,44 @@ def title(axes: Axes, text: str) -> None:
 
 
 def over_time(panels: Sequence[Axes], runs: Sequence[Drawn], has_means: bool = False) -> None:
-    """One axis of time for some panels: all of the runs, named below the last."""
+    """One axis of time for some panels: all of the runs, named below the last, and their events."""
     start = min(run.result.time[0] for run in runs)
     end = max(run.result.time[-1] for run in runs)
     for axes in panels:
         axes.set_xlim(start, end)
+    _mark_events(panels, runs)
     means = f", lines: means over {mean_window(runs[0].result.time):.3g} s" if has_means else ""
     panels[-1].set_xlabel(f"time [s]{means}")
+
+
+def _mark_events(panels: Sequence[Axes], runs: Sequence[Drawn]) -> None:
+    """Lines where something has happened, or ended, in a run; their names in the first panel."""
+    marks: dict[float, str] = {}
+    for run in runs:
+        for occurrence in run.result.ending.events[:_MOST_MARKS]:
+            marks[occurrence.time] = marks.get(occurrence.time) or occurrence.label
+    if any(marks.values()):
+        _make_room_below(panels[0])
+    start, end = panels[0].get_xlim()
+    for time, label in marks.items():
+        for axes in panels:
+            axes.axvline(time, color="0.35", linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
+        is_late = time - start > _LATE * (end - start)
+        panels[0].annotate(
+            plain(label), (time, 0), xycoords=panels[0].get_xaxis_transform(),
+            xytext=(-2 if is_late else 2, 2), textcoords="offset points",
+            ha="right" if is_late else "left", va="bottom", fontsize="small",
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
+        )  # fmt: skip
+
+
+def _make_room_below(axes: Axes) -> None:
+    """Room for a line of text below the data."""
+    bottom, top = axes.get_ylim()
+    if axes.get_yscale() == "log":
+        axes.set_ylim(bottom=bottom * (bottom / top) ** _ROOM)
+    else:
+        axes.set_ylim(bottom=bottom - _ROOM * (top - bottom))
 
 
 def draw_errors(

@@ -42,7 +42,8 @@ def difference(system: System, fmus: Path) -> str:
         return f"it has the wire {one}"
     for one in sorted(map(_shown, wires - connections)):
         return f"it has no wire {one}"
-    return ""
+    later = [f"it starts at {system.start_time:g} s"] if system.start_time else []
+    return next(iter([*(f"its {name} has a step of its own" for name in system.steps), *later]), "")
 
 
 def _shown(connection: Connection) -> str:

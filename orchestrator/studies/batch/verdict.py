@@ -143,7 +143,7 @@ class _Step:
 
 def _plant(setting: Setting, state: Any, rotation: Any) -> _Result:
     known = setting.plant
-    seen = plant.outputs(state, rotation, known.ell, known.roll.rolls, known.current)
+    seen = plant.outputs(state, rotation, known.ell, known.roll.rolls)
     return state, {**_named("y", AXES, seen.y), **_named("dy", AXES, seen.dy)}
 
 

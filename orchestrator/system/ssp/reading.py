@@ -1,150 +1,175 @@
-"""An SSP 1.0 archive as a system."""
+"""An SSP archive as a system."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
-from fmpy.ssp import ssd as fmpy_ssd
-
-from orchestrator.errors import InputError, reason
-from orchestrator.system.component import read_component
-from orchestrator.system.names import PortName, port_name
-from orchestrator.system.ssp import OSP, SSD, STRUCTURE
+from orchestrator.errors import InputError
+from orchestrator.findings import Findings
+from orchestrator.system.component import Component
+from orchestrator.system.names import PortName
+from orchestrator.system.ssp.archive import Archive, listed
+from orchestrator.system.ssp.bindings import Bindings, Given, Values
+from orchestrator.system.ssp.building import Builder
+from orchestrator.system.ssp.definitions import definitions_of
+from orchestrator.system.ssp.experiment import step_of, times_of
+from orchestrator.system.ssp.hierarchy import Leaf, Node, Way
+from orchestrator.system.ssp.wires import Course, Wires
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.unpacking import unpacked
-from orchestrator.system.values import real, unit_of
+from orchestrator.system.transformation import Transformation, chained
+from orchestrator.system.values import BOOLEANS, Value, real, typed
 
-#: How the file of a newer version begins.
-_NEWER = re.compile(rb"<(\w+:)?SystemStructureDescription\b[^>]*\bversion=[\"']2\.")
-
-#: What is not read and would change the numbers, by the names of its elements.
-_UNSUPPORTED = {
-    "transformations in connections": {
-        "LinearTransformation",
-        "BooleanMappingTransformation",
-        "IntegerMappingTransformation",
-        "EnumerationMappingTransformation",
-    },
-    "mappings of parameters": {"ParameterMapping"},
-}
+_ROOT = "SystemStructureDescription"
 
 
-def read_ssp(archive: Path) -> System:
+def read_ssp(path: Path, variant: str | None = None, findings: Findings | None = None) -> System:
     """Read the system in an SSP archive.
+
+    Args:
+        path: of the archive.
+        variant: which of its descriptions; None: the default.
+        findings: takes all that is wrong with it.
 
     Raises:
         InputError: the archive is missing, broken, or uses what this master cannot do.
 
     """
-    folder = unpacked(archive)
+    findings = Findings() if findings is None else findings
+    archive = Archive(path, findings)
+    root = archive.structure(variant)
+    content = root.find("System")
+    if root.tag != _ROOT or content is None:
+        raise InputError(f"{path}: not a readable SSP: it describes no system")
     try:
-        _check_version((folder / STRUCTURE).read_bytes())
-        description = fmpy_ssd.read_ssd(str(archive))
-        root = ElementTree.parse(folder / STRUCTURE).getroot()
-    except Exception as error:
-        raise InputError(f"{archive}: not a readable SSP: {reason(error)}") from error
-    _check_supported(archive, root)
-    system = description.system
-    components = {}
-    for element in system.elements:
-        if not isinstance(element, fmpy_ssd.Component):
-            raise InputError(
-                f"{archive}: {element.name}: only a flat system of FMUs is supported, no nested "
-                "systems or signal dictionaries"
-            )
-        if not re.fullmatch(r"[^/\\]+", element.name):
-            raise InputError(f"{archive}: component {element.name!r}: write it without slashes")
-        if element.name in components:
-            raise InputError(f"{archive}: two components are named {element.name}")
-        components[element.name] = read_component(element.name, _inside(archive, folder, element))
-    stop_time, step = _default_experiment(archive, root)
-    found = System(
-        name=system.name or archive.stem,
+        system = _read(archive, root)
+    except RecursionError:
+        raise InputError(f"{path}: not a readable SSP: nested too deeply") from None
+    findings.refuse()
+    return system
+
+
+def _read(archive: Archive, root: Element) -> System:
+    definitions = definitions_of(archive, root)
+    [content] = root.findall("System")[:1]
+    top = Builder(archive, definitions).group(content)
+    leaves = {leaf.way: leaf for leaf in top.leaves()}
+    ports = _Ports(archive, leaves, Wires(archive, top), Bindings(archive, definitions).values(top))
+    components: dict[str, Component] = {}
+    for leaf in leaves.values():
+        name = ".".join(leaf.way)
+        if name in components:
+            archive.problem(f"two components are named {name}")
+        if leaf.component is not None:
+            components[name] = leaf.component
+    times = times_of(archive, root)
+    steps = {".".join(way): step_of(archive, leaf) for way, leaf in leaves.items()}
+    system = System(
+        name=content.get("name") or archive.path.stem,
         components=components,
-        connections=tuple(_connections(archive, system)),
-        stop_time=stop_time,
-        step=step,
+        connections=tuple(ports.connections),
+        parameters=ports.parameters,
+        start_time=times.start_time,
+        stop_time=times.stop_time,
+        step=times.step,
+        steps={name: step for name, step in steps.items() if step is not None},
     )
-    return found.with_parameters(_parameters(archive, system, found))
+    if not leaves:
+        archive.problem("holds no component: there is nothing to run")
+    for problem in system.problems():
+        archive.problem(problem)
+    return system
 
 
-def _check_version(structure: bytes) -> None:
-    """Refuse what the schema of SSP 1.0 would take many lines to refuse."""
-    if _NEWER.search(structure):
-        raise ValueError("it is an SSP 2.0; this master takes SSP 1.0 with FMUs of FMI 2.0")
+class _Ports:
+    """What feeds and what sets the ports of components.
+
+    Attributes:
+        connections: between components.
+        parameters: values of ports that nothing feeds, in the types of their variables.
+
+    """
+
+    def __init__(
+        self, archive: Archive, leaves: Mapping[Way, Leaf], wires: Wires, given: Values
+    ) -> None:
+        """Follow each port upstream."""
+        self.connections: list[Connection] = []
+        self.parameters: dict[PortName, Value] = {}
+        self._archive, self._leaves, self._given = archive, leaves, given
+        self._used: set[Node] = set()
+        for node in dict.fromkeys((*wires.targets(), *given)):
+            leaf = leaves.get(node.way)
+            if leaf is not None and leaf.component is not None:
+                port = PortName(leaf.component.name, node.port)
+                try:
+                    self._follow(port, wires.course(node), leaf)
+                except InputError as error:
+                    archive.problem(error)
+        lost = [str(node) for node in given if node not in self._used]
+        if lost:
+            archive.note(f"values that are given to {listed(lost)} reach no component")
+
+    def _follow(self, port: PortName, course: Course, leaf: Leaf) -> None:
+        """Enter what arrives at a port: another's value, or the outermost that is given."""
+        origin = self._leaves.get(course.nodes[0].way) if course.wires else None
+        if origin is not None:
+            self._used.update(course.nodes[1:])
+            self._feed(port, course, origin)
+            return
+        self._used.update(course.nodes)
+        for i, node in enumerate(course.nodes):
+            if node in self._given:
+                given, connector = self._given[node]
+                unit = connector.unit or given.unit
+                try:
+                    whole = chained(
+                        given.transformation(self._archive, connector),
+                        course.transformation(unit, i),
+                    )
+                except InputError as error:
+                    raise InputError(f"{node}: {error}") from None
+                self._set(port, leaf, given, whole)
+                return
+
+    def _feed(self, port: PortName, course: Course, origin: Leaf) -> None:
+        """Connect a port to another component."""
+        for node in course.nodes[1:]:
+            if node in self._given:
+                self._archive.note(
+                    f"{node}: is fed by {course.nodes[0]}, and the value that is given to it has "
+                    "no effect"
+                )
+        if origin.component is not None:
+            source = PortName(origin.component.name, course.nodes[0].port)
+            connector = origin.connector(source.port)
+            try:
+                whole = course.transformation(connector.unit if connector else None)
+            except InputError as error:
+                raise InputError(f"{source} -> {port}: {error}") from None
+            self.connections.append(Connection(source, port, whole))
+
+    def _set(self, port: PortName, leaf: Leaf, given: Given, whole: Transformation | None) -> None:
+        """Give a port its value."""
+        component, connector = leaf.component, leaf.connector(port.port)
+        if component is None or connector is None:
+            return
+        if not component.is_settable(port.port):
+            self._archive.note(
+                f"{port}: is of causality {connector.kind} and cannot be set; the value that is "
+                "given to it has no effect"
+            )
+            return
+        items = {**connector.items, **given.items}
+        value: object = items.get(given.text, given.text)
+        if whole is not None:
+            value = whole(_number(str(value)))
+        if isinstance(value, float) and value.is_integer() and connector.type != "Real":
+            value = int(value)
+        self.parameters[port] = typed(str(port), component.variable(port.port), value)
 
 
-def _check_supported(archive: Path, root: ElementTree.Element) -> None:
-    """Refuse what is not read and would change the numbers."""
-    tags = {element.tag.rpartition("}")[2] for element in root.iter()}
-    for what, unsupported in _UNSUPPORTED.items():
-        if tags & unsupported:
-            raise InputError(f"{archive}: {what} are not supported")
-
-
-def _inside(archive: Path, folder: Path, element: Any) -> Path:
-    """The FMU of a component, which is in the archive."""
-    fmu: Path = folder / element.source
-    inside = ".." not in fmu.parts and fmu.is_relative_to(folder)
-    if not inside or not fmu.is_file():
-        raise InputError(f"{archive}: holds no {element.source!r} for {element.name}")
-    return fmu
-
-
-def _connections(archive: Path, system: Any) -> Iterator[Connection]:
-    kinds = {
-        (element.name, connector.name): connector.kind
-        for element in system.elements
-        for connector in element.connectors
-    }
-    for connection in system.connections:
-        if connection.startElement is None or connection.endElement is None:
-            raise InputError(f"{archive}: connections to the system's own ports are not supported")
-        start = PortName(connection.startElement, connection.startConnector)
-        end = PortName(connection.endElement, connection.endConnector)
-        # The standard lets a connection be written from either end.
-        backwards = kinds.get((start.component, start.port)) == "input"
-        yield Connection(end, start) if backwards else Connection(start, end)
-
-
-def _parameters(archive: Path, described: Any, system: System) -> dict[PortName, Any]:
-    """Values of the system's own bindings, then those of its components, which win."""
-    values: dict[PortName, Any] = {}
-    for element in (described, *described.elements):
-        for parameter, name in _bound(element):
-            target = port_name(name) if element is described else PortName(element.name, name)
-            unit = unit_of(system.component(target.component).variable(target.port))
-            if parameter.unit and unit and parameter.unit != unit:
-                raise InputError(f"{archive}: {target} is in {unit}, not in {parameter.unit}")
-            values[target] = parameter.value
-    return values
-
-
-def _bound(element: Any) -> Iterator[tuple[Any, str]]:
-    for binding in element.parameterBindings:
-        for parameter_set in binding.parameterValues:
-            for parameter in parameter_set.parameters:
-                yield parameter, f"{binding.prefix or ''}{parameter.name}"
-
-
-def _default_experiment(
-    archive: Path, root: ElementTree.Element
-) -> tuple[float | None, float | None]:
-    """Stop time and step [s], as far as they are stated."""
-    experiment = root.find(f"{{{SSD}}}DefaultExperiment")
-    algorithm = root.find(f".//{{{OSP}}}FixedStepAlgorithm")
-
-    def stated(element: ElementTree.Element | None, name: str) -> float | None:
-        text = None if element is None else element.get(name)
-        try:
-            return None if text is None else real(text)
-        except ValueError:
-            raise InputError(f"{archive}: {name} {text!r} is no number") from None
-
-    if stated(experiment, "startTime"):
-        raise InputError(f"{archive}: starts later or earlier than 0 s, which is not supported")
-    return stated(experiment, "stopTime"), stated(algorithm, "baseStepSize")
+def _number(text: str) -> float:
+    """A value that is transformed, as a number."""
+    return float(BOOLEANS[text]) if text in BOOLEANS else real(text)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from io import BytesIO
 from pathlib import Path
 from xml.etree import ElementTree
@@ -9,8 +11,10 @@ from zipfile import ZipFile, ZipInfo
 
 from orchestrator.system.component import Component
 from orchestrator.system.ssp import OSP, SSC, SSD, SSV, STRUCTURE
-from orchestrator.system.structure import System
-from orchestrator.system.values import literal
+from orchestrator.system.structure import Connection, System
+from orchestrator.system.transformation import Linear, Mapped
+from orchestrator.system.units import BASES
+from orchestrator.system.values import Value, literal, type_of
 
 #: Name of every parameter set: ecos applies the sets of the one name that it is given.
 PARAMETER_SET = "scenario"
@@ -34,21 +38,35 @@ def ssp_bytes(system: System) -> bytes:
     archive = BytesIO()
     with ZipFile(archive, "w") as content:
         content.writestr(ZipInfo(STRUCTURE, _EPOCH), structure_xml(system))
-        for component in system.components.values():
-            if system.parameters_of(component.name):
-                values = parameter_set_xml(system, component)
-                content.writestr(ZipInfo(_parameter_source(component), _EPOCH), values)
-        for fmu in sorted({component.fmu for component in system.components.values()}):
-            content.writestr(ZipInfo(_source(fmu), _EPOCH), fmu.read_bytes())
+        for name, source in _parameter_sources(system).items():
+            values = parameter_set_xml(system, system.components[name])
+            content.writestr(ZipInfo(source, _EPOCH), values)
+        for fmu, source in _sources(system).items():
+            content.writestr(ZipInfo(source, _EPOCH), fmu.read_bytes())
     return archive.getvalue()
 
 
-def _source(fmu: Path) -> str:
-    return f"resources/{fmu.name}"
+def _sources(system: System) -> dict[Path, str]:
+    """Where the archive has each FMU."""
+    fmus = sorted({component.fmu for component in system.components.values()})
+    names = _distinct(fmu.name for fmu in fmus)
+    return {fmu: f"resources/{name}" for fmu, name in zip(fmus, names, strict=True)}
 
 
-def _parameter_source(component: Component) -> str:
-    return f"parameters/{component.name}.ssv"
+def _parameter_sources(system: System) -> dict[str, str]:
+    """Where the archive has the parameter set of each component that has one."""
+    having = [name for name in system.components if system.parameters_of(name)]
+    names = _distinct(f"{name}.ssv" for name in having)
+    return {name: f"parameters/{file}" for name, file in zip(having, names, strict=True)}
+
+
+def _distinct(names: Iterable[str]) -> list[str]:
+    """Names of files that need no encoding in a URI, of which some hosts know nothing."""
+    found: list[str] = []
+    for name in names:
+        plain = re.sub(r"[^\w.-]", "_", name, flags=re.ASCII)
+        found.append(f"{len(found)}_{plain}" if plain in found else plain)
+    return found
 
 
 def parameter_set_xml(system: System, component: Component) -> bytes:
@@ -59,10 +77,17 @@ def parameter_set_xml(system: System, component: Component) -> bytes:
     )
     parameters = ElementTree.SubElement(root, f"{{{SSV}}}Parameters")
     for name, value in system.parameters_of(component.name).items():
-        kind = component.variable(name).type
         element = ElementTree.SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
-        ElementTree.SubElement(element, f"{{{SSV}}}{kind}", value=literal(value))
+        kind = component.variable(name).type
+        ElementTree.SubElement(element, f"{{{SSV}}}{kind}", value=_literal(component, name, value))
     return _serialised(root)
+
+
+def _literal(component: Component, name: str, value: Value) -> str:
+    """A value as an SSV has it, which knows those of an enumeration by name."""
+    declared = component.variable(name).declaredType
+    items = () if declared is None else declared.items
+    return next((str(item.name) for item in items if int(item.value) == value), literal(value))
 
 
 def _register_prefixes() -> None:
@@ -90,14 +115,26 @@ def structure_xml(system: System) -> bytes:
     )
     structure = ElementTree.SubElement(root, _ssd("System"), name=system.name)
     elements = ElementTree.SubElement(structure, _ssd("Elements"))
+    sources, parameter_sources = _sources(system), _parameter_sources(system)
     for position, component in enumerate(system.components.values()):
-        _add_component(elements, component, position, bool(system.parameters_of(component.name)))
+        element = _add_component(elements, component, position, sources[component.fmu])
+        if component.name in parameter_sources:
+            bindings = ElementTree.SubElement(element, _ssd("ParameterBindings"))
+            ElementTree.SubElement(
+                bindings,
+                _ssd("ParameterBinding"),
+                source=parameter_sources[component.name],
+                type="application/x-ssp-parameter-set",
+            )
+        if component.name in system.steps:
+            hint = {"value": str(system.steps[component.name])}
+            ElementTree.SubElement(_annotation(element), f"{{{OSP}}}StepSizeHint", hint)
     # The schema has no empty list of connections.
     connections = ElementTree.Element(_ssd("Connections"))
     if system.connections:
         structure.append(connections)
     for connection in system.connections:
-        ElementTree.SubElement(
+        element = ElementTree.SubElement(
             connections,
             _ssd("Connection"),
             startElement=connection.source.component,
@@ -105,9 +142,41 @@ def structure_xml(system: System) -> bytes:
             endElement=connection.target.component,
             endConnector=connection.target.port,
         )
+        if connection.transformation is not None:
+            # Where units differ, it has been made of them.
+            element.set("suppressUnitConversion", "true")
+            _add_transformation(element, connection, system)
+    _add_enumerations(root, system)
     _add_units(root, system)
     _add_experiment(root, system)
     return _serialised(root)
+
+
+def _add_transformation(
+    element: ElementTree.Element, connection: Connection, system: System
+) -> None:
+    made = connection.transformation
+    if isinstance(made, Linear) and made != Linear():
+        numbers = {"factor": str(made.factor), "offset": str(made.offset)}
+        ElementTree.SubElement(element, _ssc("LinearTransformation"), numbers)
+    elif isinstance(made, Mapped):
+        source = connection.source
+        kind = type_of(system.component(source.component).variable(source.port))
+        of = bool if kind == "Boolean" else int
+        # Numbers of an enumeration are integers as well.
+        name = "BooleanMapping" if of is bool else "IntegerMapping"
+        table = ElementTree.SubElement(element, _ssc(f"{name}Transformation"))
+        for start, end in made.pairs:
+            pair = {"source": literal(of(start)), "target": literal(of(end))}
+            ElementTree.SubElement(table, _ssc("MapEntry"), pair)
+
+
+def _annotation(element: ElementTree.Element) -> ElementTree.Element:
+    """An annotation of an element, as libcosim and ecos look for it."""
+    annotations = ElementTree.SubElement(element, _ssd("Annotations"))
+    return ElementTree.SubElement(
+        annotations, _ssc("Annotation"), type="com.opensimulationplatform"
+    )
 
 
 def _version(component: Component) -> str:
@@ -124,13 +193,13 @@ def _ssc(tag: str) -> str:
 
 
 def _add_component(
-    elements: ElementTree.Element, component: Component, position: int, has_parameters: bool
-) -> None:
+    elements: ElementTree.Element, component: Component, position: int, source: str
+) -> ElementTree.Element:
     element = ElementTree.SubElement(
         elements,
         _ssd("Component"),
         name=component.name,
-        source=_source(component.fmu),
+        source=source,
         type="application/x-fmu-sharedlibrary",
     )
     connectors = ElementTree.SubElement(element, _ssd("Connectors"))
@@ -139,8 +208,10 @@ def _add_component(
             connector = ElementTree.SubElement(
                 connectors, _ssd("Connector"), name=variable.name, kind=variable.causality
             )
-            unit = {"unit": variable.unit} if variable.unit else {}
-            ElementTree.SubElement(connector, _ssc(variable.type), unit)
+            stated = {"unit": variable.unit} if variable.unit else {}
+            if type_of(variable) == "Enumeration" and variable.declaredType is not None:
+                stated = {"name": variable.declaredType.name}
+            ElementTree.SubElement(connector, _ssc(variable.type), stated)
     width, height = _BOX
     left = position * (width + _GAP)
     ElementTree.SubElement(
@@ -148,14 +219,23 @@ def _add_component(
         _ssd("ElementGeometry"),
         {"x1": str(left), "y1": "0.0", "x2": str(left + width), "y2": str(height)},
     )
-    if has_parameters:
-        bindings = ElementTree.SubElement(element, _ssd("ParameterBindings"))
-        ElementTree.SubElement(
-            bindings,
-            _ssd("ParameterBinding"),
-            source=_parameter_source(component),
-            type="application/x-ssp-parameter-set",
-        )
+    return element
+
+
+def _add_enumerations(root: ElementTree.Element, system: System) -> None:
+    enumerations = {
+        variable.declaredType.name: variable.declaredType.items
+        for component in system.components.values()
+        for variable in component.description.modelVariables
+        if type_of(variable) == "Enumeration" and variable.declaredType is not None
+    }
+    if not enumerations:
+        return
+    parent = ElementTree.SubElement(root, _ssd("Enumerations"))
+    for name in sorted(enumerations):
+        element = ElementTree.SubElement(parent, _ssc("Enumeration"), name=name)
+        for item in enumerations[name]:
+            ElementTree.SubElement(element, _ssc("Item"), name=item.name, value=str(item.value))
 
 
 def _add_units(root: ElementTree.Element, system: System) -> None:
@@ -169,24 +249,20 @@ def _add_units(root: ElementTree.Element, system: System) -> None:
     parent = ElementTree.SubElement(root, _ssd("Units"))
     for name in sorted(units):
         element = ElementTree.SubElement(parent, _ssc("Unit"), name=name)
-        exponents = {
-            base: str(exponent)
-            for base in ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-            if (exponent := getattr(units[name], base, 0))
-        }
-        ElementTree.SubElement(element, _ssc("BaseUnit"), exponents)
+        base = ElementTree.SubElement(element, _ssc("BaseUnit"))
+        for attribute, otherwise in (*((of, 0) for of in BASES), ("factor", 1), ("offset", 0)):
+            stated = getattr(units[name], attribute, otherwise)
+            if stated != otherwise:
+                base.set(attribute, str(stated))
 
 
 def _add_experiment(root: ElementTree.Element, system: System) -> None:
-    experiment = ElementTree.SubElement(root, _ssd("DefaultExperiment"), startTime="0.0")
+    start_time = str(system.start_time or 0.0)
+    experiment = ElementTree.SubElement(root, _ssd("DefaultExperiment"), startTime=start_time)
     if system.stop_time is not None:
         experiment.set("stopTime", str(system.stop_time))
     if system.step is not None:
-        annotations = ElementTree.SubElement(experiment, _ssd("Annotations"))
-        annotation = ElementTree.SubElement(
-            annotations, _ssc("Annotation"), type="com.opensimulationplatform"
-        )
-        algorithm = ElementTree.SubElement(annotation, f"{{{OSP}}}Algorithm")
+        algorithm = ElementTree.SubElement(_annotation(experiment), f"{{{OSP}}}Algorithm")
         ElementTree.SubElement(
             algorithm, f"{{{OSP}}}FixedStepAlgorithm", baseStepSize=str(system.step)
         )

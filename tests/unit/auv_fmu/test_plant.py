@@ -105,8 +105,7 @@ def moved(state, tau, tau_w, h, parameters=PARAMETERS, n=1):
 
 def seen(state, parameters=PARAMETERS):
     rotation = rotation_from_quaternion(state.quaternion)
-    rolls, current = parameters.roll.rolls, parameters.current
-    return plant.outputs(state, rotation, parameters.ell, rolls, current)
+    return plant.outputs(state, rotation, parameters.ell, parameters.roll.rolls)
 
 
 def test_surge_under_constant_force_follows_the_analytic_solution_of_euler():
@@ -222,6 +221,37 @@ def test_vehicle_at_rest_over_ground_is_dragged_along_as_damping_says():
     assert seen(state, parameters).nu == AT_REST
     state = moved(state, UNDRIVEN, AT_REST, H, parameters, n)
     expected = c - c * (1 - H * VEHICLE.d11 / VEHICLE.m11) ** n
+    assert seen(state, parameters).nu[0] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("parameters", [PARAMETERS, HELD])
+def test_current_that_changes_leaves_the_velocity_over_ground_as_it_is(parameters):
+    """From then on all is as for a vehicle that has begun there and so, in the new water."""
+    tau, tau_w = (20.0, 3.0, 5.0), (0.5, 0.1, -0.2, 0.0, 0.1, 0.2)
+    before = parameters._replace(current=(0.4, -0.3, 0.2))
+    after = parameters._replace(current=(-0.2, 0.0, 0.5))
+    begun = started((1.0, 2.0, 3.0, 0.0, 0.3, -0.4), (0.5, 0.1, -0.1, 0.0, 0.2, 0.1), before)
+    state = moved(begun, tau, tau_w, H, before, 100)
+    rotation = rotation_from_quaternion(state.quaternion)
+    changed = plant.immersed(state, rotation, after.current)
+    np.testing.assert_allclose(seen(changed, after).nu, seen(state, before).nu, atol=1e-15)
+    through_water = np.subtract(changed.nu[:3], state.nu[:3])
+    turned = np.column_stack(rotation_from_euler(*seen(state).euler)).T
+    np.testing.assert_allclose(through_water, turned @ (0.6, -0.3, -0.3), atol=1e-14)
+    fresh = started((*state.position, *seen(state).euler), seen(state, before).nu, after)
+    carried = moved(state, tau, tau_w, H, after, 100)
+    other = moved(fresh, tau, tau_w, H, after, 100)
+    np.testing.assert_allclose(carried.nu, other.nu, atol=1e-12)
+    np.testing.assert_allclose(carried.position, other.position, atol=1e-12)
+
+
+def test_vehicle_in_a_current_that_comes_up_is_dragged_along_as_damping_says():
+    """Surge over ground is c + (u - c) (1 - h d/m)^k from the moment at which it comes."""
+    c, u, n = 0.5, 0.2, 200
+    state = started((0.0,) * 6, (u, 0.0, 0.0, 0.0, 0.0, 0.0))
+    parameters = PARAMETERS._replace(current=(c, 0.0, 0.0))
+    state = moved(state, UNDRIVEN, AT_REST, H, parameters, n)
+    expected = c + (u - c) * (1 - H * VEHICLE.d11 / VEHICLE.m11) ** n
     assert seen(state, parameters).nu[0] == pytest.approx(expected, rel=1e-12)
 
 

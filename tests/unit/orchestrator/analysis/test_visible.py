@@ -64,6 +64,15 @@ def test_extremes_of_each_division_are_kept(seed, n, block, watched):
     np.testing.assert_array_equal(seen.rows, rows[seen.time.astype(int)])
 
 
+@pytest.mark.parametrize("n", [WHOLE + 1, 90_000])
+@pytest.mark.parametrize("block", [7, 4096])
+def test_blocks_in_which_rows_come_change_nothing(n, block):
+    rows = random_rows(2, n)
+    one, other = seen_of(rows, 512), seen_of(rows, block)
+    assert one.rows.tobytes() == other.rows.tobytes()
+    assert one.means.rows.tobytes() == other.means.rows.tobytes()
+
+
 @pytest.mark.parametrize("n", [1, 50, WHOLE])
 def test_short_runs_are_kept_whole(n):
     rows = random_rows(1, n)

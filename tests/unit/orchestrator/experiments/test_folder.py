@@ -15,7 +15,8 @@ from shutil import rmtree
 import pytest
 
 from orchestrator.errors import InputError
-from orchestrator.experiments.folder import RECORD, replaced, settle, whole
+from orchestrator.experiments.folder import RECORD, replaced, settle
+from orchestrator.system.atomic import whole
 from support.machine import contents, ended, forked, killed_at
 
 

@@ -31,6 +31,22 @@ def test_what_is_written_is_read_again_exactly(tmp_path: Path, ending: str):
     assert np.vstack(read).tobytes() == rows.tobytes()
 
 
+def test_parquet_of_the_same_rows_is_the_same_file(tmp_path: Path):
+    """However long its observer had to wait for them."""
+    pytest.importorskip("pyarrow")
+    rows = np.random.default_rng(1).normal(size=(20_000, 2))
+    files = []
+    for i, block in enumerate((512, 700, 20_000)):
+        path = tmp_path / f"{i}.parquet"
+        file = FORMATS["parquet"](path)
+        file.begin(Header(("a.x",), Experiment(1.0, 0.1)))
+        for start in range(0, len(rows), block):
+            file.take(rows[start : start + block])
+        file.end(Ending())
+        files.append(path.read_bytes())
+    assert files[0] == files[1] == files[2]
+
+
 @pytest.mark.parametrize(
     ("text", "why"),
     [

@@ -11,6 +11,7 @@ import pytest
 from orchestrator.master.signals import Gathering, Signals
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection
+from orchestrator.system.transformation import Linear, Mapped
 
 OUT, FED, ALSO, FREE = (PortName("a", name) for name in ("out", "fed", "also", "free"))
 
@@ -26,9 +27,10 @@ class Row(SimpleNamespace):
         return np.array([[self.columns[c.target], self.columns[c.source]] for c in connections]).T
 
 
-def made(out: float, free: float = 7.0):
-    row, connections = Row(out, free), (Connection(OUT, FED), Connection(OUT, ALSO))
-    gather = Gathering(row, connections)
+def made(out: float, free: float = 7.0, transformation=None):
+    row = Row(out, free)
+    connections = tuple(Connection(OUT, target, transformation) for target in (FED, ALSO))
+    gather = Gathering.along(row, connections)
     signals = Signals(row, [gather], connections)
     gather(row.values)
     return row, gather, signals
@@ -58,14 +60,6 @@ def test_an_input_alone_is_altered_and_released():
     assert list(row.values) == [3.0, 3.0, 3.0, 7.0]
 
 
-def test_a_frozen_input_keeps_what_it_had():
-    row, gather, signals = made(3.0)
-    signals.freeze(ALSO)
-    row.values[0] = 4.0
-    gather(row.values)
-    assert list(row.values) == [4.0, 4.0, 3.0, 7.0]
-
-
 def test_an_input_that_nothing_feeds_gets_back_what_it_had():
     row, _, signals = made(3.0)
     signals.bias(FREE, 1.0)
@@ -77,7 +71,24 @@ def test_an_input_that_nothing_feeds_gets_back_what_it_had():
     assert row.values[3] == 7.0
 
 
-def test_an_output_reaches_all_that_it_feeds():
-    _, _, signals = made(1.0)
-    assert signals.inputs(OUT) == [FED, ALSO]
-    assert signals.inputs(FED) == [FED]
+def test_what_is_supplied_is_altered_as_what_is_fed():
+    row, _, signals = made(3.0)
+    signals.bias(FREE, 1.0)
+    signals.supply(FREE, 4.0)
+    assert row.values[3] == 5.0
+    assert signals.supplied(FREE) == 4.0
+    signals.release(FREE)
+    signals.supply(FREE, 6.0)
+    assert row.values[3] == signals.supplied(FREE) == 6.0
+
+
+@pytest.mark.parametrize("transformation", [None, Linear(2.0, 1.0), Mapped(((1.0, 5.0),))])
+@pytest.mark.parametrize("component", ["a", "b"])
+def test_a_component_takes_at_once_what_it_would_take_next(transformation, component):
+    row, gather, signals = made(1.0, transformation=transformation)
+    signals.bias(ALSO, 0.5)
+    before = row.values.copy()
+    signals.refresh(component)
+    if component == "a":
+        gather(before)
+    assert list(row.values) == list(before)

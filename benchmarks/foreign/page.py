@@ -1,0 +1,192 @@
+"""docs/foreign.md from what came of every file."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from compare import STEPS
+from other_masters import TOOLS
+
+#: Deviations up to these are rounding errors: of a system in another tool, of an FMU alone.
+SYSTEM_BOUND, FMU_BOUND = 1e-9, 1e-12
+
+#: Why what runs deviates, by a part of its path and who it deviates from.
+_HOST = "host"
+EXPLANATIONS: Mapping[tuple[str, str], str] = {
+    ("/LinearTransformation3/", "libcosim"): "it applies no parameter sets of the system",
+    ("/algebraic_loop_", "ecos"): "it hands inputs over before it reads outputs, so a direct "
+    "feedthrough shows a step earlier",
+    ("/0004_Atmos.fmu", _HOST): "its output `CPUtime` is the processor's",
+}
+
+#: What came of a file, in the words of the page.
+_OUTCOMES = {
+    "refused": "refused",
+    "fails": "ended early",
+    "crashes": "crashed",
+}
+
+_HEAD = """\
+# What others have made
+
+`python benchmarks/foreign FOLDER` clones public repositories at named commits, collects every FMU
+and every SSP archive in them, runs each in a process of its own, and writes this page. Archives are
+run unchanged, in the default order, for {steps} steps or to the end that they name, whichever comes
+first; a folder with a `SystemStructure.ssd` is zipped as it is, and each further `.ssd` in it is an
+archive of its own. FMUs are run alone, for {steps} steps of their own step size, with all inputs at
+their start values. What holds the same bytes is counted once.
+
+Systems that libcosim or ecos can run as well are held against them in Jacobi order, with the same
+steps: as they are, and in libcosim also as `auv-fmu export --format osp` writes what we have read.
+FMUs are held against a plain host of {host} lines that shares nothing with the master, as t_k = k h
+has it. A deviation is the largest over all Real outputs and steps, relative to the size of an
+output where that is above one. Compared with: {tools}.
+"""
+
+
+def page(found: Sequence[Mapping[str, Any]], lines_of_host: int) -> str:
+    """The page."""
+    head = _HEAD.format(steps=STEPS, host=lines_of_host, tools=", ".join(_tools()))
+    archives = [one for one in found if not one["is_fmu"]]
+    fmus = [one for one in found if one["is_fmu"]]
+    parts = [head, *_archives(archives), *_fmus(fmus), *_parameters(fmus), *_absent(found)]
+    return "\n".join(parts)
+
+
+def _tools() -> Iterator[str]:
+    for package in ("libcosimpy", "ecospy"):
+        try:
+            yield f"{package} {version(package)}"
+        except PackageNotFoundError:
+            continue
+
+
+def _archives(archives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    there = [one for one in archives if one["outcome"] != "absent"]
+    running = [one for one in there if one["outcome"] == "runs"]
+    yield f"\n## Archives\n\n{len(running)} of {len(there)} run.\n"
+    yield f"| archive | rows | {' | '.join(TOOLS)} | said |"
+    yield f"| --- | --: |{' --- |' * len(TOOLS)} --- |"
+    for one in running:
+        tools = one.get("tools", {})
+        cells = (_compared(one, tool, tools.get(tool, "")) for tool in TOOLS)
+        yield f"| {_name(one)} | {one['rows']} | {' | '.join(cells)} | {_said(one['said'])} |"
+    yield "\nThese do not:\n\n| archive | why |\n| --- | --- |"
+    for one in there:
+        if one["outcome"] != "runs":
+            yield f"| {_name(one)} | {_why(one)} |"
+
+
+def _said(lines: Sequence[str]) -> str:
+    """What a run has said, in a cell."""
+    more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
+    return f"{_cell(lines[0])}{more}" if lines else ""
+
+
+def _compared(one: Mapping[str, Any], tool: str, deviation: float | str) -> str:
+    """What came of the comparison: a number, or why there is none."""
+    if isinstance(deviation, str):
+        return "does not run it" if deviation else ""
+    if deviation <= SYSTEM_BOUND:
+        return f"{deviation:.1e}"
+    return f"{deviation:.1e}: {_explained(one, tool)}"
+
+
+def _explained(one: Mapping[str, Any], tool: str) -> str:
+    why = [
+        text
+        for (part, other), text in EXPLANATIONS.items()
+        if other == tool and part in one["path"]
+    ]
+    return why[0] if why else "**not explained**"
+
+
+def _fmus(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    there = [one for one in fmus if one["outcome"] != "absent"]
+    running = [one for one in there if one["outcome"] == "runs"]
+    numbers = [one["deviation"] for one in running if isinstance(one["deviation"], float)]
+    yield f"\n## FMUs alone\n\n{len(running)} of {len(there)} run.\n"
+    yield (
+        f"{len(numbers)} have Real outputs that the plain host reads as well: {_equal(numbers)} "
+        f"agree bit for bit, {_within(numbers)} to {FMU_BOUND:g}.\n"
+    )
+    for one in running:
+        if isinstance(one["deviation"], float) and not one["deviation"] <= FMU_BOUND:
+            yield f"- {_name(one)} deviates by {one['deviation']:.1e}: {_explained(one, _HOST)}.\n"
+    yield "| FMUs that do not run | why |\n| --- | --- |"
+    for one in there:
+        if one["outcome"] != "runs":
+            yield f"| {_name(one)} | {_why(one)} |"
+
+
+def _equal(numbers: Iterable[float]) -> int:
+    return sum(d == 0.0 for d in numbers)
+
+
+def _within(numbers: Iterable[float]) -> int:
+    return sum(d <= FMU_BOUND for d in numbers)
+
+
+def _parameters(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """What came of other values for all Real parameters."""
+    changed = [one for one in fmus if "changed" in one and one["changed"].get("wanted") != 0]
+    ran = [one for one in changed if one["changed"]["outcome"] == "runs"]
+    lost = [one for one in ran if one["changed"]["lost"]]
+    silent = sum(bool(one["changed"]["silent"]) for one in lost)
+    yield (
+        f"\n## Parameters\n\n{len(changed)} of the FMUs that run have Real parameters. All of an "
+        "FMU's were changed at once, by a hundredth, and read back after initialisation: "
+        f"{len(ran) - len(lost)} hold all that they were given, {len(lost)} do not, which is said "
+        f"of {len(lost) - silent} of them, and {len(changed) - len(ran)} do not run with these "
+        "values.\n"
+    )
+    numbers = [one["changed"].get("deviation") for one in ran]
+    compared = [number for number in numbers if isinstance(number, float)]
+    yield (
+        f"{_within(compared)} of {len(compared)} with Real outputs agree to {FMU_BOUND:g} with the "
+        "plain host, which sets the same values.\n"
+    )
+    for one in ran:
+        deviation = one["changed"].get("deviation")
+        if isinstance(deviation, float) and not deviation <= FMU_BOUND:
+            yield f"- {_name(one)} deviates by {deviation:.1e}: {_explained(one, _HOST)}."
+    for one in lost:
+        yield f"- {_name(one)} does not take {_listed(one['changed']['lost'])}."
+    for one in changed:
+        if one not in ran:
+            yield f"- {_name(one)}: {_why(one['changed'])}"
+
+
+def _listed(names: Sequence[str], most: int = 5) -> str:
+    shown = ", ".join(f"`{name}`" for name in names[:most])
+    return shown + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def _absent(found: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """What could not be fetched where this page was written."""
+    places = Counter(one["place"] for one in found if one["outcome"] == "absent")
+    if places:
+        yield "\n## Not to be had\n\nFiles that could not be fetched when this page was written:\n"
+        for one in found:
+            if one["outcome"] == "absent":
+                yield f"- {_name(one)}"
+    yield ""
+
+
+def _name(one: Mapping[str, Any]) -> str:
+    """Where a file comes from, and how often it is there."""
+    more = f" ({one['copies']} more)" if one["copies"] else ""
+    return f"{one['place']}: {_cell(one['path'])}{more}"
+
+
+def _why(one: Mapping[str, Any]) -> str:
+    return f"{_OUTCOMES[one['outcome']]}: {_cell(one['reason'])}"
+
+
+def _cell(text: str) -> str:
+    """A text in one cell of a table."""
+    return re.sub(r"\s+", " ", text).replace("|", "\\|").replace("<", "&lt;")

@@ -1,0 +1,206 @@
+"""Our master beside other hosts, on any files: `python benchmarks/hosts.py FILE...`.
+
+An FMU runs alone, here and in `fmpy.simulate_fmu`; a system in Jacobi order, here and in libcosim
+and ecos, each of which is given all its steps in one call and records nothing, while our master
+keeps all rows. Every pair is a process of its own, in which both take turns; what comes before the
+first step is taken off. Printed are the medians of our time, of theirs, and
+of their ratios. What a host does not run, or ends the process with, has no line but a count.
+
+Without files: the FMUs and the system of this project, of the native kind.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import importlib
+import json
+import platform
+import resource
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+import fmpy
+
+from orchestrator.errors import InputError
+from orchestrator.experiments import bundle
+from orchestrator.experiments.bundle import NATIVE
+from orchestrator.experiments.preparation import Request, prepare
+from orchestrator.experiments.scenario import Scenario
+from orchestrator.master.loop import chosen
+from orchestrator.master.simulation import simulate
+from orchestrator.master.table import Table
+from orchestrator.system.component import read_component
+from orchestrator.system.ssp.reading import read_ssp
+from orchestrator.system.structure import System
+
+#: Rounds, steps of a run, and the longest that the steps of one run shall take [s].
+ROUNDS, STEPS, LONGEST = 9, 10_000, 0.5
+
+#: Steps that the length of a run is found with, and runs of one step, the shortest of which is
+#: taken off.
+FIRST, SET_UPS = 500, 5
+
+#: How long a pair may take [s].
+PATIENCE = 120
+
+#: First argument of this script where it times one pair.
+_PAIR = "--pair"
+
+#: Makes a number of steps, and says how long they took [s].
+Run = Callable[[int], float]
+
+
+def ours(system: System, order: str) -> tuple[Run, float]:
+    """Our master with its default loop, and the step that it takes."""
+    step = prepare(Scenario(system.name), system, Request(stop_time=1.0)).experiment.step
+
+    def run(steps: int) -> float:
+        request = Request(stop_time=steps * step, step=step, order=order)
+        prepared, table = prepare(Scenario(system.name), system, request), Table()
+        loop = chosen("auto", prepared.experiment)
+        start = perf_counter()
+        ending = simulate(prepared.system, prepared.experiment, [table], loop=loop)
+        seconds = perf_counter() - start
+        if ending.failure is not None or len(table) != steps + 1:
+            raise InputError(f"{ending.failure or ending.remark}")
+        return seconds
+
+    return run, step
+
+
+def in_fmpy(fmu: Path, step: float) -> Run:
+    """fmpy on an unpacked FMU."""
+    folder = fmpy.extract(str(fmu))
+    description = fmpy.read_model_description(folder, validate=False)
+
+    def run(steps: int) -> float:
+        start = perf_counter()
+        fmpy.simulate_fmu(
+            folder,
+            validate=False,
+            model_description=description,
+            fmi_type="CoSimulation",
+            start_time=0.0,
+            stop_time=steps * step,
+            output_interval=step,
+        )
+        return perf_counter() - start
+
+    return run
+
+
+def in_libcosim(ssp: Path, _: float) -> Run:
+    """libcosim on an archive."""
+    from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level  # noqa: PLC0415
+
+    log_output_level(CosimLogLevel.ERROR)
+
+    def run(steps: int) -> float:
+        execution = CosimExecution.from_ssp_file(ssp_path=str(ssp))
+        start = perf_counter()
+        if not execution.step(steps):
+            raise InputError("libcosim ended the run")
+        return perf_counter() - start
+
+    return run
+
+
+def in_ecos(ssp: Path, step: float) -> Run:
+    """ecos on an archive."""
+    for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
+        ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
+    ecospy: Any = importlib.import_module("ecospy")
+
+    def run(steps: int) -> float:
+        with ecospy.EcosSimulation(step_size=step, ssp_path=str(ssp)) as simulation:
+            simulation.init()
+            start = perf_counter()
+            simulation.step(steps)
+            return perf_counter() - start
+
+    return run
+
+
+#: Hosts by the ends of the names of what they run.
+HOSTS = {
+    ".fmu": {"fmpy": in_fmpy},
+    ".ssp": {"libcosim": in_libcosim, "ecos": in_ecos},
+}
+
+
+def pair(path: Path, host: str) -> None:
+    """Time a file here and in another host, in turns, and tell both a step [s]."""
+    alone = path.suffix == ".fmu"
+    system = System(path.stem, {"a": read_component("a", path)}, ()) if alone else read_ssp(path)
+    here, step = ours(system, "jacobi")
+    there = HOSTS[path.suffix][host](path, step)
+    taken = max(here(FIRST), there(FIRST))
+    steps = max(20, min(STEPS, int(FIRST * LONGEST / taken)))
+    runs = [(run, min(run(1) for _ in range(SET_UPS))) for run in (here, there)]
+    rounds = [tuple(run(steps) - before for run, before in runs) for _ in range(ROUNDS)]
+    found = {
+        "here": median(a for a, _ in rounds) / steps,
+        "there": median(b for _, b in rounds) / steps,
+        "ratio": median(a / b for a, b in rounds),
+    }
+    print(f"\n{_PAIR}{json.dumps(found)}", flush=True)
+
+
+def measured(path: Path, host: str) -> dict[str, float] | None:
+    """What a process finds that times a pair; None: one of the two cannot run it."""
+    try:
+        process = subprocess.run(
+            [sys.executable, __file__, _PAIR, str(path), host],
+            capture_output=True,
+            timeout=PATIENCE,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return None
+    for line in process.stdout.decode(errors="replace").splitlines():
+        if line.startswith(_PAIR):
+            found: dict[str, float] = json.loads(line.removeprefix(_PAIR))
+            return found
+    return None
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("file", nargs="*", type=Path, metavar="FILE", help=".fmu or .ssp")
+    files = parser.parse_args().file
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    print(f"{platform.python_implementation()} {platform.python_version()}, {platform.machine()}")
+    print(f"medians of {ROUNDS} rounds of at most {STEPS} steps")
+    with TemporaryDirectory(prefix="auvfmu") as folder:
+        if not files:
+            bundle.build(Path(folder), kind=NATIVE)
+            files = [*sorted(Path(folder).glob("*.fmu")), Path(folder, "auv.ssp")]
+        lines: list[tuple[float, str]] = []
+        left_out = 0
+        for path in files:
+            for host in HOSTS[path.suffix]:
+                if found := measured(path, host):
+                    here, there = (1e6 * found[key] for key in ("here", "there"))
+                    text = f"{path.name:44} {here:9.2f} us here {there:9.2f} us in {host:9}"
+                    lines.append((found["ratio"], f"{text} {found['ratio']:6.3f}"))
+                else:
+                    left_out += 1
+    for _, line in sorted(lines):
+        print(line)
+    print(f"{left_out} pairs of a file and a host of which one does not run")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == [_PAIR]:
+        pair(Path(sys.argv[2]), sys.argv[3])
+    else:
+        main()

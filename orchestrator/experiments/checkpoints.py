@@ -1,0 +1,103 @@
+"""Checkpoints of runs that belong together: where they lie, and what they are of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+from orchestrator.errors import InputError
+from orchestrator.experiments.bill_of_materials import digest_of
+from orchestrator.experiments.preparation import Prepared
+from orchestrator.master.checkpoint import (
+    Checkpoints,
+    Identity,
+    check_gives_states,
+    interval_in,
+)
+
+#: The folder of checkpoints, in that of the result.
+FOLDER = "checkpoint"
+
+
+def checkpoints_of(
+    runs: Sequence[Prepared],
+    folder: Path,
+    every: float | None,
+    resume: bool,
+    say: Callable[[str], None] = lambda _: None,
+) -> list[Checkpoints]:
+    """The checkpoints of some runs, one after the other.
+
+    Args:
+        runs: whose results go into a folder: of the first into it, of the others below it.
+        folder: of the first one's checkpoints.
+        every: one for so many simulated seconds [s]; None: as often as before, if runs are resumed.
+        resume: begin with those that are there.
+        say: takes notes for the user.
+
+    Returns:
+        None at all, if none are wanted.
+
+    Raises:
+        InputError: there is nothing to resume, or something else; or an FMU has no state.
+
+    """
+    if resume and every is None:
+        every = interval_in(folder)
+        if every is None:
+            raise InputError(
+                f"there is nothing to resume in {folder}; a run leaves something there with "
+                "--checkpoint-every"
+            )
+    if every is None:
+        return []
+    for prepared in runs:
+        check_gives_states(prepared.system)
+    places = [folder, *(folder / prepared.scenario.name for prepared in runs[1:])]
+    found = [
+        Checkpoints(place, _identity(prepared), every, resume)
+        for place, prepared in zip(places, runs, strict=True)
+    ]
+    times = [checkpoints.time for checkpoints in found]
+    for prepared, time in zip(runs, times, strict=True):
+        if time is not None:
+            say(f"{prepared.scenario.name}: goes on at t = {time:g} s")
+    if resume and not any(times):
+        say(f"there is nothing to resume in {folder}: begins at the start")
+    return found
+
+
+def leave(
+    kept: Sequence[Checkpoints], is_whole: bool, say: Callable[[str], None] = lambda _: None
+) -> None:
+    """Remove checkpoints that nobody needs any more, or say where they are.
+
+    Args:
+        kept: of runs that belong together.
+        is_whole: whether all of these have come to their end.
+        say: takes notes for the user.
+
+    """
+    # Those of the first are in the folder that holds the others'.
+    for checkpoints in reversed(kept):
+        if is_whole:
+            checkpoints.remove()
+        elif checkpoints.time is not None:
+            say(f"--resume goes on from t = {checkpoints.time:g} s, from {checkpoints.folder}")
+
+
+def _identity(prepared: Prepared) -> Identity:
+    """All that the rows of a run depend on."""
+    system, experiment = prepared.system, prepared.experiment
+    return {
+        "auv-fmu": version("auv-fmu"),
+        "the components": ", ".join(system.components),
+        **{f"the FMU of {name}": digest_of(of.fmu) for name, of in system.components.items()},
+        **{f"what feeds {wire.target}": repr(wire) for wire in system.connections},
+        "the events": repr(prepared.events),
+        "the inputs": "" if prepared.course is None else prepared.course.digest,
+        **{f"the step of {name}": repr(step) for name, step in system.steps.items()},
+        **{str(name): repr(value) for name, value in system.parameters.items()},
+        **{name: repr(value) for name, value in vars(experiment).items()},
+    }

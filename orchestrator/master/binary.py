@@ -1,0 +1,158 @@
+"""The library of an FMU, loaded once a process."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Iterator
+from contextlib import chdir, contextmanager
+from pathlib import Path
+from shutil import copytree
+from tempfile import mkdtemp
+from threading import Lock
+from typing import Any
+
+import fmpy
+from fmpy.fmi2 import FMU2Slave, fmi2Error
+
+from orchestrator.errors import InputError, reason
+from orchestrator.system.component import Component
+from orchestrator.system.unpacking import check_place, runs_python
+
+#: How this program names itself in descriptions of FMUs.
+_OWN = "auv-fmu "
+
+#: What only FMUs with some capability need, and some of the others lack.
+_OPTIONAL = ("FMUstate", "Derivative", "Status", "CancelStep", "DebugLogging")
+
+
+class FMU2OfOthers(FMU2Slave):  # type: ignore[misc]
+    """An FMU that may lack functions that its capabilities do not ask for.
+
+    By the beginning of the class's name fmpy knows the version.
+    """
+
+    dll: Any
+
+    def _loadFunctions(self) -> None:
+        dll = self.dll
+        self.dll = _Lenient(dll)
+        super()._loadFunctions()
+        self.dll = dll
+
+
+class _Lenient:
+    """A library in which optional functions are found that are not there."""
+
+    def __init__(self, dll: Any) -> None:
+        self._dll = dll
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return getattr(self._dll, name)
+        except AttributeError:
+            if not any(part in name for part in _OPTIONAL):
+                raise
+            return lambda *_: fmi2Error
+
+
+class Library:
+    """A loaded FMU, which serves all its instances in this process.
+
+    Attributes:
+        fmu: fmpy's view of it.
+        corrupted: whether one of them has ended with fmi2Fatal: FMI then forbids every further
+            call, also for the others, even to free them.
+        is_akin: whether it is made by this program or PythonFMU: nothing is left in it of an
+            instance, and of each step that it refuses it says that it wants to terminate.
+        users: how many there are.
+
+    """
+
+    def __init__(self, component: Component, folder: Path) -> None:
+        """Load what has been unpacked into a folder.
+
+        Raises:
+            InputError: it cannot be loaded.
+
+        """
+        check_place(folder)
+        check_binary(component, folder)
+        try:
+            # fmpy changes the current folder meanwhile, and leaves it so if it fails.
+            with chdir(Path.cwd()):
+                self.fmu = FMU2OfOthers(
+                    guid=component.description.guid,
+                    modelIdentifier=component.description.coSimulation.modelIdentifier,
+                    unzipDirectory=str(folder),
+                )
+        except Exception as error:
+            raise InputError(f"{named(component)} cannot be loaded: {reason(error)}") from error
+        tool = component.description.generationTool or ""
+        self.is_akin = tool.startswith(_OWN) or runs_python(folder)
+        self.corrupted, self.users = False, 0
+
+
+def named(component: Component) -> str:
+    """A component and its FMU, for messages."""
+    return f"{component.name}: {component.fmu.name}"
+
+
+def check_binary(component: Component, folder: Path) -> None:
+    """Check that an FMU, unpacked into a folder, has a library for this machine.
+
+    Raises:
+        InputError: it has none.
+
+    """
+    binaries = folder / "binaries"
+    identifier = component.description.coSimulation.modelIdentifier
+    file = f"{identifier}{fmpy.sharedLibraryExtension}"
+    if (binaries / fmpy.platform / file).is_file():
+        return
+    others = sorted(path.parent.name for path in binaries.glob(f"*/{glob.escape(identifier)}.*"))
+    there = f"binaries for {', '.join(others)} alone" if others else "no binaries at all"
+    raise InputError(
+        f"{named(component)} has no {file} for this machine, {fmpy.platform}: it has {there}"
+    )
+
+
+#: Libraries by the folders into which their FMUs are unpacked, for runs in several threads.
+_libraries: dict[Path, Library] = {}
+_LOCK = Lock()
+
+
+@contextmanager
+def library_of(component: Component, folder: Path) -> Iterator[Library]:
+    """The library of an unpacked FMU, for one more instance of it.
+
+    Many libraries hold something of the instances that they have had: each is unloaded with its
+    last one, but for those of which it is known that they do not.
+
+    Raises:
+        InputError: it cannot be loaded.
+
+    """
+    with _LOCK:
+        library = _libraries.get(folder)
+        if library is None:
+            library = Library(component, folder)
+        elif library.corrupted:
+            # It stays loaded, with all that it has in memory; under another name it is a new one.
+            library = Library(component, _copied(folder))
+        _libraries[folder] = library
+        library.users += 1
+    try:
+        yield library
+    finally:
+        with _LOCK:
+            library.users -= 1
+            if not (library.users or library.corrupted or library.is_akin):
+                del _libraries[folder]
+                library.fmu.freeLibrary()
+
+
+def _copied(folder: Path) -> Path:
+    try:
+        return Path(copytree(folder, mkdtemp(dir=folder.parent), dirs_exist_ok=True))
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be copied: {reason(error)}") from error

@@ -1,0 +1,102 @@
+"""What an FMU says about itself in its modelDescription.xml."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import fmpy
+from fmpy.model_description import ModelDescription, ValidationError
+
+from orchestrator.errors import InputError, reason
+from orchestrator.system.unpacking import Version, unpacked
+
+_CAUSALITIES = {"parameter", "calculatedParameter", "input", "output", "local", "independent"}
+
+
+class Described(NamedTuple):
+    """A description, and what is wrong with it; None: it is valid."""
+
+    description: ModelDescription
+    flaw: Exception | None
+
+    def remark(self) -> str | None:
+        """What is wrong with it, in some words."""
+        if isinstance(self.flaw, ValidationError):
+            first, *others = map(str, self.flaw.problems)
+            return first + f" (and {len(others)} problems more)" * bool(others)
+        return None if self.flaw is None else reason(self.flaw)
+
+
+def read_description(folder: Path) -> Described:
+    """The description in the folder of an unpacked FMU, be it valid or not.
+
+    Raises:
+        Exception: it cannot be read; whatever it is, it says why.
+
+    """
+    try:
+        return Described(fmpy.read_model_description(folder), None)
+    except Exception as error:
+        flaw = error
+    try:
+        return Described(fmpy.read_model_description(folder, validate=False), flaw)
+    except Exception:
+        raise flaw from None
+
+
+@lru_cache(maxsize=256)
+def described(fmu: Path, _: Version, versions: Sequence[str]) -> Described:
+    """The description of an FMU for co-simulation, read once a version of the file.
+
+    Args:
+        fmu: the file.
+        versions: of FMI that it may have.
+
+    Raises:
+        InputError: it is no such FMU.
+
+    """
+    folder = unpacked(fmu)
+    try:
+        version = _version(folder / "modelDescription.xml")
+        if version not in versions:
+            wanted = " or ".join(versions)
+            raise InputError(f"{fmu}: is of FMI {version}; only FMUs of FMI {wanted} are supported")
+        found = read_description(folder)
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"{fmu}: not a readable FMU: {reason(error)}") from error
+    implementation = found.description.coSimulation
+    if implementation is None:
+        raise InputError(f"{fmu}: is for model exchange alone; only co-simulation is supported")
+    if found.description.guid is None:
+        raise InputError(f"{fmu}: not a readable FMU: its description has no guid")
+    if not re.fullmatch(r"[^/\\]+", implementation.modelIdentifier or ""):
+        raise InputError(
+            f"{fmu}: its model identifier {implementation.modelIdentifier!r} names no library"
+        )
+    if found.flaw is not None and any(_contradictions(found.description)):
+        raise InputError(f"{fmu}: not a readable FMU: {reason(found.flaw)}")
+    return found
+
+
+def _version(file: Path) -> str | None:
+    """The version of FMI that a description says it is of: all else differs between them."""
+    root: ElementTree.Element
+    _, root = next(ElementTree.iterparse(file, ["start"]))
+    return root.get("fmiVersion")
+
+
+def _contradictions(description: ModelDescription) -> Iterator[str]:
+    """Variables of which is left open which one is meant, or what it is for."""
+    names = set()
+    for variable in description.modelVariables:
+        if variable.causality not in _CAUSALITIES or variable.name in names:
+            yield variable.name
+        names.add(variable.name)

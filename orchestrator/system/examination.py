@@ -1,0 +1,97 @@
+"""An FMU examined without loading it: what is wrong with it, and what it cannot do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree import ElementTree
+
+from fmpy.validation import validate_fmu
+
+from orchestrator.errors import InputError, reason
+from orchestrator.findings import Findings
+from orchestrator.system.component import Component, read_component
+from orchestrator.system.unpacking import unpacked
+
+#: What of an FMU surprises who runs it, by the flag of its description and what that is then.
+_SURPRISES = {
+    ("canBeInstantiatedOnlyOncePerProcess", True): "one instance a process: a further one gets a "
+    "process of its own",
+    ("needsExecutionTool", True): "needs the program that it was made with",
+    ("canHandleVariableCommunicationStepSize", False): "takes steps of one length alone: the stop "
+    "time must be a multiple of the step",
+    ("canRunAsynchronuously", True): "may compute a step while its host goes on",
+    ("canGetAndSetFMUstate", False): "gives no state: a run of it cannot be resumed",
+}
+
+
+def examine(fmu: Path, findings: Findings) -> Component | None:
+    """Take note of all that is wrong with an FMU.
+
+    Args:
+        fmu: the file.
+        findings: take it.
+
+    Returns:
+        The FMU; None: it is none that can be run.
+
+    """
+    with findings.collecting():
+        # What is read of a description with references to nothing depends on the reader.
+        for text in list(_dangling(fmu)) or _flaws(fmu):
+            findings.note(text)
+        component = read_component(fmu.stem, fmu)
+        for text in (*_bad_starts(component), *_aliases(component)):
+            findings.note(text)
+        return component
+    return None
+
+
+def surprises(component: Component) -> Iterator[str]:
+    """What an FMU cannot do, or does in another way than most."""
+    for (flag, value), text in _SURPRISES.items():
+        if getattr(component.description.coSimulation, flag) is value:
+            yield text
+    if component.having("input") and all(
+        unknown.dependencies is None for unknown in component.description.outputs
+    ):
+        yield "does not say what its outputs depend on: each is taken to depend on all inputs"
+
+
+def _flaws(fmu: Path) -> list[str]:
+    """What the standard's schema and rules have against the description."""
+    try:
+        return [str(problem) for problem in validate_fmu(str(fmu))]
+    except Exception as error:
+        return [reason(error)]
+
+
+def _dangling(fmu: Path) -> Iterator[str]:
+    """References in the structure of the model to variables that do not exist."""
+    try:
+        root = ElementTree.parse(unpacked(fmu) / "modelDescription.xml").getroot()
+    except (OSError, ElementTree.ParseError):
+        return
+    known = range(1, 1 + len(root.findall("ModelVariables/ScalarVariable")))
+    for unknown in root.iterfind("ModelStructure//Unknown"):
+        for index in (unknown.get("index", ""), *unknown.get("dependencies", "").split()):
+            if not index.isdecimal() or int(index) not in known:
+                yield f"its model structure names variable {index!r}; there are {len(known)}"
+
+
+def _bad_starts(component: Component) -> Iterator[str]:
+    """Start values that are not of the types of their variables, or out of their ranges."""
+    for name in component.variables:
+        try:
+            component.start(name)
+        except InputError as error:
+            yield f"start value of {error}"
+
+
+def _aliases(component: Component) -> Iterator[str]:
+    """Inputs and parameters that are one variable under several names."""
+    seen: dict[tuple[str, int], str] = {}
+    for variable in (*component.having("input"), *component.having("parameter")):
+        other = seen.setdefault((variable.type, variable.valueReference), variable.name)
+        if other != variable.name:
+            yield f"{other} and {variable.name} are one: who sets one sets both"

@@ -1,0 +1,180 @@
+"""Connections between components, followed through the connectors of the systems around them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+from orchestrator.errors import InputError
+from orchestrator.system.ssp.archive import Archive
+from orchestrator.system.ssp.hierarchy import GIVES, TAKES, Bus, Connector, Group, Leaf, Node
+from orchestrator.system.ssp.transformations import converts_units, transformation_of
+from orchestrator.system.transformation import Linear, Transformation, chained
+from orchestrator.system.units import Unit
+
+#: Parts of arrays and the like, which FMI 2.0 does not have.
+_UNSUPPORTED = ("startIndices", "endIndices")
+
+
+@dataclass(frozen=True)
+class Wire:
+    """One connection of a file, which ends in a node.
+
+    Attributes:
+        source: where its value comes from.
+        unit: of its target; None: it is the one that arrives.
+        stated: transformation of the value, after its unit has been converted.
+        converts: whether its unit is converted.
+
+    """
+
+    source: Node
+    unit: Unit | None
+    stated: Transformation | None
+    converts: bool
+
+
+@dataclass(frozen=True)
+class Course:
+    """How a value comes to a port of a component.
+
+    Attributes:
+        archive: whose connections it takes.
+        nodes: through which it comes, from its origin on, the port included.
+        wires: between them.
+
+    """
+
+    archive: Archive
+    nodes: tuple[Node, ...]
+    wires: tuple[Wire, ...]
+
+    def transformation(self, unit: Unit | None, first: int = 0) -> Transformation | None:
+        """What happens to a value on its way to the port.
+
+        Args:
+            unit: in which it sets out.
+            first: number of the node where it does.
+
+        Raises:
+            InputError: units do not fit, or transformations cannot follow each other.
+
+        """
+        whole: Transformation | None = None
+        for wire in self.wires[first:]:
+            step = wire.stated
+            if wire.converts:
+                step = chained(self.archive.conversion(unit, wire.unit), step)
+                # What a transformation makes of a value is in the target's unit, or unknown.
+                unit = wire.unit or (unit if wire.stated is None else None)
+            else:
+                # Said even where it changes nothing: the units at its ends may differ.
+                step, unit = step or Linear(), wire.unit
+            whole = chained(whole, step)
+        return whole
+
+
+class Wires:
+    """All connections of a system and of those in it, by their targets."""
+
+    def __init__(self, archive: Archive, top: Group) -> None:
+        """Read them; what is wrong with them becomes problems of the archive."""
+        self._archive = archive
+        self._wires: dict[Node, Wire] = {}
+        self._read(top)
+
+    def targets(self) -> Iterator[Node]:
+        """All nodes that are fed, in the order in which the file has their connections."""
+        yield from self._wires
+
+    def course(self, node: Node) -> Course:
+        """Follow a port upstream.
+
+        Raises:
+            InputError: its connections lead in a circle.
+
+        """
+        nodes: list[Node] = [node]
+        wires: list[Wire] = []
+        while (wire := self._wires.get(nodes[0])) is not None:
+            if wire.source in nodes:
+                raise InputError(f"{node}: the connections that feed it lead in a circle")
+            nodes.insert(0, wire.source)
+            wires.insert(0, wire)
+        return Course(self._archive, tuple(nodes), tuple(wires))
+
+    def _read(self, group: Group) -> None:
+        for connection in group.content.findall("Connections/Connection"):
+            try:
+                self._add(group, connection)
+            except InputError as error:
+                self._archive.problem(error)
+        for element in group.members.values():
+            if isinstance(element, Group):
+                self._read(element)
+
+    def _add(self, group: Group, connection: Element) -> None:
+        start, end = (_End.of(group, connection, which) for which in ("start", "end"))
+        named = f"{start.node} -> {end.node}"
+        if any(connection.get(name) for name in _UNSUPPORTED):
+            raise InputError(f"{named}: connections of elements of arrays are not supported")
+        # The standard lets a connection be written from either end.
+        backwards = start.takes or end.gives
+        if (start.takes and end.takes) or (start.gives and end.gives):
+            both = "take their value from elsewhere" if start.takes else "give one"
+            raise InputError(f"{named}: cannot be connected, as both {both}")
+        source, target = (end, start) if backwards else (start, end)
+        before = self._wires.get(target.node)
+        if before is not None:
+            raise InputError(
+                f"{target.node} is fed by {before.source} and by {source.node}; an input takes one "
+                "connection"
+            )
+        try:
+            stated = transformation_of(connection, source.connector.items, target.connector.items)
+        except InputError as error:
+            raise InputError(f"{named}: {error}") from None
+        self._wires[target.node] = Wire(
+            source.node, target.connector.unit, stated, converts_units(connection)
+        )
+
+
+@dataclass(frozen=True)
+class _End:
+    """An end of a connection, as the system sees it in which the connection is.
+
+    Attributes:
+        node: where it is.
+        connector: what is known of it.
+        gives, takes: which way its value goes; neither: both are possible.
+
+    """
+
+    node: Node
+    connector: Connector
+    gives: bool
+    takes: bool
+
+    @classmethod
+    def of(cls, group: Group, connection: Element, which: str) -> _End:
+        """The start or the end of a connection."""
+        # Some writers leave it empty where it is the system itself.
+        name, port = connection.get(f"{which}Element") or None, connection.get(f"{which}Connector")
+        if not port:
+            raise InputError(f"a <{connection.tag}> without {which}Connector")
+        element: Leaf | Bus | Group | None = group if name is None else group.members.get(name)
+        if element is None:
+            raise InputError(
+                f"a connection to {Node((*group.way, name or ''), port)}: "
+                f"there is no element {name!r}"
+            )
+        connector = element.connector(port)
+        if connector is None:
+            if isinstance(element, Leaf) and element.component is not None:
+                element.component.variable(port)
+            raise InputError(f"a connection to {Node(element.way, port)}, which is not there")
+        outwards, inwards = connector.kind in GIVES, connector.kind in TAKES
+        # Seen from within, a system's inputs give and its outputs take.
+        gives, takes = (inwards, outwards) if element is group else (outwards, inwards)
+        return cls(Node(element.way, port), connector, gives, takes)

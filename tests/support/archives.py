@@ -1,0 +1,179 @@
+"""SSP archives of FMUs that are descriptions alone: what is read, and never run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from zipfile import ZipFile
+
+_NAMESPACES = " ".join(
+    f'xmlns:{prefix}="http://ssp-standard.org/SSP1/SystemStructure{name}"'
+    for prefix, name in (
+        ("ssd", "Description"),
+        ("ssc", "Common"),
+        ("ssv", "ParameterValues"),
+        ("ssm", "ParameterMapping"),
+        ("ssb", "SignalDictionary"),
+    )
+)
+
+#: Units that FMUs and descriptions define: a length in three, and two of other things.
+UNITS = {
+    "m": 'm="1"',
+    "mm": 'm="1" factor="0.001"',
+    "km": 'm="1" factor="1000"',
+    "K": 'K="1"',
+    "degC": 'K="1" offset="273.15"',
+}
+
+#: An enumeration that FMUs and descriptions define.
+ITEMS = {"slow": 2, "fast": 5}
+
+
+def variable(name: str, causality: str, kind: str = "Real", unit: str = "", **more: str) -> str:
+    """A variable of a description."""
+    stated = f' unit="{unit}"' if unit else ""
+    if kind == "Enumeration":
+        stated += ' declaredType="Speed"'
+    given = more.pop(
+        "start", {"Boolean": "false", "Enumeration": "2", "String": "x"}.get(kind, "0")
+    )
+    if causality != "output" or more:
+        stated += f' start="{given}"'
+    more.setdefault("variability", "fixed" if causality == "parameter" else "discrete")
+    attributes = " ".join(f'{key}="{value}"' for key, value in more.items())
+    return (
+        f'<ScalarVariable name="{name}" valueReference="{{reference}}" causality="{causality}" '
+        f"{attributes}><{kind}{stated}/></ScalarVariable>"
+    )
+
+
+def fmu(path: Path, *variables: str) -> Path:
+    """An FMU that has these variables and no library."""
+    bases = "".join(
+        f'<Unit name="{name}"><BaseUnit {base}/></Unit>' for name, base in UNITS.items()
+    )
+    items = "".join(f'<Item name="{name}" value="{value}"/>' for name, value in ITEMS.items())
+    outputs = "".join(
+        f'<Unknown index="{i}"/>'
+        for i, text in enumerate(variables, start=1)
+        if 'causality="output"' in text
+    )
+    structure = f"<Outputs>{outputs}</Outputs>" if outputs else ""
+    body = "".join(text.replace("{reference}", str(i)) for i, text in enumerate(variables))
+    with ZipFile(path, "w") as archive:
+        archive.writestr(
+            "modelDescription.xml",
+            '<?xml version="1.0" encoding="UTF-8"?><fmiModelDescription fmiVersion="2.0" '
+            f'modelName="M" guid="g"><CoSimulation modelIdentifier="m"/><UnitDefinitions>{bases}'
+            '</UnitDefinitions><TypeDefinitions><SimpleType name="Speed"><Enumeration>'
+            f"{items}</Enumeration></SimpleType></TypeDefinitions><ModelVariables>{body}"
+            f"</ModelVariables><ModelStructure>{structure}</ModelStructure></fmiModelDescription>",
+        )
+    return path
+
+
+def described(system: str, version: str = "1.0", after: str = "") -> str:
+    """A description of a system, with the units and the enumeration."""
+    bases = "".join(
+        f'<ssc:Unit name="{name}"><ssc:BaseUnit {base}/></ssc:Unit>' for name, base in UNITS.items()
+    )
+    items = "".join(f'<ssc:Item name="{name}" value="{value}"/>' for name, value in ITEMS.items())
+    return (
+        f'<?xml version="1.0" encoding="UTF-8"?><ssd:SystemStructureDescription {_NAMESPACES} '
+        f'version="{version}" name="test">{system}<ssd:Enumerations><ssc:Enumeration name="Speed">'
+        f"{items}</ssc:Enumeration></ssd:Enumerations><ssd:Units>{bases}</ssd:Units>{after}"
+        "</ssd:SystemStructureDescription>"
+    )
+
+
+def system(
+    elements: str = "",
+    connections: str = "",
+    connectors: str = "",
+    name: str = "top",
+    bindings: str = "",
+    more: str = "",
+) -> str:
+    """A system, at the top or in another."""
+    parts = [
+        f"<ssd:{tag}>{text}</ssd:{tag}>"
+        for tag, text in (
+            ("Connectors", connectors),
+            ("ParameterBindings", bindings),
+            ("Elements", elements),
+            ("Connections", connections),
+        )
+        if text
+    ]
+    return f'<ssd:System name="{name}">{"".join(parts)}{more}</ssd:System>'
+
+
+def connector(name: str, kind: str, unit: str = "", of: str = "Real") -> str:
+    """A connector."""
+    stated = f' unit="{unit}"' if unit else ""
+    if of == "Enumeration":
+        stated = ' name="Speed"'
+    return f'<ssd:Connector name="{name}" kind="{kind}"><ssc:{of}{stated}/></ssd:Connector>'
+
+
+def component(name: str, source: str = "a.fmu", bindings: str = "", **more: str) -> str:
+    """A component, whose connectors are those of its FMU."""
+    inside = f"<ssd:ParameterBindings>{bindings}</ssd:ParameterBindings>" if bindings else ""
+    attributes = "".join(f' {key}="{value}"' for key, value in more.items())
+    return f'<ssd:Component name="{name}" source="{source}"{attributes}>{inside}</ssd:Component>'
+
+
+def connection(start: str, end: str, inside: str = "", **more: str) -> str:
+    """A connection; ends are `element.connector`, or `connector` of the system itself."""
+    ends = ""
+    for which, text in (("start", start), ("end", end)):
+        element, dot, port = text.partition(".")
+        ends += f' {which}Element="{element}"' if dot else ""
+        ends += f' {which}Connector="{port if dot else element}"'
+    ends += "".join(f' {key}="{value}"' for key, value in more.items())
+    return f"<ssd:Connection{ends}>{inside}</ssd:Connection>"
+
+
+def parameter_set(values: Mapping[str, str], name: str = "set") -> str:
+    """A parameter set; a value is the inside of a parameter, such as `Real value="1"`."""
+    parameters = "".join(
+        f'<ssv:Parameter name="{name}"><ssv:{value}/></ssv:Parameter>'
+        for name, value in values.items()
+    )
+    return (
+        f'<ssv:ParameterSet {_NAMESPACES} version="1.0" name="{name}"><ssv:Parameters>{parameters}'
+        "</ssv:Parameters></ssv:ParameterSet>"
+    )
+
+
+def mapping(*entries: str) -> str:
+    """A mapping of entries such as `source="a" target="b"`, or these and what is inside them."""
+    inside = "".join(
+        f"<ssm:MappingEntry {attributes}>{transformation}</ssm:MappingEntry>"
+        for attributes, _, transformation in (entry.partition("|") for entry in entries)
+    )
+    return f'<ssm:ParameterMapping {_NAMESPACES} version="1.0">{inside}</ssm:ParameterMapping>'
+
+
+def binding(values: Mapping[str, str] | None = None, mapped: str = "", **more: str) -> str:
+    """A binding, with its values inside it or in the file that it names as its source."""
+    attributes = "".join(f' {key}="{value}"' for key, value in more.items())
+    inside = ""
+    if values is not None:
+        inside = f"<ssd:ParameterValues>{parameter_set(values)}</ssd:ParameterValues>"
+    if mapped:
+        inside += f"<ssd:ParameterMapping>{mapped}</ssd:ParameterMapping>"
+    return f"<ssd:ParameterBinding{attributes}>{inside}</ssd:ParameterBinding>"
+
+
+def archive(path: Path, description: str, files: Mapping[str, str | Path]) -> Path:
+    """An archive of a description and further files: texts, or files that are there."""
+    with ZipFile(path, "w") as content:
+        content.writestr("SystemStructure.ssd", description)
+        for name, file in files.items():
+            if isinstance(file, Path):
+                content.write(file, name)
+            else:
+                content.writestr(name, file)
+    return path

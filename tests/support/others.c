@@ -1,0 +1,170 @@
+/* An FMI 2.0 slave as tools of others make them: see others.py.
+
+   y = gain u, and every other output is the input of its kind. What is peculiar about it says how
+   it is compiled. */
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define HAS_STRINGS
+#define HAS_STATUS
+#include "slave.h"
+
+/* Value references, of variables of any kind. */
+enum { U, Y, GAIN, STUBBORN, DERIVED, VARIABLES };
+enum { PENDING = 5 };
+
+static const double reals[VARIABLES] = {101325.0, 0.0, 1.0, 1.0, 1.0};
+
+typedef struct {
+    double reals[VARIABLES];
+    int integers[VARIABLES];
+    int booleans[VARIABLES];
+    char texts[VARIABLES][1000];
+    double time, step, end;
+    int asked, steps;
+    const char *name;
+    const Callbacks *callbacks;
+} Instance;
+
+Status fmi2SetDebugLogging(Component c, int on, size_t n, const char *const *categories)
+{
+    return OK;
+}
+
+Component fmi2Instantiate(const char *name, int type, const char *guid, const char *location,
+                          const Callbacks *callbacks, int visible, int logging)
+{
+#ifdef ONCE
+    static int used;
+    if (used++)
+        return NULL;
+#endif
+    Instance *it = calloc(1, sizeof *it);
+    memcpy(it->reals, reals, sizeof reals);
+#ifdef REMEMBERS
+    static int before;
+    it->reals[GAIN] += before++;
+#endif
+    strcpy(it->texts[U], "start");
+    it->integers[U] = 1;
+    it->name = strdup(name);
+    it->callbacks = callbacks;
+    return it;
+}
+
+void fmi2FreeInstance(Component c) { free(c); }
+
+Status fmi2SetupExperiment(Component c, int tolerance, double t, double start, int stop, double end)
+{
+    ((Instance *)c)->end = stop ? end : HUGE_VAL;
+    return OK;
+}
+
+Status fmi2EnterInitializationMode(Component c)
+{
+#ifdef RESETS
+    memcpy(((Instance *)c)->reals, reals, sizeof reals);
+#endif
+    return OK;
+}
+
+Status fmi2ExitInitializationMode(Component c)
+{
+#ifdef CHATTERS
+    Instance *it = c;
+    for (int i = 0; i < 200; i++)
+        it->callbacks->logger(NULL, it->name, Warning, "", "%s %d", "chatter", i);
+    it->callbacks->logger(it->callbacks->environment, it->name, Error, NULL, "%s", "alarming");
+#endif
+    return OK;
+}
+
+Status fmi2Terminate(Component c) { return OK; }
+Status fmi2Reset(Component c) { return OK; }
+
+#define ACCESS(kind, type, values_of) \
+    Status fmi2Set##kind(Component c, const unsigned *r, size_t n, const type *values) \
+    { \
+        for (size_t i = 0; i < n; i++) \
+            if (r[i] != STUBBORN) \
+                ((Instance *)c)->values_of[r[i]] = values[i]; \
+        return OK; \
+    } \
+    Status fmi2Get##kind(Component c, const unsigned *r, size_t n, type *values) \
+    { \
+        Instance *it = c; \
+        it->values_of[Y] = it->values_of[U]; \
+        it->reals[Y] = it->reals[GAIN] * it->reals[U]; \
+        for (size_t i = 0; i < n; i++) \
+            values[i] = it->values_of[r[i]]; \
+        return OK; \
+    }
+ACCESS(Real, double, reals)
+ACCESS(Integer, int, integers)
+ACCESS(Boolean, int, booleans)
+
+Status fmi2SetString(Component c, const unsigned *r, size_t n, const char *const *values)
+{
+    for (size_t i = 0; i < n; i++)
+        strcpy(((Instance *)c)->texts[r[i]], values[i]);
+    return OK;
+}
+
+/* What is handed out is good until the next call. */
+Status fmi2GetString(Component c, const unsigned *r, size_t n, const char **values)
+{
+    Instance *it = c;
+#ifdef SPEAKS
+    if (it->steps)
+        snprintf(it->texts[Y], sizeof it->texts[Y], "%s%d %s", it->name, it->steps, it->texts[U]);
+    else
+#endif
+        strcpy(it->texts[Y], it->texts[U]);
+    for (size_t i = 0; i < n; i++)
+        values[i] = it->texts[r[i]];
+    return OK;
+}
+
+Status fmi2DoStep(Component c, double t, double h, int no_rollback)
+{
+    Instance *it = c;
+    it->time = t;
+#ifdef ENDS
+    if (t + h > 0.5)
+        return Discard;
+#endif
+    if (t + h > it->end)
+        return Error;
+#ifdef RIGID
+    if (it->step && (h < 0.999 * it->step || h > 1.001 * it->step))
+        return Error;
+#endif
+    it->step = h;
+    it->steps++;
+#ifdef WAITS
+    it->asked = 0;
+    return PENDING;
+#endif
+    return OK;
+}
+
+Status fmi2GetStatus(Component c, int kind, Status *value)
+{
+    *value = ((Instance *)c)->asked++ < 2 ? PENDING : OK;
+    return OK;
+}
+
+Status fmi2GetBooleanStatus(Component c, int kind, int *value)
+{
+    *value = kind == 3;
+    return OK;
+}
+
+Status fmi2GetRealStatus(Component c, int kind, double *value)
+{
+    *value = 0.5;
+    return OK;
+}

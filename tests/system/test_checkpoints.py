@@ -1,0 +1,278 @@
+"""Runs that are killed and resumed leave what they would have left if nobody had killed them."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+from itertools import count
+from pathlib import Path
+from shutil import copytree
+
+import pytest
+
+from orchestrator import simulate
+from orchestrator.commands.main import main
+from orchestrator.experiments.bundle import current_fmus
+from orchestrator.master.attendant import Run
+from orchestrator.master.checkpoint import Checkpoints
+from support.machine import LOOPS, contents, ended, eventually, forked, killed_at, start
+from support.mixed import Shape, build
+
+pytestmark = pytest.mark.usefixtures("workplace")
+
+#: What differs between two runs of the same: when, how long, and by which command.
+_RECORD = "run.json"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def fmus() -> None:
+    current_fmus()
+
+
+def run(*arguments: str, out: str) -> int:
+    return main(["run", *arguments, "--out", out])
+
+
+def result(folder: str) -> dict[str, bytes]:
+    """All files of a result but the records."""
+    files = contents(Path(folder))
+    return {name: files[name] for name in files if Path(name).name != _RECORD}
+
+
+def killed_after(checkpoints: int, *arguments: str, out: str) -> None:
+    """Run, and be killed when so many checkpoints have been written."""
+
+    def doomed() -> None:
+        written, left = Checkpoints._write, [checkpoints]
+
+        def counted(self: Checkpoints, run: Run) -> None:
+            written(self, run)
+            left[0] -= 1
+            if not left[0]:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+        Checkpoints._write = counted
+        run(*arguments, out=out)
+
+    assert ended(forked(doomed)) == -signal.SIGKILL
+
+
+CHECKPOINTS = ["--checkpoint-every", "0.3"]
+
+
+LEFT = ["fig4", "--stop-time", "1", "--no-figures"]
+
+
+@pytest.fixture(scope="module")
+def one_left(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a run leaves that was killed behind its first checkpoint."""
+    folder = tmp_path_factory.mktemp("left")
+    killed_after(1, *LEFT, *CHECKPOINTS, out=str(folder))
+    return folder
+
+
+@pytest.fixture
+def left(one_left: Path) -> None:
+    copytree(one_left, "r")
+
+
+@pytest.mark.parametrize(
+    ("scenario", "options", "then"),
+    [
+        ("fig4", ["--loop", "python", "--interval", "0.1"], ["--isolate"]),
+        ("fig4", ["--kind", "native", "--loop", "compiled", "--format", "parquet"], []),
+        ("fig3b", ["--loop", "compiled", "--order", "jacobi", "--step", "0.03"], []),
+    ],
+)
+def test_a_run_that_is_killed_and_resumed_is_one_that_was_not(scenario, options, then):
+    """Twice killed: behind its second checkpoint, and behind the next but one."""
+    arguments = [scenario, "--stop-time", "2", "--no-figures", *options]
+    assert run(*arguments, out="whole") == 0
+    killed_after(2, *arguments, *CHECKPOINTS, out="killed")
+    killed_after(2, *arguments, "--resume", out="killed")
+    assert run(*arguments, *then, "--loop", "auto", "--resume", out="killed") == 0
+    assert result("killed") == result("whole")
+    record = json.loads(Path("killed", _RECORD).read_text())
+    assert record["resumed_at"] == pytest.approx(1.2)
+
+
+EVENTS = """
+stop_time = 2.0
+
+[steps]
+disturbance = 0.04
+planner = 0.14
+
+[inputs]
+file = "inputs.csv"
+
+[wires]
+"plant.tau_w" = false
+
+[[events]]
+at = 0.25
+for = 0.6
+bias = { "plant.y.x" = 0.01 }
+
+[[events]]
+when = "controller.tau.u > -17.5"
+repeat = true
+for = 0.2
+set = { "plant.current.y" = 0.3 }
+
+[[events]]
+at = 1.0
+for = 0.7
+drop = "plant.nu"
+
+[[events]]
+at = 1.1
+for = 0.5
+override = { "plant.tau_w.v" = 5.0 }
+
+[[events]]
+at = 1.5
+reset = "controller"
+"""
+
+
+@pytest.mark.parametrize("options", [["--loop", "python"], ["--order", "jacobi", "--isolate"]])
+def test_a_run_in_which_things_happen(options):
+    """Killed while some of them last, others wait, and slow components hold what is not due."""
+    Path("inputs.csv").write_text(
+        "time,plant.tau_w.u,plant.tau_w.v\n" + "".join(f"{t},{t},{-t}\n" for t in range(4))
+    )
+    Path("events.toml").write_text(EVENTS)
+    arguments = ["events.toml", "--no-figures", *options]
+    assert run(*arguments, out="whole") == 0
+    plain = [option for option in arguments if option != "--isolate"]
+    killed_after(2, *plain, *CHECKPOINTS, out="killed")
+    killed_after(2, *plain, "--resume", out="killed")
+    assert run(*arguments, "--resume", out="killed") == 0
+    assert result("killed") == result("whole")
+    whole, killed = (json.loads(Path(out, _RECORD).read_text()) for out in ("whole", "killed"))
+    assert len(whole["events"]) > 6
+    assert killed["events"] == whole["events"]
+
+
+def test_a_run_with_a_companion_and_figures(capsys):
+    """Killed in the first, and in the second."""
+    arguments = ["fig5", "--stop-time", "1"]
+    assert run(*arguments, out="whole") == 0
+    killed_after(2, *arguments, *CHECKPOINTS, out="killed")
+    killed_after(3, *arguments, "--resume", out="killed")
+    capsys.readouterr()
+    assert run(*arguments, "--resume", out="killed") == 0
+    assert capsys.readouterr().err.splitlines() == [
+        "auv-fmu: fig5: goes on at t = 0.9 s",
+        "auv-fmu: fig5-pd: goes on at t = 0.6 s",
+    ]
+    assert result("killed") == result("whole")
+
+
+def test_killed_before_any_call_that_changes_the_disk():
+    """Before every third one."""
+    arguments = ["fig4", "--no-figures", "--stop-time", "0.16", "--checkpoint-every", "0.08"]
+    assert run(*arguments, out="whole") == 0
+    for n in count(0, 3):
+        out = f"killed{n}"
+        if not killed_at(n, lambda out=out: run(*arguments, out=out)):
+            break
+        assert run(*arguments, "--resume", out=out) == 0
+        assert result(out) == result("whole"), n
+    assert n > 20
+
+
+def test_killed_at_any_time_by_the_kernel():
+    """With another loop and without isolation it goes on as well."""
+    arguments = ["fig4", "--stop-time", "5", "--no-figures", *CHECKPOINTS]
+    assert run(*arguments, out="whole") == 0
+    process = start("run", *arguments, "--isolate", "--out", "killed")
+    assert eventually(Path("killed/checkpoint/state.json").exists)
+    process.kill()
+    process.communicate()
+    assert run(*arguments, "--resume", "--loop", "compiled", out="killed") == 0
+    assert result("killed") == result("whole")
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_a_signal_leaves_the_rows_and_the_checkpoint(loop, capsys):
+    arguments = ["fig4", "--no-figures", "--stop-time", "3", *CHECKPOINTS, "--loop", loop]
+    assert run(*arguments, out="whole") == 0
+    process = start("run", *arguments, "--real-time", "1", "--out", "stopped")
+    assert eventually(Path("stopped/checkpoint/state.json").exists)
+    process.send_signal(signal.SIGINT)
+    said = process.communicate()[1].splitlines()
+    assert process.returncode == 1
+    assert said[-2].endswith(", from stopped/checkpoint")
+    assert "interrupted at t = " in said[-1]
+    assert run(*arguments, "--resume", out="stopped") == 0
+    assert result("stopped") == result("whole")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (["--set", "plant.m11=26"], "plant.m11 differ"),
+        (["--stop-time", "3", "--order", "jacobi"], "order, stop_time differ"),
+        (["--kind", "native"], "the FMU of controller, the FMU of disturbance, the FMU of planner"),
+    ],
+)
+def test_another_run_is_refused(left, capsys, change, words):
+    before = contents(Path("r"))
+    assert run(*LEFT, *change, "--resume", out="r") == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.startswith("auv-fmu: r/checkpoint is of another run: ")
+    assert words in line
+    assert contents(Path("r/checkpoint")) == {
+        name.removeprefix("checkpoint/"): content
+        for name, content in before.items()
+        if name.startswith("checkpoint/")
+    }
+
+
+def test_what_would_be_lost_or_was_damaged_is_refused(left, capsys):
+    assert run(*LEFT, *CHECKPOINTS, out="r") == 2
+    assert "r/checkpoint holds a run as it was at t = 0.3 s: --resume" in capsys.readouterr().err
+    os.truncate("r/checkpoint/rows.bin", 1000)
+    assert run(*LEFT, "--resume", out="r") == 2
+    assert "r/checkpoint/rows.bin: holds fewer than 16 rows" in capsys.readouterr().err
+    Path("r/checkpoint/state.json").write_text("{}")
+    assert run(*LEFT, "--resume", out="r") == 2
+    assert "r/checkpoint/state.json: no checkpoint" in capsys.readouterr().err
+
+
+def test_what_makes_no_sense_is_refused(capsys):
+    for options, words in (
+        (["--resume"], "there is nothing to resume in r/checkpoint"),
+        (["--checkpoint-every", "0"], "a checkpoint every 0 s: must be positive and finite"),
+        (["--checkpoint-every", "nan"], "a checkpoint every nan s"),
+        (["--real-time", "0"], "real time x 0: the factor must be positive and finite"),
+        (["--real-time", "inf"], "real time x inf"),
+    ):
+        assert run("fig4", *options, out="r") == 2
+        [line] = capsys.readouterr().err.splitlines()
+        assert words in line
+    assert not Path("r").exists()
+
+
+def test_an_fmu_without_a_state_is_refused_by_name_before_the_run(tmp_path, capsys):
+    build(tmp_path, Shape((0, 0, 0, 0), (1, 0, 0, 0))).rename("odd.fmu")
+    Path("odd.toml").write_text('stop_time = 1.0\nonly = ["odd"]\n[components]\nodd = "odd.fmu"\n')
+    assert run("odd.toml", "--checkpoint-every", "0.5", out="r") == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.startswith("auv-fmu: odd: its FMU odd.fmu does not give its state away")
+    assert not Path("r").exists()
+
+
+def test_from_python(left):
+    whole = simulate("fig4", stop_time=1.0)
+    resumed = simulate("fig4", stop_time=1.0, checkpoint="r/checkpoint", resume=True)
+    assert resumed.rows.tobytes() == whole.rows.tobytes()
+    assert (whole.resumed_at, resumed.resumed_at) == (None, 0.3)
+    assert not Path("r/checkpoint").exists()
+    with pytest.raises(ValueError, match="nothing to resume in r/checkpoint"):
+        simulate("fig4", checkpoint="r/checkpoint", resume=True)
+    with pytest.raises(ValueError, match="checkpoints need checkpoint="):
+        simulate("fig4", checkpoint_every=1.0)

@@ -1,0 +1,259 @@
+"""Events and inputs of a run: the numbers of a straight line that changes at the same instants."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from auv_fmu import closed_loop as line
+from auv_fmu import plant
+from auv_fmu.closed_loop import LAWS, PAPER, Setting
+from orchestrator import load, simulate
+from orchestrator.analysis.signals import tracking_error
+from orchestrator.commands.main import main
+from orchestrator.errors import InputError
+from orchestrator.experiments.preparation import Request, loaded, prepare, with_companion
+from orchestrator.experiments.scenario import read_scenario
+from orchestrator.master.experiment import ORDERS
+from orchestrator.master.simulation import simulate as run
+from orchestrator.master.table import Table
+
+H = 0.02
+STEPS = 120
+
+#: What makes the steps, in which kind of FMUs, and where.
+WAYS: list[dict[str, Any]] = [
+    {"kind": "native", "loop": "compiled"},
+    {"kind": "native", "loop": "python"},
+    {"kind": "python", "loop": "python"},
+    {"kind": "native", "isolate": True},
+]
+
+EVENTS = [
+    {"at": 0.2, "override": {"controller.tau.u": 5.0}, "for": 0.3},
+    {"at": 0.35, "bias": {"controller": {"eta": {"psi": 0.1}}}, "for": 0.5},
+    {"at": 0.99, "drop": "plant.y", "for": 0.4},
+    {"at": 1.2, "set": {"plant.current": {"x": 0.3, "z": -0.1}, "disturbance.A_f": 0.8}},
+    {"at": 1.2, "set": {"controller.k_d": 40.0}, "for": 0.5},
+    {"when": "plant.nu.u > 0.15", "lose": ["plant.tau.q", "plant.tau.r"], "for": 0.2},
+    {"at": 1.9, "reset": "controller"},
+]
+
+
+@dataclass
+class Span:
+    """From which instant to which, without the last; at once where nothing ends it."""
+
+    begin: int
+    end: int = STEPS + 1
+
+    def __contains__(self, k: int) -> bool:
+        return self.begin <= k < self.end
+
+
+def straight(delayed: bool) -> Iterator[dict[str, Any]]:
+    """The loop of `auv_fmu.closed_loop`, written out once more, with what EVENTS say."""
+    setting: Setting = PAPER
+    law = LAWS[type(setting.controller)]
+    gauss = plant.white_noise(setting.plant.noise.seed).gauss
+    vehicles, before, held, lost, fast = line.begin(setting), None, None, None, True
+    for k in range(STEPS + 1):
+        if k == 60:
+            current = setting.plant._replace(current=(0.3, 0.0, -0.1))
+            waves = setting.disturbance._replace(A_f=0.8)
+            setting = setting._replace(plant=current, disturbance=waves)
+        k_d = 40.0 if k in Span(60, 85) else PAPER.controller.k_d
+        setting = setting._replace(controller=setting.controller._replace(k_d=k_d))
+        parts = line.splits(setting, H)
+        gains = law.sampled(setting.controller, H / parts.controller)
+        seen = line.scene(setting, vehicles, k * H, tuple(gauss(0.0, 1.0) for _ in range(3)))
+        if lost is None and seen.plant.nu[0] > 0.15 and not fast:
+            lost = Span(k, k + 10)
+        fast = seen.plant.nu[0] > 0.15
+        measured = law.measurement(seen)
+        if k in Span(18, 43):
+            phi, theta, psi = measured.euler
+            measured = measured._replace(euler=(phi, theta, psi + 0.1))
+        if k in Span(50, 70):
+            measured = measured._replace(y=held)
+        held = measured.y
+        if k in (0, 95):
+            control = law.start(gains, measured)
+        control, signals = law.command(gains, control, measured)
+        now = signals.tau, seen.tau_w
+        told, tau_w = before if before and delayed else now
+        before = now
+        if k == 95:
+            # What has begun anew shows what it computes then, as at the start.
+            told = signals.tau
+        if k in Span(10, 25):
+            told = (5.0, *told[1:])
+        if lost and k in lost:
+            told = (told[0], 0.0, 0.0)
+        yield {"k": k, "vehicle": vehicles.plant, "seen": seen, "tau": signals.tau, "told": told}
+        control = law.steps(gains, control, signals, measured, H, 1)
+        tau = plant.applied(setting.plant, told)
+        vehicles = line.move(setting, vehicles, tau, tau_w, H, parts)
+    assert lost is not None
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("way", WAYS, ids=str)
+def test_events_are_those_of_the_straight_line_bit_for_bit(way, order):
+    table = simulate("fig4", stop_time=STEPS * H, order=order, events=EVENTS, **way)
+    assert table.failure is None
+    instants = list(straight(order == "jacobi"))
+    after = {
+        "plant.eta": [(*i["vehicle"].position, *i["seen"].plant.euler) for i in instants],
+        "plant.nu": [i["seen"].plant.nu for i in instants],
+        "plant.y": [i["seen"].y for i in instants],
+    }
+    for group, rows in after.items():
+        names = [name for name in table.columns if name.startswith(f"{group}.")]
+        np.testing.assert_array_equal(table.group(*names), rows, group)
+    for group, key in (("controller.tau", "tau"), ("plant.tau", "told")):
+        values = table.step_values(*(f"{group}.{k}" for k in "uqr"))
+        np.testing.assert_array_equal(values, [i[key] for i in instants[:-1]], group)
+    times = [event.time for event in table.events]
+    assert times == sorted(times)
+    assert len({event.event for event in table.events}) == len(EVENTS)
+
+
+def test_without_events_nothing_is_different():
+    free, held = (simulate("fig4", stop_time=1.0, kind="native", events=e) for e in (None, []))
+    np.testing.assert_array_equal(free.rows, held.rows)
+
+
+def test_a_component_with_longer_steps_hears_of_it_at_its_next_one():
+    """From the seventh to the eleventh instant; it takes inputs at even ones."""
+    plain, biased = (
+        simulate("fig4", stop_time=0.4, kind="native", steps={"controller": 0.04}, events=events)
+        for events in ([], [{"at": 0.14, "for": 0.08, "bias": {"controller.eta.psi": 0.1}}])
+    )
+    difference = biased["controller.eta.psi"] - plain["controller.eta.psi"]
+    # A row holds the inputs of the step that ends there, and the vehicle answers a step later.
+    np.testing.assert_array_equal(difference[:9], 0.0)
+    np.testing.assert_allclose(difference[9:13], 0.1, atol=1e-3)
+    np.testing.assert_allclose(difference[13:], 0.0, atol=1e-2)
+
+
+def test_a_run_is_replayed_from_its_table_bit_for_bit(tmp_path):
+    """The vehicle alone, with a CSV of the inputs that it had in the loop."""
+    loop = simulate("fig4", stop_time=2.0, kind="native")
+    names = [name for name in loop.columns if name.startswith(("plant.tau.", "plant.tau_w."))]
+    file = tmp_path / "inputs.csv"
+    with file.open("w", newline="") as out:
+        writer = csv.writer(out)
+        writer.writerow(("time", *names))
+        # A row holds the inputs of the step that ends there.
+        writer.writerows(np.column_stack((loop.time[:-1], loop.group(*names)[1:])).tolist())
+    scenario = tmp_path / "alone.toml"
+    scenario.write_text(
+        'only = ["plant"]\nstop_time = 2.0\n[inputs]\nfile = "inputs.csv"\nbetween = "hold"\n'
+    )
+    for way in WAYS:
+        alone = simulate(scenario, **way)
+        for name in alone.columns:
+            np.testing.assert_array_equal(alone[name][1:], loop[name][1:], name)
+
+
+def test_inputs_go_in_straight_lines_between_rows(tmp_path):
+    file = tmp_path / "u.csv"
+    file.write_text("time,plant.tau.u\n0.1,1.0\n0.5,9.0\n0.5,-3.0\n0.9,0.5\n")
+    table = simulate("fig3a", stop_time=1.2, kind="native", inputs=file, parameters=None)
+    begun = table.step_start
+    before = np.interp(begun, [0.1, 0.5], [1.0, 9.0])
+    after = np.interp(begun, [0.5, 0.9], [-3.0, 0.5])
+    expected = np.where(begun < 0.5 - 1e-9, before, after)
+    np.testing.assert_allclose(table["plant.tau.u"][1:], expected, rtol=1e-12)
+
+
+def test_what_happens_is_said_recorded_and_kept(workplace: Path, capsys):
+    Path("mine.toml").write_text(
+        'compare = "fig5-pd"\nfigure = "overlay"\nstop_time = 1.0\n'
+        '[[events]]\nat = 0.3\nfor = 0.2\nlose = "controller.tau.r"\nlabel = "no yaw"\n'
+        "[[events]]\nat = 0.4\nset = { controller.k_d = 60.0 }\n"
+        '[[events]]\nwhen = "plant.eta.z > 100"\nstop = true\n'
+    )
+    assert main(["run", "mine.toml", "--kind", "native", "--out", "out"]) == 0
+    said = capsys.readouterr().err.splitlines()
+    assert "auv-fmu: warning: mine: did not happen: stop, when plant.eta.z > 100" in said
+    assert "auv-fmu: mine: t = 0.3 s: lose controller.tau.r (no yaw)" in said
+    assert "auv-fmu: mine: t = 0.5 s: lose controller.tau.r, ended" in said
+    # The PD controller has no k_d.
+    assert [line for line in said if "t = 0.4 s" in line] == [
+        "auv-fmu: mine: t = 0.4 s: set controller.k_d = 60"
+    ]
+    assert "auv-fmu: fig5-pd: t = 0.3 s: lose controller.tau.r (no yaw)" in said
+    events = json.loads(Path("out/run.json").read_text())["events"]
+    assert [(e["time"], e["label"]) for e in events] == [
+        (0.3, "no yaw"), (0.4, "set controller.k_d = 60"), (0.5, ""),
+    ]  # fmt: skip
+    svg = Path("out/mine.svg").read_text()
+    assert "no yaw" in svg
+    # Another command draws them from the record.
+    assert main(["plot", "out", "plant.tau.*", "--out", "again.svg"]) == 0
+    assert "no yaw" in Path("again.svg").read_text()
+
+
+def test_a_run_that_an_event_stops_has_not_failed(workplace: Path, capsys):
+    Path("stops.toml").write_text('[[events]]\nwhen = "plant.eta.x < 1.9"\nstop = true\n')
+    assert main(["run", "fig4", "--kind", "native", "--events", "stops.toml", "--no-figures"]) == 0
+    [line] = [s for s in capsys.readouterr().err.splitlines() if "ended at" in s]
+    record = json.loads(Path("results/fig4/run.json").read_text())
+    assert record["failure"] is None
+    assert record["remark"] in line
+    with Path("results/fig4/result.csv").open(encoding="utf-8") as table:
+        x = [float(row["plant.eta.x"]) for row in csv.DictReader(table)]
+    assert x[-1] < 1.9 <= min(x[:-1])
+
+
+def test_what_a_system_has_not_is_said_where_it_goes_without(workplace: Path, capsys):
+    left = "fault-sensor: the system comes without the scenario's events"
+    assert main(["export", "fault-sensor", "--kind", "native"]) == 0
+    assert f"auv-fmu: warning: {left}" in capsys.readouterr().err.splitlines()
+    with pytest.warns(UserWarning, match=left):
+        load("fault-sensor", "native")
+    with pytest.raises(InputError, match=left):
+        load("fault-sensor", "native", strict=True)
+
+
+# What is said of the scenarios
+
+#: Of each controller: largest error in the 20 s before the event and after it, when it is below
+#: half a metre for good after the event has ended, and the largest force that is commanded.
+SAID = {
+    "fault-thruster": {"proposed": (0.26, 0.88, 2.2, 30.3), "PD": (0.22, 0.87, 2.9, 16.8)},
+    "fault-sensor": {"proposed": (0.26, 5.66, 6.6, 217), "PD": (0.22, 1.18, 1.8, 63.1)},
+    "current-step": {"proposed": (0.26, 0.50, None, 26.4), "PD": (0.22, 0.42, None, 15.1)},
+}
+
+
+@pytest.mark.parametrize("name", SAID)
+def test_what_is_said_of_the_scenarios_is_so(name):
+    scenario = read_scenario(name)
+    [event] = scenario.events
+    begin, end = event["at"], event["at"] + event.get("for", 0.0)
+    own = prepare(scenario, loaded(name, "native")[1], Request(kind="native", loop="compiled"))
+    for prepared in with_companion(own, Request(kind="native", loop="compiled")):
+        table = Table()
+        run(
+            prepared.system, prepared.experiment, [table],
+            loop=prepared.loop, attendants=prepared.attendants(),
+        )  # fmt: skip
+        error = np.linalg.norm(tracking_error(table), axis=1)
+        time, after = table.time, table.time >= begin
+        before, largest, below, force = SAID[name][prepared.scenario.label]
+        assert error[(time >= begin - 20.0) & ~after].max() == pytest.approx(before, abs=0.005)
+        assert error[after].max() == pytest.approx(largest, abs=0.005)
+        assert np.abs(table["controller.tau.u"][after]).max() == pytest.approx(force, rel=0.005)
+        if below is not None:
+            last = time[np.flatnonzero(error > 0.5)[-1]]
+            assert last - end == pytest.approx(below, abs=0.05)

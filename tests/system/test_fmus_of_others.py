@@ -1,0 +1,210 @@
+"""FMUs as others make them: run with the right numbers, or refused by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.findings import Findings
+from orchestrator.system.component import read_component
+from orchestrator.system.names import PortName
+from support.others import WAYS, build, run, system_of
+
+#: Outputs by the inputs that they repeat.
+_PASSED = {"u": "y", "mode": "mode_y", "on": "fault", "said": "heard"}
+
+EVERY_WAY = pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+
+
+def with_values(system, values):
+    return system.with_parameters({PortName("a", port): value for port, value in values.items()})
+
+
+@EVERY_WAY
+@pytest.mark.parametrize("peculiarity", ["", "RESETS"])
+def test_parameters_last_also_where_initialisation_resets_them(tmp_path, peculiarity, way):
+    system = with_values(system_of(build(tmp_path, peculiarity)), {"gain": 3.0, "u": 2.0})
+    table = run(system, **way)
+    assert (table["a.y"] == 6.0).all()
+    assert table.parameters[PortName("a", "gain")] == 3.0
+    assert table.ending.messages == ()
+
+
+@EVERY_WAY
+def test_a_parameter_that_did_not_take_is_said_before_all_messages(tmp_path, way):
+    system = with_values(system_of(build(tmp_path, "CHATTERS")), {"stubborn": 3.0, "gain": 2.0})
+    first, *others = run(system, **way).ending.messages
+    assert first == "a.stubborn was set to 3.0, and the FMU holds 1.0"
+    assert others[0] == "a: chatter 0"
+    assert len(others) >= 100
+
+
+@EVERY_WAY
+def test_an_input_that_nothing_feeds_keeps_what_the_fmu_begins_with(tmp_path, way):
+    """The description names no start value; the FMU has 101325, and a text."""
+    table = run(system_of(build(tmp_path)), **way)
+    assert (table["a.u"] == 101325.0).all()
+    assert (table["a.y"] == 101325.0).all()
+    assert (table["a.mode"] == 1.0).all()
+
+
+@EVERY_WAY
+def test_values_of_all_kinds_are_set_connected_and_recorded(tmp_path, way):
+    system = system_of(
+        build(tmp_path),
+        "ab",
+        {f"b.{target}": f"a.{source}" for target, source in _PASSED.items()},
+    )
+    values = {"u": 0.1, "mode": "storm", "on": True, "said": "Grüße, 1", "count": 7}
+    table = run(with_values(system, values), **way)
+    assert table["a.mode_y"][0] == 4.0
+    assert table["a.heard"].tolist() == ["Grüße, 1"] * 11
+    for name, value in (("y", 0.1), ("mode_y", 4.0), ("fault", 1.0), ("heard", "Grüße, 1")):
+        assert table[f"b.{name}"].tolist() == [value] * 11
+    assert table.parameters[PortName("a", "count")] == 7
+    assert table.ending.messages == ()
+
+
+@EVERY_WAY
+def test_texts_that_change_in_every_step_arrive(tmp_path, way):
+    """Each of two FMUs says the number of its steps, and hears the other's of the step before."""
+    wires = {"a.said": "b.heard", "b.said": "a.heard"}
+    table = run(system_of(build(tmp_path, "SPEAKS"), "ab", wires), **way)
+    assert table["a.heard"].tolist()[:4] == ["", "a1 ", "a2 b1 ", "a3 b2 a1 "]
+    assert table["b.heard"].tolist()[:4] == ["", "b1 ", "b2 a1 ", "b3 a2 b1 "]
+
+
+@EVERY_WAY
+def test_an_alarming_message_of_a_call_that_went_well_ends_nothing(tmp_path, way):
+    """Nor does an output that happens to be called fault."""
+    system = with_values(system_of(build(tmp_path, "CHATTERS")), {"on": True})
+    table = run(system, **way)
+    assert table.failure is None
+    assert (table["a.fault"] == 1.0).all()
+    assert len(table) == 11
+
+
+@pytest.mark.parametrize("way", [way for name, way in WAYS.items() if name != "compiled"])
+def test_a_second_instance_of_an_fmu_that_allows_one_gets_its_own_process(tmp_path, way):
+    """Also in the next run of this process: the FMU never takes a second one."""
+    fmu = build(
+        tmp_path,
+        "ONCE",
+        'canBeInstantiatedOnlyOncePerProcess="true" canHandleVariableCommunicationStepSize="true"',
+    )
+    system = with_values(system_of(fmu, "abc", {"b.u": "a.y", "c.u": "b.y"}), {"u": 2.0})
+    for _ in range(2):
+        table = run(system, **way)
+        assert table.failure is None
+        assert (table["c.y"][2:] == 2.0).all()
+
+
+@pytest.mark.parametrize("way", [WAYS["python"], WAYS["compiled"]], ids=["python", "compiled"])
+def test_nothing_is_left_in_a_library_of_the_run_before(tmp_path, way):
+    """The gain of an instance is one, and one more for each that its library has had before."""
+    system = with_values(system_of(build(tmp_path, "REMEMBERS")), {"u": 2.0})
+    for _ in range(3):
+        assert (run(system, **way)["a.y"] == 2.0).all()
+
+
+def test_a_function_that_no_capability_asks_for_may_be_missing(tmp_path):
+    assert run(system_of(build(tmp_path, "LACKS"))).failure is None
+
+
+@EVERY_WAY
+def test_a_last_step_that_rounding_takes_beyond_the_stop_time_is_made(tmp_path, way):
+    """0.2 and 0.1 are more than 0.3, and the FMU makes no step beyond a stop time that it knows."""
+    table = run(system_of(build(tmp_path)), 0.3, 0.1, **way)
+    assert table.failure is None
+    assert table.time[-1] == 3 * 0.1
+
+
+def test_the_compiled_loop_gives_way_to_fmus_in_their_own_processes(tmp_path):
+    fmu = build(tmp_path, "ONCE", 'canBeInstantiatedOnlyOncePerProcess="true"')
+    table = run(system_of(fmu, "ab"), loop="compiled")
+    assert table.header.loop == "python"
+    assert any("b: runs in a process of its own" in text for text in table.ending.messages)
+
+
+@EVERY_WAY
+def test_an_fmu_may_end_the_simulation(tmp_path, way):
+    table = run(system_of(build(tmp_path, "ENDS"), "ab", {"b.u": "a.y"}), **way)
+    assert table.failure is None
+    assert table.ending.remark == "ended at t = 0.5 s: a has ended the simulation, at 0.5 s"
+    assert np.array_equal(table.time, np.arange(6) * 0.1)
+
+
+@EVERY_WAY
+def test_an_fmu_that_takes_steps_of_one_length_gets_no_other(tmp_path, way):
+    system = system_of(build(tmp_path, "RIGID", ""))
+    table = run(system, 1.0, 0.3, **way)
+    assert table.failure is None
+    assert table.time.tolist() == [0.0, 0.3, 0.6, 3 * 0.3]
+    assert table.ending.messages == (
+        "a: takes steps of one length alone, so the run ends with the last whole step, at "
+        "t = 0.9 s",
+    )
+    assert run(system, 0.9, 0.3, **way).ending.messages == ()
+    with pytest.raises(InputError, match="a: takes steps of one length alone, so the stop time"):
+        run(system, 0.2, 0.3, **way)
+
+
+@EVERY_WAY
+def test_a_step_that_goes_on_after_its_call_is_waited_for(tmp_path, way):
+    fmu = build(
+        tmp_path,
+        "WAITS",
+        'canRunAsynchronuously="true" canHandleVariableCommunicationStepSize="true"',
+    )
+    table = run(system_of(fmu), **way)
+    assert table.failure is None
+    assert len(table) == 11
+
+
+def test_a_step_that_should_have_ended_with_its_call_is_a_failure(tmp_path):
+    table = run(system_of(build(tmp_path, "WAITS")))
+    assert table.failure is not None
+    assert "a: its step goes on after fmi2DoStep, and its description" in table.failure
+
+
+def test_a_description_that_is_not_valid_is_a_note_where_it_does_no_harm(tmp_path):
+    findings = Findings()
+    read_component("a", build(tmp_path), findings=findings)
+    assert findings.notes == [
+        'a: the description of plain.fmu is not valid: Variable "u" (line 2) has no start value.'
+    ]
+
+
+@pytest.mark.parametrize("way", [WAYS["python"], WAYS["isolated"]])
+def test_a_machine_for_which_there_is_no_library_is_named(tmp_path: Path, way):
+    fmu = build(tmp_path, platform="win64")
+    with pytest.raises(InputError) as error:
+        run(system_of(fmu), **way)
+    assert "a: plain.fmu has no others.so for this machine, linux64" in str(error.value)
+    assert str(error.value).endswith("it has binaries for win64 alone")
+
+
+def test_an_fmu_that_cannot_be_instantiated_says_that_it_needs_a_tool(tmp_path):
+    fmu = build(tmp_path, "ONCE", 'needsExecutionTool="true"')
+    with pytest.raises(InputError) as error:
+        run(system_of(fmu, "ab"))
+    assert str(error.value) == (
+        "b: ONCE.fmu cannot be instantiated: Failed to instantiate model; it needs the tool that "
+        "it was made with"
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ('fmiVersion="2.0"', 'fmiVersion="1.0"', "is of FMI 1.0; only FMUs of FMI 2.0"),
+        ('fmiVersion="2.0"', 'fmiVersion="3.0"', "is of FMI 3.0; only FMUs of FMI 2.0"),
+        ("CoSimulation", "ModelExchange", "is for model exchange alone"),
+    ],
+)
+def test_other_versions_and_kinds_are_refused_by_name(tmp_path, old, new, why):
+    with pytest.raises(InputError, match=why):
+        read_component("a", build(tmp_path, change=(old, new)))

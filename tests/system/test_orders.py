@@ -1,0 +1,281 @@
+"""Orders, rings, longer steps of single components, and what happens on the way to an input."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from itertools import permutations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orchestrator.commands.main import main
+from orchestrator.errors import InputError
+from orchestrator.experiments.bundle import NATIVE
+from orchestrator.experiments.preparation import Request, load, prepare
+from orchestrator.experiments.result import simulate as simulated
+from orchestrator.experiments.scenario import Scenario
+from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.isolated import Isolation
+from orchestrator.master.loop import chosen
+from orchestrator.master.paces import paces
+from orchestrator.master.schedule import delays, stages
+from orchestrator.master.simulation import simulate
+from orchestrator.master.table import Table
+from orchestrator.system.graph import delayed
+from orchestrator.system.names import port_name
+from orchestrator.system.structure import System
+from orchestrator.system.transformation import Linear, Mapped
+from support.machine import LOOPS
+from support.relay import Clock, Wire, expected, relay, system_of
+
+#: Step [s], of which all multiples are exact.
+H = 0.125
+
+NAMES = "abcd"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("relays")
+
+
+def run(
+    system: System, experiment: Experiment, loop: str = "python", isolation: Isolation | None = None
+) -> Table:
+    table = Table()
+    how = chosen(loop, experiment, isolation)
+    simulate(system, experiment, [table], isolation, how)
+    assert table.failure is None
+    return table
+
+
+_TRANSFORMATIONS = st.none() | st.sampled_from(
+    [Linear(-0.5, 0.25), Linear(1.0, 0.0), Mapped(((0.0, 1.0), (1.0, -0.0), (0.5, 0.125)))]
+)
+
+
+@st.composite
+def systems(draw: st.DrawFn) -> dict:
+    """Arguments of :func:`.relay.system_of`, but for the files."""
+    names = list(NAMES[: draw(st.integers(1, 4))])
+    # No gain makes a ring grow.
+    wire = st.builds(
+        Wire,
+        st.sampled_from([f"{name}.{port}" for name in names for port in ("g", "y")]),
+        _TRANSFORMATIONS,
+    )
+    inputs = [f"{name}.{port}" for name in names for port in "uv"]
+    gains = st.sampled_from([0.0, 0.25, -0.5])
+    return {
+        "declares": {name: draw(st.booleans()) for name in names},
+        "wires": draw(st.dictionaries(st.sampled_from(inputs), wire)),
+        "parameters": {f"{name}.a": draw(gains) for name in names}
+        | {f"{name}.c": draw(st.sampled_from([1.0, -2.0])) for name in names},
+        "steps": {name: draw(st.integers(1, 4)) * H for name in names if draw(st.booleans())},
+    }
+
+
+def made(folder: Path, declares: dict[str, bool], **arguments: object) -> System:
+    return system_of({name: relay(folder, d) for name, d in declares.items()}, **arguments)
+
+
+@settings(max_examples=40)
+@given(
+    arguments=systems(),
+    n=st.integers(1, 12),
+    rest=st.sampled_from([0.0, 0.4]),
+    start=st.sampled_from([0.0, -1.0, 2.5]),
+    order=st.sampled_from(ORDERS) | st.permutations(list(NAMES)),
+)
+def test_any_system_in_any_order_is_what_a_few_lines_make(folder, arguments, n, rest, start, order):
+    system = made(folder, **arguments)
+    if not isinstance(order, str):
+        order = [name for name in order if name in system.components]
+    clock = Clock(start, H, n, start + (n + rest) * H if rest else None)
+    experiment = Experiment(start + (n + rest) * H, H, order, start)
+    table, compiled = (run(system, experiment, loop) for loop in LOOPS)
+    assert compiled.rows.tobytes() == table.rows.tobytes()
+    flat = (
+        None if order == "jacobi" else [name for names in stages(system, order) for name in names]
+    )
+    paces = {name: round(system.steps.get(name, H) / H) for name in system.components}
+    first = dict(zip(map(port_name, table.columns), table.rows[0, 1:].tolist(), strict=True))
+    rows = expected(system, clock, paces, flat, first)
+    assert list(table.time) == [clock.time(k) for k in range(clock.steps + 1)]
+    for k, row in enumerate(rows, start=1):
+        got = dict(zip(table.columns, table.rows[k, 1:].tolist(), strict=True))
+        assert got == row
+
+
+#: Each takes what the one before it shows at once; the first takes it from the last.
+RING = {"a.u": "c.g", "b.u": "a.g", "c.u": "b.g"}
+GAINS = {"a.a": 0.5, "b.a": -1.0, "c.a": 0.25, "a.c": 1.0, "b.c": 2.0, "c.c": -1.0}
+
+
+def ring(folder: Path, declares: bool = True, gain: float = 0.5, **others: object) -> System:
+    fmus = {name: relay(folder, declares) for name in "abc"}
+    return system_of(fmus, RING, GAINS | {"a.a": gain}, **others)
+
+
+@pytest.mark.parametrize("declares", [True, False])
+def test_a_ring_is_opened_before_its_first_component_and_one_line_says_so(folder, declares):
+    system, table = ring(folder, declares), Table()
+    ending = simulate(system, Experiment(3 * H, H), [table])
+    line = "a takes c.g one step late: direct feedthroughs form a ring"
+    assert ending.messages == (line, *(f"{name}: initialises" for name in "abc"))
+    assert stages(system, "gauss-seidel") == [["a"], ["b"], ["c"]]
+    # What closes the ring is a step old, everything else is new.
+    np.testing.assert_array_equal(table["a.u"][1:], table["c.g"][:-1])
+    np.testing.assert_array_equal(table["b.u"][1:], table["a.g"][1:])
+    np.testing.assert_array_equal(table["c.u"][1:], table["b.g"][1:])
+
+
+def test_a_ring_that_feeds_another_is_opened_first(folder):
+    """It stands behind it; what it feeds gets nothing late but what its own ring is opened for."""
+    fmus = {name: relay(folder) for name in "abcde"}
+    wires = {"a.u": "b.g", "b.u": "a.g", "a.v": "d.g", "c.u": "d.g", "d.u": "c.g", "e.u": "b.g"}
+    system = system_of(fmus, wires)
+    assert stages(system, "gauss-seidel") == [["c"], ["d"], ["a"], ["b"], ["e"]]
+    assert delays(system, "gauss-seidel") == [
+        f"{late} one step late: direct feedthroughs form a ring"
+        for late in ("a takes b.g", "c takes d.g")
+    ]
+
+
+def test_strict_refuses_a_ring_unless_the_order_is_stated(folder):
+    system = replace(ring(folder), stop_time=1.0)
+    with pytest.raises(InputError, match=r"a takes c\.g one step late: direct feedthro"):
+        simulated(system, strict=True)
+    assert len(simulated(system, strict=True, order=["b", "c", "a"], step=H)) == 9
+
+
+def test_values_of_a_ring_are_its_solution_at_the_start(folder):
+    """g = A g + c, of which the iteration is a contraction."""
+    table = run(ring(folder), Experiment(H, H))
+    matrix = np.array([[0.0, 0.0, 0.5], [-1.0, 0.0, 0.0], [0.0, 0.25, 0.0]])
+    solution = np.linalg.solve(np.eye(3) - matrix, [1.0, 2.0, -1.0])
+    found = [table[f"{name}.g"][0] for name in "abc"]
+    np.testing.assert_allclose(found, solution, rtol=0.0, atol=1e-15)
+
+
+def test_a_ring_that_does_not_come_to_rest_is_refused_with_its_ports(folder):
+    """Its gain is minus one: the values go round and round."""
+    with pytest.raises(InputError, match=r"do not come to rest: .*c\.g.* in an algebraic loop"):
+        run(ring(folder, gain=4.0), Experiment(H, H))
+
+
+@pytest.mark.parametrize("order", ["gauss-seidel", *permutations(("plant", "controller"))])
+def test_an_order_of_names_is_the_derived_one_where_it_says_the_same(order):
+    """Where what the controller and the disturbance show at once goes is what counts."""
+    system, experiment = load("fig4", NATIVE), Experiment(2.0, 0.02)
+    derived = run(system, experiment)
+    if order == "gauss-seidel":
+        order = [name for names in stages(system, order) for name in names]
+    else:
+        order = ("disturbance", "planner", *order)
+    table = run(system, replace(experiment, order=order))
+    same = delayed(system, order) == []
+    assert same == (order[-1] == "plant")
+    assert (table.rows.tobytes() == derived.rows.tobytes()) == same
+
+
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [
+        (["plant"], "names controller, disturbance, planner not at all; it takes every component"),
+        (["plant", "plant"], "order plant,plant: names plant twice; it takes every component once"),
+        (["plants"], "no component 'plants'; it has .*; did you mean plant"),
+        ("random", "order 'random': use one of gauss-seidel, jacobi, or name every component"),
+    ],
+)
+def test_orders_that_cannot_be_are_refused(order, words):
+    with pytest.raises(InputError, match=words):
+        simulated(load("fig4", NATIVE), order=order)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_equal_steps_of_all_components_are_one_step(order):
+    system, experiment = load("fig4", NATIVE), Experiment(4.0, 0.02, order)
+    whole = run(system, experiment)
+    same = run(replace(system, steps=dict.fromkeys(system.components, 0.02)), experiment)
+    assert same.rows.tobytes() == whole.rows.tobytes()
+    # All of them slow: every second row is that of the longer step; 2 k h is the same number.
+    finer = replace(experiment, step=0.01)
+    slow = run(replace(system, steps=dict.fromkeys(system.components, 0.02)), finer)
+    assert slow.rows[::2].tobytes() == whole.rows.tobytes()
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_a_slow_controller_is_sampled_and_held(loop):
+    table = run(
+        replace(load("fig4", NATIVE), steps={"controller": 0.1}), Experiment(2.0, 0.02), loop
+    )
+    force, measured = table["controller.tau.u"][1:], table["controller.y.x"][1:]
+    for signal in (force, measured, table["plant.tau.u"][1:]):
+        np.testing.assert_array_equal(signal.reshape(-1, 5), signal[::5, None] * np.ones(5))
+    np.testing.assert_array_equal(measured[::5], table["plant.y.x"][:-1:5])
+    assert len(set(force[::5])) == 20
+
+
+def test_isolated_components_have_steps_of_their_own_too(folder):
+    system = ring(folder, declares=False, steps={"b": 2 * H, "c": 3 * H})
+    experiment = Experiment(10.5 * H, H)
+    apart = run(system, experiment, isolation=Isolation(20.0))
+    assert apart.rows.tobytes() == run(system, experiment).rows.tobytes()
+
+
+def test_steps_follow_from_what_is_stated_and_else_from_the_fmus(folder):
+    fmus = {"a": relay(folder, step=0.02), "b": relay(folder, step=0.05), "c": relay(folder)}
+    system = system_of(fmus, stop_time=1.0)
+
+    def paces_of(system: System, **stated: object) -> tuple[float, dict[str, int]]:
+        prepared = prepare(Scenario("s"), system, Request(**stated))
+        step = prepared.experiment.step
+        return step, paces(prepared.system, step)
+
+    assert paces_of(system) == (0.01, {"a": 2, "b": 5, "c": 1})
+    assert paces_of(system, steps={"b": 0.1}) == (0.02, {"a": 1, "b": 5, "c": 1})
+    assert paces_of(system, step=0.05) == (0.05, {"a": 1, "b": 1, "c": 1})
+    annotated = replace(system, step=0.05, steps={"c": 0.15})
+    assert paces_of(annotated) == (0.05, {"a": 1, "b": 1, "c": 3})
+    assert paces_of(annotated, steps={"c": 0.1}) == (0.05, {"a": 1, "b": 1, "c": 2})
+    assert paces_of(system_of({"a": relay(folder)}, stop_time=1.0)) == (0.02, {"a": 1})
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"step": 0.02, "steps": {"plant": 0.03}}, "plant wants steps of 0.03 s, which are no mul"),
+        ({"step": 0.02, "steps": {"plant": 0.01}}, "plant wants steps of 0.01 s, which are no mul"),
+        ({"steps": {"plant": -1.0}}, "step of plant -1.0: must be a positive number of seconds"),
+        ({"steps": {"plnt": 0.1}}, "no component 'plnt'; it has .*; did you mean plant"),
+        ({"steps": {"plant": 0.0123457}}, "want steps of 0.0123457, 0.02 s, which have no step in"),
+    ],
+)
+def test_steps_that_cannot_be_are_refused(options, words):
+    system = replace(load("fig4", NATIVE), step=None)
+    with pytest.raises(InputError, match=words):
+        simulated(system, **options)
+
+
+def test_a_scenario_may_state_order_and_steps(workplace):
+    Path("slow.toml").write_text(
+        'order = "jacobi"\nstop_time = 0.2\n[steps]\ncontroller = 0.04\n', encoding="utf-8"
+    )
+    options = ["--no-figures", "--kind", "native", "--out"]
+    assert main(["run", "slow.toml", *options, "r"]) == 0
+    experiment = json.loads(Path("r/run.json").read_text())["experiment"]
+    assert (experiment["order"], experiment["steps"]["controller"]) == ("jacobi", 0.04)
+    order = ["disturbance", "planner", "controller", "plant"]
+    assert main(["run", "slow.toml", "--order", ",".join(order), *options, "s"]) == 0
+    assert json.loads(Path("s/run.json").read_text())["experiment"]["order"] == order
+
+
+@pytest.mark.parametrize("isolation", [None, Isolation(20.0)])
+def test_no_step_is_logged(folder, isolation):
+    ending = simulate(system_of({"a": relay(folder)}), Experiment(10 * H, H), (), isolation)
+    assert ending.messages == ("a: initialises",)

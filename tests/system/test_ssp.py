@@ -1,0 +1,108 @@
+"""SSP archives of others, run: what stands in them is what happens."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator import load, simulate
+from orchestrator.commands.main import main
+from orchestrator.errors import InputError
+from support.archives import (
+    archive,
+    binding,
+    component,
+    connection,
+    connector,
+    described,
+    system,
+)
+from support.relay import relay
+
+#: When the run begins and ends, and its step [s].
+START, STOP, STEP = 2.0, 4.0, 0.125
+
+EXPERIMENT = (
+    f'<ssd:DefaultExperiment startTime="{START}" stopTime="{STOP}"><ssd:Annotations>'
+    '<ssc:Annotation type="com.opensimulationplatform"><osp:Algorithm xmlns:osp="urn:osp">'
+    f'<osp:FixedStepAlgorithm baseStepSize="{STEP}"/></osp:Algorithm></ssc:Annotation>'
+    "</ssd:Annotations></ssd:DefaultExperiment>"
+)
+
+
+def nested(offset: float) -> str:
+    """A value of 3 goes down into a system, as 2 * 3 + offset, and is integrated there.
+
+    What a parameter set at the top gives to a connector of the inner system is subtracted from it.
+    """
+    inner = system(
+        component("b") + component("c", bindings=binding({"a": 'Real value="10"'})),
+        connection("u", "b.u") + connection("w", "b.v") + connection("b.y", "c.u")
+        + connection("c.g", "y"),
+        connector("u", "input") + connector("w", "input") + connector("y", "output"),
+        name="inner",
+    )  # fmt: skip
+    return system(
+        component("a", bindings=binding({"c": 'Real value="3"'})) + inner + component("d"),
+        connection("a.g", "inner.u", f'<ssc:LinearTransformation factor="2" offset="{offset}"/>')
+        + connection("inner.y", "d.u", '<ssc:LinearTransformation factor="-1"/>'),
+        bindings=binding({"inner.w": 'Real value="4"'}),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def ssp(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An archive with two variants, of which the second is not valid to the letter."""
+    folder = tmp_path_factory.mktemp("ssp")
+    other = described(nested(5.0), after=EXPERIMENT).replace('name="test"', 'name="test" own="1"')
+    files = {"a.fmu": relay(folder), "Other.ssd": other}
+    return archive(folder / "nested.ssp", described(nested(1.0), after=EXPERIMENT), files)
+
+
+@pytest.mark.parametrize("loop", ["python", "compiled"])
+@pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
+def test_nested_system_computes_what_it_says(ssp: Path, order: str, loop: str):
+    """The integral of 2 * 3 + 1 - 4 is a ramp, which is exact in these steps."""
+    result = simulate(ssp, order=order, loop=loop)
+    ramp = (2.0 * 3.0 + 1.0 - 4.0) * (result.time - START)
+    assert (result.time[0], result.time[-1], len(result.time)) == (START, STOP, 17)
+    assert np.array_equal(result["inner.b.y"], ramp)
+    gained, taken = result["inner.c.g"], result["d.u"]
+    assert np.array_equal(gained[1:], 10.0 * ramp[:-1])
+    # Side by side, what follows at once from an input is passed on a step later.
+    late = order == "jacobi"
+    assert np.array_equal(taken[1 + late :], -gained[1 : len(gained) - late])
+
+
+def test_nested_component_is_set_and_shown_by_its_dotted_name(ssp: Path, capsys, tmp_path: Path):
+    out = tmp_path / "out"
+    arguments = ["run", str(ssp), "--out", str(out), "--no-figures", "--columns", "inner.b.*"]
+    assert main([*arguments, "--set", "inner.c.a=7", "--set", "d.c=-1"]) == 0
+    header = (out / "result.csv").read_text().splitlines()[0]
+    assert header == "time,inner.b.u,inner.b.v,inner.b.g,inner.b.y,inner.b.t,inner.b.h"
+    assert simulate(ssp, {"inner.c.a": 7}).parameters["inner.c.a"] == 7.0
+    assert main([*arguments, "--set", "inner.b.u=1"]) == 2
+    assert "inner.b.u is fed by a.g and cannot be set" in capsys.readouterr().err
+
+
+def test_variant_is_run_with_a_warning_or_refused_by_the_strict(ssp: Path, capsys, tmp_path: Path):
+    arguments = ["run", str(ssp), "--out", str(tmp_path / "out"), "--no-figures"]
+    assert main([*arguments, "--variant", "Other"]) == 0
+    # The FMUs have something to say as well.
+    [line] = [text for text in capsys.readouterr().err.splitlines() if ssp.name in text]
+    assert "warning" in line and "attribute 'own' is not allowed" in line
+    assert main([*arguments, "--variant", "Other", "--strict"]) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert "attribute 'own' is not allowed" in line
+    with pytest.warns(UserWarning, match="attribute 'own' is not allowed"):
+        result = simulate(ssp, variant="Other")
+    assert result["inner.b.u"][-1] == 2.0 * 3.0 + 5.0
+    with pytest.raises(InputError, match="attribute 'own' is not allowed"):
+        load(ssp, variant="Other", strict=True)
+
+
+def test_variants_are_for_archives(capsys):
+    assert main(["run", "fig4", "--variant", "B"]) == 2
+    assert "fig4: has no variants" in capsys.readouterr().err

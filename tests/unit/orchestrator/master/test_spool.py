@@ -1,0 +1,65 @@
+"""Rows that are kept in a file count as far as somebody says so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.master.spool import Spool
+
+ROWS = np.random.default_rng(1).normal(size=(10_000, 3))
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A file of all rows, and of a part of one more."""
+    path = tmp_path / "rows.bin"
+    spool = Spool(path, 3)
+    for block in np.split(ROWS, [1, 513, 9000]):
+        assert spool.append(block) is None
+    spool.to_disk()
+    spool.close()
+    path.write_bytes(path.read_bytes() + b"part")
+    return path
+
+
+def read(path: Path) -> np.ndarray:
+    return np.fromfile(path).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("kept", [1, 4096, 4097, 10_000])
+def test_rows_that_count_are_read_again_and_gone_on_with(path: Path, kept: int):
+    spool = Spool(path, 3, kept)
+    assert np.vstack(list(spool.kept())).tobytes() == ROWS[:kept].tobytes()
+    assert spool.append(ROWS[kept:]) is None
+    assert spool.append(ROWS[:5]) is None
+    spool.close()
+    assert read(path).tobytes() == np.vstack((ROWS, ROWS[:5])).tobytes()
+
+
+def test_the_first_number_that_is_another_is_told_once(path: Path):
+    spool = Spool(path, 3, 100)
+    changed = ROWS[100:].copy()
+    changed[2000, 1] += 1e-12
+    changed[2001:] = 0.0
+    told = [spool.append(block) for block in np.array_split(changed, 12)]
+    spool.close()
+    size = len(np.array_split(changed, 12)[0])
+    assert [one for one in told if one] == [(2000 % size, 1)]
+    assert read(path).tobytes() == np.vstack((ROWS[:100], changed)).tobytes()
+
+
+def test_zero_is_not_minus_zero(path: Path):
+    for value in (0.0, -0.0):
+        spool = Spool(path, 3, 5)
+        told = spool.append(np.full((1, 3), value))
+        spool.close()
+    assert told == (0, 0)
+
+
+def test_fewer_rows_than_count_are_refused(path: Path):
+    with pytest.raises(InputError, match="holds fewer than 10,001 rows"):
+        Spool(path, 3, 10_001)

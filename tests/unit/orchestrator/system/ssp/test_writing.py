@@ -1,0 +1,99 @@
+"""What is written is what was read, and valid."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+from fmpy.ssp.ssd import read_ssd, read_ssv
+
+from orchestrator.errors import InputError
+from orchestrator.findings import Findings
+from orchestrator.system.container import write_container
+from orchestrator.system.osp import write_osp
+from orchestrator.system.ssp.reading import read_ssp
+from orchestrator.system.ssp.writing import write_ssp
+from orchestrator.system.structure import System
+from support.archives import (
+    archive,
+    binding,
+    component,
+    connection,
+    connector,
+    described,
+    fmu,
+    system,
+    variable,
+)
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> System:
+    """A system with all that a system may have, two of whose FMUs have one name."""
+    folder = tmp_path_factory.mktemp("fmus")
+    (folder / "other").mkdir()
+    ports = (
+        variable("y", "output", unit="degC"), variable("n", "output", "Enumeration"),
+        variable("b", "output", "Boolean"), variable("m", "input", "Enumeration"),
+        variable("c", "input", "Boolean"), variable("k", "parameter", "Enumeration"),
+        variable("t", "parameter", "String"),
+    )  # fmt: skip
+    files = {
+        "a.fmu": fmu(folder / "a.fmu", variable("u", "input", unit="K"), *ports),
+        "x/a.fmu": fmu(folder / "other" / "a.fmu", variable("u", "input", unit="degC"), *ports),
+    }
+    hint = '<ssd:Annotations><ssc:Annotation type="x"><StepSizeHint value="0.5"/></ssc:Annotation>'
+    inner = system(
+        component("a b", "x/a.fmu", binding({"k": 'Enumeration value="fast"'})).replace(
+            "</ssd:Component>", f"{hint}</ssd:Annotations></ssd:Component>"
+        ),
+        connection("u", "a b.u"), connector("u", "input", "K"), name="inner",
+    )  # fmt: skip
+    top = system(
+        component("a", bindings=binding({"t": 'String value="x &amp; y"'})) + inner,
+        connection("a.y", "inner.u", '<ssc:LinearTransformation factor="2"/>')
+        + connection("a.y", "a.u", suppressUnitConversion="true")
+        + connection(
+            "a.n", "a.m",
+            '<ssc:IntegerMappingTransformation><ssc:MapEntry source="2" target="5"/>'
+            "</ssc:IntegerMappingTransformation>")
+        + connection(
+            "a.b", "a.c",
+            '<ssc:BooleanMappingTransformation><ssc:MapEntry source="true" target="false"/>'
+            "</ssc:BooleanMappingTransformation>"),
+    )  # fmt: skip
+    text = described(top, after='<ssd:DefaultExperiment startTime="2" stopTime="3"/>')
+    return read_ssp(archive(folder / "all.ssp", text, files))
+
+
+def test_system_that_is_written_and_read_is_the_same(found: System, tmp_path: Path):
+    [path] = write_ssp(found, tmp_path)
+    findings = Findings(strict=True)
+    again = read_ssp(path, findings=findings)
+    assert again.connections == found.connections
+    assert again.parameters == found.parameters
+    assert again.steps == found.steps == {"inner.a b": 0.5}
+    assert (again.start_time, again.stop_time) == (2.0, 3.0)
+    contents = [
+        {name: part.fmu.read_bytes() for name, part in one.components.items()}
+        for one in (found, again)
+    ]
+    assert contents[0] == contents[1]
+
+
+def test_what_is_written_is_valid(found: System, tmp_path: Path):
+    """fmpy holds it against the schemas of SSP 1.0."""
+    [path] = write_ssp(found, tmp_path)
+    read_ssd(str(path))
+    with ZipFile(path) as content:
+        sets = [name for name in content.namelist() if name.endswith(".ssv")]
+    assert len(sets) == 2
+    for name in sets:
+        read_ssv(str(path), name)
+
+
+def test_formats_without_words_for_a_transformation_refuse_it(found: System, tmp_path: Path):
+    for write in (write_osp, write_container):
+        with pytest.raises(InputError, match="write an SSP"):
+            write(found, tmp_path)

@@ -1,0 +1,65 @@
+"""Units are converted as their definitions say, and transformations follow each other."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orchestrator.errors import InputError
+from orchestrator.system.transformation import Linear, Mapped, chained
+from orchestrator.system.units import UndefinedUnit, Unit, conversion
+
+LENGTH, TEMPERATURE = (0, 1, 0, 0, 0, 0, 0, 0), (0, 0, 0, 0, 1, 0, 0, 0)
+M, INCH = Unit("m", LENGTH), Unit("inch", LENGTH, 0.0254)
+KELVIN, CELSIUS = Unit("K", TEMPERATURE), Unit("degC", TEMPERATURE, 1.0, 273.15)
+FAHRENHEIT = Unit("degF", TEMPERATURE, 5 / 9, 273.15 - 32 * 5 / 9)
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "value", "expected"),
+    [
+        (INCH, M, 100.0, 2.54),
+        (M, INCH, 2.54, 100.0),
+        (CELSIUS, KELVIN, 25.0, 298.15),
+        (CELSIUS, FAHRENHEIT, 100.0, 212.0),
+        (FAHRENHEIT, CELSIUS, -40.0, -40.0),
+    ],
+)
+def test_conversion_is_the_one_of_the_tables(source, target, value, expected):
+    converted = conversion(source, target)
+    assert converted is not None
+    assert converted(value) == pytest.approx(expected, rel=1e-12)
+
+
+def test_equal_units_and_unknown_ones_leave_a_value_as_it_is():
+    metre = Unit("metre", LENGTH)
+    for source, target in ((M, M), (M, metre), (None, M), (M, None), (Unit("?"), Unit("?"))):
+        assert conversion(source, target) is None
+
+
+def test_units_of_different_things_are_refused():
+    with pytest.raises(InputError, match="units differ, m and K"):
+        conversion(M, KELVIN)
+    with pytest.raises(UndefinedUnit, match=r"units differ, m and \?, and nothing defines \?"):
+        conversion(M, Unit("?"))
+
+
+NUMBERS = st.integers(-9, 9).map(float)
+LINEARS = st.builds(Linear, NUMBERS, NUMBERS)
+TABLES = st.dictionaries(NUMBERS, NUMBERS, max_size=5).map(
+    lambda pairs: Mapped(tuple(pairs.items()))
+)
+
+
+@given(st.tuples(LINEARS, LINEARS) | st.tuples(TABLES, TABLES), NUMBERS)
+def test_chained_transformations_are_one_after_the_other(both, value):
+    first, then = both
+    whole = chained(first, then)
+    assert whole is not None
+    assert whole(value) == then(first(value))
+
+
+def test_line_and_table_do_not_follow_each_other():
+    with pytest.raises(InputError, match="follow each other"):
+        chained(Linear(2.0), Mapped(((1.0, 2.0),)))
