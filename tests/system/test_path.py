@@ -34,7 +34,7 @@ def test_controllers_follow_the_survey_and_get_closer(native: Path, name: str, f
 
 
 @pytest.mark.parametrize("kind", ["dist", "native"])
-@pytest.mark.parametrize("step", [0.02, 0.7])
+@pytest.mark.parametrize("step", [0.1, 0.7])
 def test_fmu_gives_the_closed_form_at_whatever_step(request, kind: str, step: float):
     """Also where a step leads over whole roundings."""
     folder = request.getfixturevalue(kind)
