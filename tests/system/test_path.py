@@ -20,17 +20,18 @@ from support.runs import run
 TABLE = "t,x,y,z\n3,3,6,0\n23,13,6,2\n33,13,6,2\n60,13,16,2\n"
 
 
-@pytest.mark.parametrize(("name", "farthest"), [("path", 0.75), ("path-pd", 1.1)])
-def test_controllers_follow_the_survey_and_get_closer(native: Path, name: str, farthest: float):
-    """The start is 0.65 m away; each pair of corners is followed more closely than that before."""
+@pytest.mark.parametrize(
+    ("name", "distances", "peak"), [("path", (0.65, 0.32), 47.0), ("path-pd", (0.84, 0.41), 29.0)]
+)
+def test_controllers_follow_the_survey_as_its_remark_says(native: Path, name, distances, peak):
+    """In the first pair of corners, and in the second."""
     result = run(closed_loop(native, read_scenario(name)), 100.0, 0.02)
     assert result.failure is None
-    distances = np.linalg.norm(tracking_error(result), axis=1)
-    first, second = (
-        distances[(result.time > a) & (result.time < b)].max() for a, b in ((25, 50), (55, 80))
-    )
-    assert farthest > first > 1.5 * second
-    assert distances[-250:].max() < 0.05
+    away = np.linalg.norm(tracking_error(result), axis=1)
+    corners = [away[(result.time > a) & (result.time < b)].max() for a, b in ((25, 50), (55, 80))]
+    assert corners == pytest.approx(distances, abs=0.006)
+    assert np.abs(result["controller.tau.u"]).max() == pytest.approx(peak, abs=0.5)
+    assert away[-250:].max() < 0.05
 
 
 @pytest.mark.parametrize("kind", ["dist", "native"])
