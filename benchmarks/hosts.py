@@ -41,14 +41,14 @@ from orchestrator.system.ssp.reading import read_ssp
 from orchestrator.system.structure import System
 
 #: Rounds, steps of a run, and the longest that the steps of one run shall take [s].
-ROUNDS, STEPS, LONGEST = 9, 10_000, 0.5
+ROUNDS, STEPS, LONGEST = 9, 10_000, 0.3
 
 #: Steps that the length of a run is found with, and runs of one step, the shortest of which is
 #: taken off.
 FIRST, SET_UPS = 500, 5
 
 #: How long a pair may take [s].
-PATIENCE = 120
+PATIENCE = 60
 
 #: First argument of this script where it times one pair.
 _PAIR = "--pair"
@@ -184,18 +184,15 @@ def main() -> None:
         if not files:
             bundle.build(Path(folder), kind=NATIVE)
             files = [*sorted(Path(folder).glob("*.fmu")), Path(folder, "auv.ssp")]
-        lines: list[tuple[float, str]] = []
         left_out = 0
         for path in files:
             for host in HOSTS[path.suffix]:
                 if found := measured(path, host):
                     here, there = (1e6 * found[key] for key in ("here", "there"))
                     text = f"{path.name:44} {here:9.2f} us here {there:9.2f} us in {host:9}"
-                    lines.append((found["ratio"], f"{text} {found['ratio']:6.3f}"))
+                    print(f"{text} {found['ratio']:6.3f}", flush=True)
                 else:
                     left_out += 1
-    for _, line in sorted(lines):
-        print(line)
     print(f"{left_out} pairs of a file and a host of which one does not run")
 
 

@@ -88,12 +88,12 @@ def collect(folder: Path) -> list[Item]:
     found: dict[str, Item] = {}
     for place, commit in PLACES.items():
         for item, content in _items(_Clone(folder / "clones" / place, place, commit)):
-            key = hashlib.sha256(content).hexdigest() if content else f"{place} {item.path}"
+            key = hashlib.sha256(content).hexdigest() if content is not None else item.name
             if key in found:
                 found[key] = replace(found[key], copies=found[key].copies + 1)
                 continue
             found[key] = item
-            if content:
+            if content is not None:
                 file = folder / item.file
                 file.parent.mkdir(parents=True, exist_ok=True)
                 file.write_bytes(content)
@@ -121,30 +121,28 @@ class _Clone:
             subprocess.run(["git", "clone", *options, address, str(folder)], check=True)
         self.paths = self._git("ls-tree", "-r", "-z", "--name-only", commit).decode().split("\0")
 
-    def read(self, path: str) -> bytes:
-        """A file; empty where it cannot be had."""
-        return self._git("show", f"{self._commit}:{path}", check=False)
+    def read(self, path: str) -> bytes | None:
+        """A file; None where it cannot be had."""
+        try:
+            return self._git("show", f"{self._commit}:{path}")
+        except subprocess.CalledProcessError:
+            return None
 
-    def _git(self, *arguments: str, check: bool = True) -> bytes:
+    def _git(self, *arguments: str) -> bytes:
         command = ["git", "-C", str(self._folder), *arguments]
-        return subprocess.run(
-            command,
-            check=check,
-            stdout=subprocess.PIPE,
-            stderr=None if check else subprocess.DEVNULL,
-        ).stdout
+        return subprocess.run(command, check=True, capture_output=True).stdout
 
 
-def _items(clone: _Clone) -> Iterator[tuple[Item, bytes]]:
-    """What a repository has, with its content; empty content: it could not be had."""
+def _items(clone: _Clone) -> Iterator[tuple[Item, bytes | None]]:
+    """What a repository has, with its content; None: it could not be had."""
     structures: dict[PurePosixPath, list[str]] = {}
     for path in map(PurePosixPath, clone.paths):
         if path.suffix in (_FMU, _SSP):
             content = clone.read(str(path))
             kind = "fmus" if path.suffix == _FMU else "archives"
-            file = f"{kind}/{clone.place}/{path}" if content else ""
+            file = "" if content is None else f"{kind}/{clone.place}/{path}"
             yield Item(clone.place, str(path), file), content
-            if path.suffix == _SSP and content:
+            if path.suffix == _SSP and content is not None:
                 yield from _inside(clone, path, content)
         elif path.suffix == _STRUCTURE:
             structures.setdefault(path.parent, []).append(path.name)
@@ -173,7 +171,11 @@ def _archived(
     """What a folder's archive has in it: all that is below it, but for other archives."""
     for path in map(PurePosixPath, clone.paths):
         nearest = next((p for p in path.parents if p in folders), None)
-        if nearest == parent and path.suffix != _SSP and (content := clone.read(str(path))):
+        if (
+            nearest == parent
+            and path.suffix != _SSP
+            and (content := clone.read(str(path))) is not None
+        ):
             yield str(path.relative_to(parent)), content
 
 

@@ -23,6 +23,18 @@ EXPLANATIONS: Mapping[tuple[str, str], str] = {
     ("/0004_Atmos.fmu", _HOST): "its output `CPUtime` is the processor's",
 }
 
+#: Reasons why something does not run, and what of a message stands for each; the first counts.
+_REASONS = {
+    "of another version of FMI": r"is of FMI",
+    "for model exchange": r"model exchange|ModelExchange",
+    "without a binary for this machine": r"for this machine",
+    "with FMUs outside of the archive": r"lies outside|is elsewhere",
+    "without a file that it names": r"holds no '",
+    "without any FMU": r"holds no component",
+    "with a library that does not load or instantiate here": r"cannot be (loaded|instantiated)",
+    "not valid": "",
+}
+
 #: What came of a file, in the words of the page.
 _OUTCOMES = {
     "refused": "refused",
@@ -37,8 +49,8 @@ _HEAD = """\
 and every SSP archive in them, runs each in a process of its own, and writes this page. Archives are
 run unchanged, in the default order, for {steps} steps or to the end that they name, whichever comes
 first; a folder with a `SystemStructure.ssd` is zipped as it is, and each further `.ssd` in it is an
-archive of its own. FMUs are run alone, for {steps} steps of their own step size, with all inputs at
-their start values. What holds the same bytes is counted once.
+archive of its own. FMUs are run alone, for {steps} steps of the size that they name, else of 20 ms,
+with all inputs at their start values. What holds the same bytes is counted once.
 
 Systems that libcosim or ecos can run as well are held against them in Jacobi order, with the same
 steps: as they are, and in libcosim also as `auv-fmu export --format osp` writes what we have read.
@@ -75,10 +87,7 @@ def _archives(archives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         tools = one.get("tools", {})
         cells = (_compared(one, tool, tools.get(tool, "")) for tool in TOOLS)
         yield f"| {_name(one)} | {one['rows']} | {' | '.join(cells)} | {_said(one['said'])} |"
-    yield "\nThese do not:\n\n| archive | why |\n| --- | --- |"
-    for one in there:
-        if one["outcome"] != "runs":
-            yield f"| {_name(one)} | {_why(one)} |"
+    yield from _not_running("archive", there)
 
 
 def _said(lines: Sequence[str]) -> str:
@@ -105,6 +114,20 @@ def _explained(one: Mapping[str, Any], tool: str) -> str:
     return why[0] if why else "**not explained**"
 
 
+def _not_running(what: str, files: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Those that do not run, by their reasons."""
+    grouped: dict[str, list[Mapping[str, Any]]] = {reason: [] for reason in _REASONS}
+    for one in files:
+        if one["outcome"] != "runs":
+            found = (name for name, part in _REASONS.items() if re.search(part, one["reason"]))
+            grouped[next(found)].append(one)
+    counts = (f"{len(members)} {reason}" for reason, members in grouped.items() if members)
+    yield f"\nThe others, {', '.join(counts)}:\n\n| {what} | why |\n| --- | --- |"
+    for members in grouped.values():
+        for one in members:
+            yield f"| {_name(one)} | {_why(one)} |"
+
+
 def _fmus(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     there = [one for one in fmus if one["outcome"] != "absent"]
     running = [one for one in there if one["outcome"] == "runs"]
@@ -117,10 +140,7 @@ def _fmus(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     for one in running:
         if isinstance(one["deviation"], float) and not one["deviation"] <= FMU_BOUND:
             yield f"- {_name(one)} deviates by {one['deviation']:.1e}: {_explained(one, _HOST)}.\n"
-    yield "| FMUs that do not run | why |\n| --- | --- |"
-    for one in there:
-        if one["outcome"] != "runs":
-            yield f"| {_name(one)} | {_why(one)} |"
+    yield from _not_running("FMU", there)
 
 
 def _equal(numbers: Iterable[float]) -> int:
@@ -136,13 +156,15 @@ def _parameters(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     changed = [one for one in fmus if "changed" in one and one["changed"].get("wanted") != 0]
     ran = [one for one in changed if one["changed"]["outcome"] == "runs"]
     lost = [one for one in ran if one["changed"]["lost"]]
-    silent = sum(bool(one["changed"]["silent"]) for one in lost)
+    silent = [one for one in lost if one["changed"]["silent"]]
     yield (
         f"\n## Parameters\n\n{len(changed)} of the FMUs that run have Real parameters. All of an "
-        "FMU's were changed at once, by a hundredth, and read back after initialisation: "
-        f"{len(ran) - len(lost)} hold all that they were given, {len(lost)} do not, which is said "
-        f"of {len(lost) - silent} of them, and {len(changed) - len(ran)} do not run with these "
-        "values.\n"
+        "FMU's were changed at once, by a hundredth, and read back after initialisation.\n\n"
+        "| FMUs | how many |\n| --- | --: |\n"
+        f"| that hold all that they were given | {len(ran) - len(lost)} |\n"
+        f"| that do not, which is said | {len(lost) - len(silent)} |\n"
+        f"| that do not, in silence | {len(silent)} |\n"
+        f"| that do not run with these values | {len(changed) - len(ran)} |\n"
     )
     numbers = [one["changed"].get("deviation") for one in ran]
     compared = [number for number in numbers if isinstance(number, float)]
@@ -184,7 +206,9 @@ def _name(one: Mapping[str, Any]) -> str:
 
 
 def _why(one: Mapping[str, Any]) -> str:
-    return f"{_OUTCOMES[one['outcome']]}: {_cell(one['reason'])}"
+    # Alone, an FMU has the name of its file.
+    reason = re.sub(r"^fmu: (\S+\.fmu )?", "", one["reason"])
+    return f"{_OUTCOMES[one['outcome']]}: {_cell(reason)}"
 
 
 def _cell(text: str) -> str:

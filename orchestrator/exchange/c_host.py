@@ -67,7 +67,12 @@ def plan(system: System, experiment: Experiment, library: Library = library_of) 
         experiment: whose steps are all of one length.
         library: where the library of an FMU is; beside its folder `binaries` is `resources`.
 
+    Raises:
+        InputError: it asks for what the host does not do.
+
     """
+    if system.steps or any(connection.transformation for connection in system.connections):
+        raise InputError("the C program has one step for all components, and no transformations")
     columns: dict[PortName, int] = {}
     lines = [f"step {experiment.step!r}", f"steps {experiment.full_steps}"]
     for component in system.components.values():

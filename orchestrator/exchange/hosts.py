@@ -237,7 +237,8 @@ def compare(system: System, hosts: Sequence[str], steps: int, step: float) -> li
 
     """
     expected = Table()
-    completed(system, Experiment(steps * step, step, "jacobi"), [expected])
+    start = system.start_time or 0.0
+    completed(system, Experiment(start + steps * step, step, "jacobi", start), [expected])
     names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
     table = expected.group(*names)[1:]
     return [_verdict(system, host, steps, step, names, table) for host in hosts]

@@ -68,7 +68,8 @@ def _complaint(table: ForeignTable, system: System, order: str, tolerance: float
     stop_time = float(table.time[-1])
     ours = _Samples(table.time, tuple(table.columns))
     try:
-        completed(system, Experiment(stop_time, system.step or DEFAULT_STEP, order), [ours])
+        step, start_time = system.step or DEFAULT_STEP, system.start_time or 0.0
+        completed(system, Experiment(stop_time, step, order, start_time), [ours])
     except InputError as error:
         return f"our own run fails: {error}"
     return _first_difference(table.time, table.columns, ours.values, tolerance)

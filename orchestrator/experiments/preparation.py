@@ -198,13 +198,15 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
         InputError: something about the request cannot be done.
 
     """
+    findings = Findings(request.strict)
     system = system.with_parameters(request.parameters)
     course, inputs = None, _first_given(request.inputs, scenario.inputs)
     if inputs is not None:
         given = set(request.parameters)
         if request.inputs is None:
             given |= set(scenario.parameters)
-        system, course = read_inputs(inputs, system, given)
+        with findings.collecting():
+            system, course = read_inputs(inputs, system, given)
     system.check()
     events = scenario.events
     if request.events is not None:
@@ -223,14 +225,14 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     experiment = Experiment(stop_time, step, order, system.start_time or 0.0)
     paces(system, step)
     stages(system, order)
-    findings = Findings(request.strict)
+    with findings.collecting():
+        happening = read_events(scenario.name, events, replace(system, step=step))
     for delay in delays(system, order):
         findings.note(delay)
     findings.refuse()
     loop = chosen(request.loop, experiment, request.isolation)
     if request.real_time is not None:
         check_factor(request.real_time)
-    happening = read_events(scenario.name, events, replace(system, step=step))
     return Prepared(
         scenario,
         system,

@@ -72,6 +72,7 @@ def write_record(
         **clock.times(),
         "failure": ending.failure,
         "remark": ending.remark,
+        "messages": list(ending.messages),
         "experiment": {
             "stop_time": experiment.stop_time,
             "step": experiment.step,
@@ -80,6 +81,7 @@ def write_record(
             "steps": dict(prepared.system.steps),
         },
         "loop": header.loop,
+        "texts": sorted(header.texts),
         **(remarks or {}),
         "events": [occurrence._asdict() for occurrence in ending.events],
         "fmus": {

@@ -25,6 +25,7 @@ from orchestrator.experiments.inputs import Inputs
 from orchestrator.experiments.named import names_in, path_of
 from orchestrator.experiments.waypoints import ENTRIES as PATH
 from orchestrator.experiments.waypoints import PLANNER, path_parameters
+from orchestrator.findings import Findings
 from orchestrator.master.experiment import Order
 from orchestrator.reading import explained, text_of
 from orchestrator.system.names import PortName, port_name
@@ -114,14 +115,14 @@ ENTRIES: dict[str, Entry] = {
         "number",
         is_number,
         "Communication step [s].",
-        "the longest that fits into the steps of all components, which are 0.02 s",
+        "0.02 s",
     ),
     "steps": Entry(
         "table of numbers",
         _is_table_of_numbers,
         "Components that take longer steps of their own, as `component = step` [s], a multiple of "
         "the communication step. Meanwhile they hold their inputs.",
-        "those that the FMUs were made for, where there is no `step`",
+        "none",
     ),
     "order": Entry(
         "name, or list of names",
@@ -207,7 +208,17 @@ def read_scenario(name: str) -> Scenario:
 
 def _scenario(path: Path, text: str) -> Scenario:
     content = tomllib.loads(text)
-    check_entries(path, content, ENTRIES)
+    findings = Findings()
+    with findings.collecting():
+        check_entries(path, content, ENTRIES)
+    if _are_tables(events := content.get("events", ())):
+        with findings.collecting():
+            check_events(path, events)
+    inputs = content.get("inputs", {})
+    if is_table(inputs) and inputs:
+        with findings.collecting():
+            content["inputs"] = _inputs(path, inputs)
+    findings.refuse()
     content["parameters"] = {
         port_name(key): value for key, value in flattened(content.get("parameters", {}))
     }
@@ -220,12 +231,6 @@ def _scenario(path: Path, text: str) -> Scenario:
     }
     if content.get("compare", "").endswith(".toml"):
         content["compare"] = str(path.parent / content["compare"])
-    check_events(path, content.get("events", ()))
-    if inputs := content.get("inputs"):
-        check_entries(f"{path}: inputs", inputs, INPUTS)
-        if "file" not in inputs:
-            raise InputError(f"{path}: inputs: name a file")
-        content["inputs"] = Inputs(**{**inputs, "file": path.parent / inputs["file"]})
     return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
 
 
@@ -240,3 +245,10 @@ def _path_parameters(
     for name in found.keys() & others.keys():
         raise InputError(f"{path}: {name} is given by {said['file']} already")
     return found
+
+
+def _inputs(path: Path, table: Mapping[str, Any]) -> Inputs:
+    check_entries(f"{path}: inputs", table, INPUTS)
+    if "file" not in table:
+        raise InputError(f"{path}: inputs: name a file")
+    return Inputs(**{**table, "file": path.parent / table["file"]})

@@ -41,7 +41,9 @@ def read_result(path: Path, watched: Choice | None = None) -> tuple[str, Table]:
     """
     file = table_in(path)
     record = read_record(file)
-    columns, blocks = read_columns(file), read_rows(file)
+    texts = record.get("texts", [])
+    columns = tuple(name for name in read_columns(file) if name not in texts)
+    blocks = read_rows(file, texts)
     first = next(blocks, None)
     if first is None:
         raise InputError(f"{file}: has no rows")
@@ -85,6 +87,7 @@ def read_record(table: Path) -> dict[str, Any]:
             if table.name not in record["files"]:
                 return {}
             header, _ = read_header(record, ()), read_ending(record)
+            frozenset(record.get("texts", []))
         except (KeyError, TypeError, AttributeError):
             raise ValueError("it lacks what a run writes") from None
         if not all(map(_is_value, header.parameters.values())):

@@ -62,6 +62,7 @@ class Library:
         fmu: fmpy's view of it.
         corrupted: whether one of them has ended with fmi2Fatal: FMI then forbids every further
             call, also for the others, even to free them.
+        runs_python: whether PythonFMU has made it.
         is_akin: whether it is made by this program or PythonFMU: nothing is left in it of an
             instance, and of each step that it refuses it says that it wants to terminate.
         users: how many there are.
@@ -88,7 +89,8 @@ class Library:
         except Exception as error:
             raise InputError(f"{named(component)} cannot be loaded: {reason(error)}") from error
         tool = component.description.generationTool or ""
-        self.is_akin = tool.startswith(_OWN) or runs_python(folder)
+        self.runs_python = runs_python(folder)
+        self.is_akin = tool.startswith(_OWN) or self.runs_python
         self.corrupted, self.users = False, 0
 
 
@@ -109,7 +111,7 @@ def check_binary(component: Component, folder: Path) -> None:
     file = f"{identifier}{fmpy.sharedLibraryExtension}"
     if (binaries / fmpy.platform / file).is_file():
         return
-    others = sorted(path.parent.name for path in binaries.glob(f"*/{glob.escape(identifier)}.*"))
+    others = sorted({path.parent.name for path in binaries.glob(f"*/{glob.escape(identifier)}.*")})
     there = f"binaries for {', '.join(others)} alone" if others else "no binaries at all"
     raise InputError(
         f"{named(component)} has no {file} for this machine, {fmpy.platform}: it has {there}"

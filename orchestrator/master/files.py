@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from importlib.util import find_spec
 from io import StringIO
-from itertools import islice
+from itertools import compress, islice
 from pathlib import Path
 from typing import IO, Any
 
@@ -187,8 +187,12 @@ def read_columns(path: Path) -> tuple[str, ...]:
             return _behind_time(next(csv.reader(lines), ()))
 
 
-def read_rows(path: Path) -> Iterator[np.ndarray]:
+def read_rows(path: Path, texts: Collection[str] = ()) -> Iterator[np.ndarray]:
     """The rows of a file, time first, some thousand at a time.
+
+    Args:
+        path: of the file.
+        texts: columns that hold texts, and are left out.
 
     Raises:
         InputError: the file is no table of a run.
@@ -197,9 +201,18 @@ def read_rows(path: Path) -> Iterator[np.ndarray]:
     with _explained(path):
         if path.suffix == ".parquet":
             with _parquet(path) as file:
-                for batch in file.iter_batches(_ROWS):
+                names = [name for name in file.schema_arrow.names if name not in texts]
+                for batch in file.iter_batches(_ROWS, columns=names):
                     columns = [column.to_numpy(zero_copy_only=False) for column in batch.columns]
                     yield np.column_stack(columns).astype(float, copy=False)
+        elif texts:
+            with lines_of(path, newline="") as lines:
+                table = csv.reader(lines)
+                kept = [name not in texts for name in next(table, ())]
+                while records := list(islice(filter(None, table), _ROWS)):
+                    if any(len(record) != len(kept) for record in records):
+                        raise ValueError(f"a row has not {len(kept)} values, as there are names")
+                    yield np.array([list(map(float, compress(it, kept))) for it in records])
         else:
             with lines_of(path) as lines:
                 width = 1 + len(_behind_time(next(csv.reader(lines), ())))

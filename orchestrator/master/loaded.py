@@ -45,7 +45,7 @@ from orchestrator.master.log import Listener
 from orchestrator.master.texts import Texts
 from orchestrator.master.transfer import Block, text_of
 from orchestrator.system.component import Component
-from orchestrator.system.unpacking import runs_python, unpacked
+from orchestrator.system.unpacking import unpacked
 from orchestrator.system.values import Value
 
 #: FMI's categories of messages about what goes wrong (FMI 2.0.4, section 2.2.4).
@@ -190,7 +190,7 @@ class LoadedInstance:
         gives the reasons of a failure no category.
         """
         self._call("exitInitializationMode")
-        if not runs_python(Path(self._fmu.unzipDirectory)):
+        if not self._library.runs_python:
             with suppress(FMICallException):
                 self._fmu.setDebugLogging(bool(self._logged), self._logged)
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from contextlib import suppress
 from math import isfinite
 
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from orchestrator.errors import InputError
 from orchestrator.master.instance import Instance, Part
 from orchestrator.master.texts import Texts
 from orchestrator.master.transfer import KINDS
@@ -84,10 +82,9 @@ class Row:
                 name = PortName(component, port.name)
                 self.columns[name] = i
                 self._outputs += [name] * (causality == "output")
-                self.text_ports |= {name} if kind == "String" else set()
-                # A description may have nonsense there, which is of no use to anybody.
-                with suppress(InputError):
-                    self.enter({name: system.components[component].start(port.name) or 0.0})
+                if kind == "String":
+                    self.text_ports.add(name)
+                self.values[i] = self.number(system.components[component].starts.get(port.name, 0))
         for component, instance in instances.items():
             part = self.values[firsts.get(component, 0) :]
             instance.tie(part, parts[component], self.texts)
@@ -110,6 +107,8 @@ class Row:
             components: in the order in which they are stepped: others may have passed it on.
 
         """
+        if np.isfinite(self.shown).all():
+            return None
         for component in components:
             for port in self._outputs:
                 value = self.values[self.columns[port]]

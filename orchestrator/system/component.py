@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -82,6 +83,16 @@ class Component:
         if variable.start is None:
             return None
         return typed(f"{self.name}.{name}", variable, variable.start)
+
+    @cached_property
+    def starts(self) -> dict[str, Value]:
+        """Start values that the description names, but for nonsense, of use to nobody."""
+        values: dict[str, Value] = {}
+        for name in self.variables:
+            with suppress(InputError):
+                value = self.start(name)
+                values |= {} if value is None else {name: value}
+        return values
 
     def is_settable(self, name: str) -> bool:
         """Whether a variable takes a value before the first step (FMI 2.0.4, section 2.2.7).

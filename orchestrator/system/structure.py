@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from orchestrator.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, splits
-from orchestrator.system.transformation import Transformation
+from orchestrator.system.transformation import Linear, Transformation
 from orchestrator.system.units import conversion, unit_of_port
 from orchestrator.system.values import Value, type_of, typed, unit_of
 
@@ -199,6 +199,8 @@ class System:
                 )
         if type_of(a) not in (type_of(b), *_FED_FROM.get(type_of(b), ())):
             raise InputError(f"{source} -> {target}: cannot feed {a.type} into {b.type}")
+        if connection.transformation not in (None, Linear()):
+            _check_transformed(connection, type_of(b))
         if connection.transformation is not None or unit_of(a) == unit_of(b):
             return
         units = unit_of_port(starts, source.port), unit_of_port(ends, target.port)
@@ -209,3 +211,13 @@ class System:
         if converted is not None:
             names = " and ".join(unit.name for unit in units if unit)
             raise InputError(f"{source} -> {target}: units differ, {names}")
+
+
+def _check_transformed(connection: Connection, kind: str) -> None:
+    """Refuse to compute with what is no number, and to make fractions of what has none."""
+    linear = isinstance(connection.transformation, Linear)
+    if kind == "String" or (linear and kind != "Real"):
+        how = "transformed linearly" if linear else "mapped"
+        raise InputError(
+            f"{connection.source} -> {connection.target}: a value of type {kind} cannot be {how}"
+        )

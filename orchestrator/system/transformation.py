@@ -46,8 +46,12 @@ def chained(first: Transformation | None, then: Transformation | None) -> Transf
         InputError: one is linear, and the other a table.
 
     """
-    if first is None or then is None:
-        return first or then
+    # One that says that nothing happens is kept where there is no other.
+    for nothing in (None, Linear()):
+        if first == nothing:
+            return then
+        if then == nothing:
+            return first
     if isinstance(first, Linear) and isinstance(then, Linear):
         return Linear(then.factor * first.factor, then(first.offset))
     if isinstance(first, Mapped) and isinstance(then, Mapped):

@@ -10,6 +10,7 @@
 
 #define HAS_STRINGS
 #define HAS_STATUS
+#define HAS_STATE
 #include "slave.h"
 
 /* Value references, of variables of any kind. */
@@ -117,7 +118,7 @@ Status fmi2SetString(Component c, const unsigned *r, size_t n, const char *const
 Status fmi2GetString(Component c, const unsigned *r, size_t n, const char **values)
 {
     Instance *it = c;
-#ifdef SPEAKS
+#if defined SPEAKS || defined FORGETS
     if (it->steps)
         snprintf(it->texts[Y], sizeof it->texts[Y], "%s%d %s", it->name, it->steps, it->texts[U]);
     else
@@ -148,6 +149,50 @@ Status fmi2DoStep(Component c, double t, double h, int no_rollback)
     it->asked = 0;
     return PENDING;
 #endif
+    return OK;
+}
+
+/* A state is a copy; who forgets does not take the number of its steps from it. */
+Status fmi2GetFMUstate(Component c, void **state)
+{
+    *state = memcpy(malloc(sizeof(Instance)), c, sizeof(Instance));
+    return OK;
+}
+
+Status fmi2SetFMUstate(Component c, void *state)
+{
+    Instance *it = c, own = *it;
+    memcpy(it, state, sizeof *it);
+    it->name = own.name;
+    it->callbacks = own.callbacks;
+#ifdef FORGETS
+    it->steps = own.steps;
+#endif
+    return OK;
+}
+
+Status fmi2FreeFMUstate(Component c, void **state)
+{
+    free(*state);
+    *state = NULL;
+    return OK;
+}
+
+Status fmi2SerializedFMUstateSize(Component c, void *state, size_t *size)
+{
+    *size = sizeof(Instance);
+    return OK;
+}
+
+Status fmi2SerializeFMUstate(Component c, void *state, char bytes[], size_t size)
+{
+    memcpy(bytes, state, size);
+    return OK;
+}
+
+Status fmi2DeSerializeFMUstate(Component c, const char bytes[], size_t size, void **state)
+{
+    *state = memcpy(malloc(size), bytes, size);
     return OK;
 }
 

@@ -24,6 +24,7 @@ const char *fmi2GetVersion(void) { return "2.0"; }
 ABSENT(fmi2GetString)
 ABSENT(fmi2SetString)
 #endif
+#ifndef HAS_STATE
 ABSENT(fmi2GetFMUstate)
 ABSENT(fmi2SetFMUstate)
 ABSENT(fmi2FreeFMUstate)
@@ -31,6 +32,7 @@ ABSENT(fmi2SerializedFMUstateSize)
 ABSENT(fmi2SerializeFMUstate)
 #ifndef LACKS
 ABSENT(fmi2DeSerializeFMUstate)
+#endif
 #endif
 ABSENT(fmi2GetDirectionalDerivative)
 ABSENT(fmi2SetRealInputDerivatives)

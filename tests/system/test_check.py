@@ -101,7 +101,7 @@ def test_missing_binary_is_said(dist, workplace, capsys):
 
 
 def test_archive_may_leave_the_stop_time_open(dist, workplace, capsys):
-    path = changed(dist / "auv.ssp", (' stopTime="100.0"', ''))
+    path = changed(dist / "auv.ssp", (' stopTime="100.0"', ""))
     assert main(["check", str(path)]) == 0
     assert "--stop-time" in lines(capsys)[0]
 

@@ -16,6 +16,9 @@ from orchestrator.commands.main import main
 from orchestrator.experiments.bundle import current_fmus
 from orchestrator.master.attendant import Run
 from orchestrator.master.checkpoint import Checkpoints
+from orchestrator.master.observer import Ending
+from orchestrator.system.structure import System
+from support import others
 from support.machine import LOOPS, contents, ended, eventually, forked, killed_at, start
 from support.mixed import Shape, build
 
@@ -241,6 +244,55 @@ def test_what_would_be_lost_or_was_damaged_is_refused(left, capsys):
     Path("r/checkpoint/state.json").write_text("{}")
     assert run(*LEFT, "--resume", out="r") == 2
     assert "r/checkpoint/state.json: no checkpoint" in capsys.readouterr().err
+
+
+WITH_STATES = (
+    'canHandleVariableCommunicationStepSize="true" canGetAndSetFMUstate="true" '
+    'canSerializeFMUstate="true"'
+)
+
+
+def stopped(system: System, stop_time: float = 2.0) -> None:
+    """Run a system in a process that is killed when it has made its last step."""
+
+    def doomed() -> None:
+        def kill(self: Checkpoints, ending: Ending) -> None:
+            self._spool.to_disk()
+            os.kill(os.getpid(), signal.SIGKILL)
+
+        Checkpoints.end = kill
+        simulate(system, stop_time=stop_time, step=0.1, checkpoint="kept", checkpoint_every=0.6)
+
+    assert ended(forked(doomed)) == -signal.SIGKILL
+
+
+@pytest.mark.parametrize("isolate", [False, True])
+def test_texts_keep_their_numbers(tmp_path, isolate):
+    """Each of two FMUs has a new text in every step, and takes the other's."""
+    fmu = others.build(tmp_path, "SPEAKS", WITH_STATES)
+    system = others.system_of(fmu, "ab", {"a.said": "b.heard", "b.said": "a.heard"})
+    stopped(system)
+    resumed = simulate(
+        system, stop_time=2.0, step=0.1, checkpoint="kept", resume=True, isolate=isolate
+    )
+    assert resumed.resumed_at == pytest.approx(1.8)
+    whole = simulate(system, stop_time=2.0, step=0.1)
+    assert resumed["a.heard"][-1].startswith("a20 b19 a18 ")
+    assert resumed["a.heard"].tolist() == whole["a.heard"].tolist()
+    assert resumed.rows.tobytes() == whole.rows.tobytes()
+    assert resumed.ending.messages == ()
+
+
+def test_an_fmu_that_does_not_restore_all_of_its_state_is_told(tmp_path):
+    """Its own process has come two steps beyond the checkpoint."""
+    system = others.system_of(others.build(tmp_path, "FORGETS", WITH_STATES))
+    stopped(system)
+    resumed = simulate(system, stop_time=2.0, step=0.1, checkpoint="kept", resume=True)
+    assert resumed.ending.messages == (
+        "a.heard is not what it was at t = 1.9 s before the run was resumed: an FMU does not "
+        "restore all of its state",
+    )
+    assert len(resumed) == 21
 
 
 def test_what_makes_no_sense_is_refused(capsys):

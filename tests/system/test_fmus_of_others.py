@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from orchestrator.commands.main import main
 from orchestrator.errors import InputError
+from orchestrator.experiments.stored import read_result
 from orchestrator.findings import Findings
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
+from orchestrator.system.ssp.writing import write_ssp
 from support.others import WAYS, build, run, system_of
 
 #: Outputs by the inputs that they repeat.
 _PASSED = {"u": "y", "mode": "mode_y", "on": "fault", "said": "heard"}
 
 EVERY_WAY = pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+HERE = pytest.mark.parametrize(
+    "way", [WAYS["python"], WAYS["compiled"]], ids=["python", "compiled"]
+)
 
 
 def with_values(system, values):
@@ -68,6 +75,24 @@ def test_values_of_all_kinds_are_set_connected_and_recorded(tmp_path, way):
     assert table.ending.messages == ()
 
 
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_files_hold_texts_and_give_the_numbers_beside_them_again(workplace, form):
+    """Also where a text has commas, quotes and lines of its own."""
+    said = 'one, "two"\nthree'
+    [archive] = write_ssp(with_values(system_of(build(workplace)), {"said": said}), workplace)
+    if form == "parquet":
+        pytest.importorskip("pyarrow")
+    command = f"run {archive} --stop-time 0.3 --step 0.1 --no-figures --out r --format {form}"
+    assert main(command.split()) == 0
+    if form == "csv":
+        with Path("r", "result.csv").open(newline="", encoding="utf-8") as file:
+            names, *rows = csv.reader(file)
+        assert [row[names.index("a.heard")] for row in rows] == [said] * 4
+    _, table = read_result(Path("r"))
+    assert (table["a.y"] == 101325.0).all()
+    assert "a.heard" not in table
+
+
 @EVERY_WAY
 def test_texts_that_change_in_every_step_arrive(tmp_path, way):
     """Each of two FMUs says the number of its steps, and hears the other's of the step before."""
@@ -77,7 +102,7 @@ def test_texts_that_change_in_every_step_arrive(tmp_path, way):
     assert table["b.heard"].tolist()[:4] == ["", "b1 ", "b2 a1 ", "b3 a2 b1 "]
 
 
-@EVERY_WAY
+@HERE
 def test_an_alarming_message_of_a_call_that_went_well_ends_nothing(tmp_path, way):
     """Nor does an output that happens to be called fault."""
     system = with_values(system_of(build(tmp_path, "CHATTERS")), {"on": True})
@@ -102,7 +127,7 @@ def test_a_second_instance_of_an_fmu_that_allows_one_gets_its_own_process(tmp_pa
         assert (table["c.y"][2:] == 2.0).all()
 
 
-@pytest.mark.parametrize("way", [WAYS["python"], WAYS["compiled"]], ids=["python", "compiled"])
+@HERE
 def test_nothing_is_left_in_a_library_of_the_run_before(tmp_path, way):
     """The gain of an instance is one, and one more for each that its library has had before."""
     system = with_values(system_of(build(tmp_path, "REMEMBERS")), {"u": 2.0})
@@ -114,7 +139,7 @@ def test_a_function_that_no_capability_asks_for_may_be_missing(tmp_path):
     assert run(system_of(build(tmp_path, "LACKS"))).failure is None
 
 
-@EVERY_WAY
+@HERE
 def test_a_last_step_that_rounding_takes_beyond_the_stop_time_is_made(tmp_path, way):
     """0.2 and 0.1 are more than 0.3, and the FMU makes no step beyond a stop time that it knows."""
     table = run(system_of(build(tmp_path)), 0.3, 0.1, **way)
@@ -137,7 +162,7 @@ def test_an_fmu_may_end_the_simulation(tmp_path, way):
     assert np.array_equal(table.time, np.arange(6) * 0.1)
 
 
-@EVERY_WAY
+@HERE
 def test_an_fmu_that_takes_steps_of_one_length_gets_no_other(tmp_path, way):
     system = system_of(build(tmp_path, "RIGID", ""))
     table = run(system, 1.0, 0.3, **way)
@@ -148,7 +173,7 @@ def test_an_fmu_that_takes_steps_of_one_length_gets_no_other(tmp_path, way):
         "t = 0.9 s",
     )
     assert run(system, 0.9, 0.3, **way).ending.messages == ()
-    with pytest.raises(InputError, match="a: takes steps of one length alone, so the stop time"):
+    with pytest.raises(InputError, match="a: takes steps of one length alone, so the run"):
         run(system, 0.2, 0.3, **way)
 
 

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -32,6 +33,16 @@ def test_host_gives_the_numbers_of_our_jacobi_master(dist: Path, host: str, scen
         pytest.skip("fmpy.ssp ignores parameter sets")
     system = closed_loop(dist, read_scenario(scenario))
     [verdict] = compare(system, [host], 500, 0.02)
+    assert verdict.failure is None
+    assert verdict.deviation <= HOSTS[host].bound
+
+
+@pytest.mark.parametrize("host", ["libcosim-ssp", "libcosim-osp"])
+def test_longer_steps_of_components_are_those_of_libcosim(dist: Path, host: str):
+    if find_spec(HOSTS[host].package) is None:
+        pytest.skip(f"{HOSTS[host].package} is not installed")
+    system = replace(closed_loop(dist), steps={"controller": 0.06, "disturbance": 0.04})
+    [verdict] = compare(system, [host], 300, 0.02)
     assert verdict.failure is None
     assert verdict.deviation <= HOSTS[host].bound
 

@@ -154,7 +154,7 @@ def test_an_isolated_fmu_that_fails_while_it_is_instantiated(
 @pytest.mark.parametrize("isolation", [None, Isolation(20.0)])
 def test_an_fmu_that_cannot_be_instantiated_is_bad_input(c_fmu, monkeypatch, isolation):
     monkeypatch.setenv("FOREIGN_INSTANTIATE", "refuses")
-    with pytest.raises(InputError, match="bad: foreign.fmu cannot be instantiated") as error:
+    with pytest.raises(InputError, match=r"bad: foreign\.fmu cannot be") as error:
         simulate(foreign_system(c_fmu), Experiment(0.5, STEP), (), isolation)
     assert not isinstance(error.value, StartError)
 

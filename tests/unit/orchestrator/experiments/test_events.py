@@ -10,6 +10,7 @@ from orchestrator.errors import InputError
 from orchestrator.experiments.events import check_events, read_events, shared_events
 from orchestrator.experiments.preparation import load
 from orchestrator.experiments.scenario import read_scenario
+from orchestrator.findings import Refused
 from orchestrator.master.events import Alter, Freeze, Set
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import Connection, System
@@ -121,6 +122,19 @@ def test_another_system_has_those_events_that_can_happen_to_it(system):
     tables = [{"at": 1.0, "set": {"controller.k_d": 3.0}}, {"at": 1.0, "drop": "plant.y"}]
     assert shared_events(tables, system) == tuple(tables)
     assert shared_events(tables, load("fig5-pd", "native")) == (tables[1],)
+
+
+def test_all_that_is_wrong_with_a_file_is_found_at_once(tmp_path):
+    file = tmp_path / "bad.toml"
+    file.write_text(
+        "titel = 3\n[[events]]\nat = 1.0\nloose = 3\n[[events]]\nstop = true\n[inputs]\nfile = 3\n"
+    )
+    with pytest.raises(Refused) as refused:
+        read_scenario(str(file))
+    found = [problem.partition("bad.toml: ")[2] for problem in refused.value.problems]
+    assert [text.partition(":")[0] for text in found] == [
+        "unknown entry 'titel'; did you mean title?", "event 1", "event 2", "inputs",
+    ]  # fmt: skip
 
 
 def test_a_file_of_events_is_checked_where_it_is_read(tmp_path):

@@ -60,6 +60,13 @@ def test_chained_transformations_are_one_after_the_other(both, value):
     assert whole(value) == then(first(value))
 
 
+def test_what_leaves_a_value_as_it_is_goes_with_everything():
+    table, line = Mapped(((1.0, 2.0),)), Linear(2.0, 1.0)
+    for other in (table, line, Linear(), None):
+        assert chained(Linear(), other) == chained(other, Linear()) == (other or Linear())
+        assert chained(None, other) == chained(other, None) == other
+
+
 def test_line_and_table_do_not_follow_each_other():
     with pytest.raises(InputError, match="follow each other"):
         chained(Linear(2.0), Mapped(((1.0, 2.0),)))
