@@ -8,6 +8,7 @@ package                        what it is
 :mod:`.pd_controller`          the baseline
 :mod:`.disturbance_generator`  friction, waves and ocean currents
 :mod:`.motion_planner`         the reference trajectory
+:mod:`.path_planner`           a reference through waypoints, in its place
 :mod:`.ports`                  what a port is, and the groups that ports come in
 :mod:`.slave`                  the Python kind of component, on PythonFMU
 :mod:`.packaging`              from component folders to FMU files

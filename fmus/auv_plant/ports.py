@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from auv_fmu.actuators import Limits
 from auv_fmu.plant import ETA_0, NU_0, Localisation, Parameters, RollAxis
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters
 from fmus.ports.quantities import ETA, LAG, NU, POSITION, TAU, TAU_W, VELOCITY
-from fmus.ports.vehicle import CONTROL_POINT, VEHICLE
+from fmus.ports.vehicle import CONTROL_POINT, LIMITS, VEHICLE
 
 DESCRIPTION = "Autonomous underwater vehicle with limited actuators and noisy position sensor"
 
-_ROLL, _LIMITS, _LOCALISATION, _DEFAULTS = RollAxis(), Limits(), Localisation(), Parameters()
+_ROLL, _LOCALISATION, _DEFAULTS = RollAxis(), Localisation(), Parameters()
 
 #: Largest standard deviation [m]: with it, no finite position becomes an infinite measurement.
 _FARTHEST = 1e6
@@ -57,11 +56,7 @@ PARAMETERS = ParameterSet(
         rolls=_ROLLS,
     ),
     ell=CONTROL_POINT,
-    limits=ParameterSet(
-        Limits,
-        tau_max=parameters("tau_max", _LIMITS.tau_max, TAU, "Upper limit of (3)", minimum=0.0),
-        tau_min=parameters("tau_min", _LIMITS.tau_min, TAU, "Lower limit of (3)", maximum=0.0),
-    ),
+    limits=LIMITS,
     eta0=parameters("eta0", ETA_0, ETA, "Initial posture"),
     nu0=parameters("nu0", NU_0, NU, "Initial velocity in the body frame"),
     noise=ParameterSet(

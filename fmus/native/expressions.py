@@ -131,11 +131,25 @@ class Expressions:
         raise self.fail(node, f"{node.attr} is no field here")
 
     def _subscript(self, node: ast.Subscript, wanted: Shape | None) -> Code:
-        code, key = self.code(node.value), ast.literal_eval(node.slice)
+        code = self.code(node.value)
+        if not isinstance(node.slice, ast.Constant):
+            return self._element(node, code)
+        key = node.slice.value
         for i, (suffix, part) in enumerate(getattr(code.shape, "parts", ())):
             if key in (i, suffix[1:]):
                 return Code(f"{code.within(_POSTFIX)}{suffix}", part)
         raise self.fail(node, f"there is no element {key!r} here")
+
+    def _element(self, node: ast.Subscript, code: Code) -> Code:
+        """The element of an array at a place that is computed."""
+        place = self.code(node.slice)
+        if not isinstance(code.shape, Structure) or not code.shape.is_array:
+            raise self.fail(node, "a computed subscript of what is no tuple of equal parts")
+        if place.shape != INTEGER:
+            raise self.fail(node, "a subscript that is no whole number")
+        self.made.raises = True
+        text = f"{code.within(_POSTFIX)}.v[PLACE({place.text}, {len(code.shape.parts)})]"
+        return Code(text, code.shape.parts[0][1])
 
     def _binop(self, node: ast.BinOp, wanted: Shape | None) -> Code:
         left, right = self._alike(node.left, node.right, wanted)

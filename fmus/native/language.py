@@ -171,7 +171,7 @@ _PARTS: dict[type[ast.expr], Callable[[Any], Sequence[ast.expr]]] = {
     ast.Dict: lambda node: node.values,
     ast.Attribute: lambda node: (node.value,),
     ast.Starred: lambda node: (node.value,),
-    ast.Subscript: lambda node: (node.value,),
+    ast.Subscript: lambda node: (node.value, node.slice),
     ast.Call: lambda node: (node.func, *node.args),
 }
 
@@ -196,8 +196,8 @@ def _wrong(node: ast.expr) -> str | None:
         wrong = f"the operator {_kind(node.op)}"
     elif isinstance(node, ast.Compare) and not all(isinstance(o, _COMPARISONS) for o in node.ops):
         wrong = "a comparison other than of size"
-    elif isinstance(node, ast.Subscript) and not isinstance(node.slice, ast.Constant):
-        wrong = "a subscript that is not a constant"
+    elif isinstance(node, ast.Subscript) and isinstance(node.slice, (ast.Slice, ast.Tuple)):
+        wrong = "a subscript for more than one element"
     elif isinstance(node, ast.Dict) and not all(isinstance(k, ast.Constant) for k in node.keys):
         wrong = "a dict whose keys are not constants"
     elif isinstance(node, ast.Call) and node.keywords:

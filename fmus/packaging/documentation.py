@@ -7,7 +7,8 @@ build puts the same text as HTML into each FMU.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import import_module
 from importlib.metadata import distribution
 from pathlib import Path
@@ -40,6 +41,9 @@ not be finite, ends with fmi2Discard and leaves everything as it was, noise incl
 step is taken. `fault` stays true until fmi2Reset or until a state without it is restored.
 
 The whole table of calls, states and bad arguments is `docs/status.md` of the project."""
+
+#: The place in a list of things that have members.
+_PLACE = re.compile(r"\[\d+\]\.")
 
 #: Why a refused call is not answered with another status.
 _ANSWERS = {
@@ -111,15 +115,28 @@ def _tables(ports: Sequence[Port], kinds: Mapping[str, str]) -> Iterator[str]:
         elif causality == "output":
             columns.append("direct feedthrough from")
         lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
-        lines += ["| " + " | ".join(_row(port, kinds)) + " |" for port in found]
+        lines += ["| " + " | ".join(_row(ports, kinds)) + " |" for ports in _alike(found)]
         yield f"## {heading}\n\n" + "\n".join(lines)
 
 
-def _row(port: Port, kinds: Mapping[str, str]) -> list[str]:
+def _alike(ports: Sequence[Port]) -> Iterable[list[Port]]:
+    """Ports one by one, but those of a list together, as `waypoint[1].x` to `waypoint[9].x`."""
+    rows: dict[str, list[Port]] = {}
+    for port in ports:
+        rows.setdefault(_PLACE.sub("[].", port.name), []).append(port)
+    return rows.values()
+
+
+def _row(ports: Sequence[Port], kinds: Mapping[str, str]) -> list[str]:
+    port, last = ports[0], ports[-1]
     kind = kinds.get(port.kind, port.kind)
-    cells = [f"`{port.name}`", kind, port.unit or "", port.description]
+    name = f"`{port.name}`" if port is last else f"`{port.name}` to `{last.name}`"
+    cells = [name, kind, port.unit or "", port.description]
     if port.causality == "parameter":
-        cells[3:3] = [_literal(port.start), _range(port), port.variability]
+        starts = [_literal(one.start) for one in ports]
+        while len(starts) > 1 and starts[-1] == starts[-2]:
+            starts.pop()
+        cells[3:3] = [", ".join(starts), _range(port), port.variability]
     elif port.causality == "output":
         groups = dict.fromkeys(name.split(".")[0] for name in port.feedthrough)
         cells.append(", ".join(f"`{group}`" for group in groups))

@@ -1,13 +1,15 @@
-"""Parameters of (2), shared by the components that integrate it."""
+"""Parameters of (2) and (3), shared by the components that need them."""
 
 from __future__ import annotations
 
+from auv_fmu.actuators import Limits
 from auv_fmu.control_point import ELL
 from auv_fmu.vehicle import Vehicle
 from fmus.ports.groups import ParameterSet
-from fmus.ports.port import POSITIVE, Port, parameter
+from fmus.ports.port import POSITIVE, Port, parameter, parameters
+from fmus.ports.quantities import TAU
 
-_VEHICLE = Vehicle()
+_VEHICLE, _LIMITS = Vehicle(), Limits()
 
 
 def _inertia(name: str, unit: str) -> Port:
@@ -34,6 +36,12 @@ VEHICLE = ParameterSet(
     righting_pitch=parameter(
         "righting.pitch", _VEHICLE.righting_pitch, "N.m", "Righting moment in pitch"
     ),
+)
+
+LIMITS = ParameterSet(
+    Limits,
+    tau_max=parameters("tau_max", _LIMITS.tau_max, TAU, "Upper limit of (3)", minimum=0.0),
+    tau_min=parameters("tau_min", _LIMITS.tau_min, TAU, "Lower limit of (3)", maximum=0.0),
 )
 
 CONTROL_POINT = parameter("ell", ELL, "m", "Distance of the control point", POSITIVE)

@@ -9,14 +9,13 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from orchestrator.reading import explained, lines_of
-from orchestrator.system.values import BOOLEANS, real
+from orchestrator.system.values import BOOLEANS, finite
 
 #: What separates the values of a row.
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
@@ -81,7 +80,7 @@ def _table(reader: Any, ports: Mapping[str, str], prefixes: Collection[str]) -> 
     time, columns = array("d"), {port: array("d") for port in places}
     for row in _rows(reader, len(names)):
         where = f"line {reader.line_num}"
-        time.append(_number(row[clock], f"{where}, time"))
+        time.append(finite(row[clock], f"{where}, time"))
         if time[-1] < 0.0:
             raise ValueError(f"{where}: time {time[-1]:g} s is before the start at 0 s")
         if len(time) > 1 and not time[-1] > time[-2]:
@@ -145,14 +144,4 @@ def _port_of(name: str, ports: Collection[str], prefixes: Collection[str]) -> st
 def _value(text: str, kind: str, where: str) -> float:
     words = BOOLEANS if kind == "Boolean" else {}
     word = text.strip().lower()
-    return float(words[word]) if word in words else _number(text, where)
-
-
-def _number(text: str, where: str) -> float:
-    try:
-        number = real(text)
-    except ValueError:
-        raise ValueError(f"{where}: {text[:40]!r} is no number") from None
-    if not isfinite(number):
-        raise ValueError(f"{where}: {text[:40]!r} is not finite")
-    return number
+    return float(words[word]) if word in words else finite(text, where)

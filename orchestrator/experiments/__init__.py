@@ -8,6 +8,7 @@ module                    what it holds
 :mod:`.scenario`          scenario files
 :mod:`.events`            what they say of events, read for a system
 :mod:`.inputs`            and of inputs that follow a table
+:mod:`.waypoints`         a path from a table of waypoints
 :mod:`.scenario_page`     their reference page
 :mod:`.wiring`            which FMUs there are, and which ports feed which
 :mod:`.bundle`            the FMUs and auv.ssp, built when missing or stale

@@ -23,6 +23,8 @@ from orchestrator.experiments.events import check_events
 from orchestrator.experiments.inputs import ENTRIES as INPUTS
 from orchestrator.experiments.inputs import Inputs
 from orchestrator.experiments.named import names_in, path_of
+from orchestrator.experiments.waypoints import ENTRIES as PATH
+from orchestrator.experiments.waypoints import PLANNER, path_parameters
 from orchestrator.findings import Findings
 from orchestrator.master.experiment import Order
 from orchestrator.reading import explained, text_of
@@ -158,6 +160,12 @@ ENTRIES: dict[str, Entry] = {
         'brackets are quoted: `"controller.K1[1]" = 12.0`.',
         "the FMUs' own",
     ),
+    "path": Entry(
+        "table",
+        is_table,
+        "Waypoints of a PathPlanner, from a table: [see below](#path).",
+        "none",
+    ),
     "events": Entry(
         "list of tables",
         _are_tables,
@@ -214,6 +222,8 @@ def _scenario(path: Path, text: str) -> Scenario:
     content["parameters"] = {
         port_name(key): value for key, value in flattened(content.get("parameters", {}))
     }
+    if "path" in content:
+        content["parameters"] |= _path_parameters(path, content.pop("path"), content["parameters"])
     content["ours"] = {key: str(why) for key, why in flattened(content.get("ours", {}))}
     content["components"] = {
         component: str(path.parent / fmu) if fmu.endswith(".fmu") else fmu
@@ -222,6 +232,19 @@ def _scenario(path: Path, text: str) -> Scenario:
     if content.get("compare", "").endswith(".toml"):
         content["compare"] = str(path.parent / content["compare"])
     return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
+
+
+def _path_parameters(
+    path: Path, said: Mapping[str, str], others: Mapping[PortName, Any]
+) -> dict[PortName, Any]:
+    """What a path comes to, in a scenario with other parameters."""
+    check_entries(f"{path}: path", said, PATH)
+    if "file" not in said:
+        raise InputError(f"{path}: path: name a file")
+    found = path_parameters(path.parent / said["file"], said.get("component", PLANNER))
+    for name in found.keys() & others.keys():
+        raise InputError(f"{path}: {name} is given by {said['file']} already")
+    return found
 
 
 def _inputs(path: Path, table: Mapping[str, Any]) -> Inputs:

@@ -9,6 +9,7 @@ from orchestrator.analysis.figures import FIGURES
 from orchestrator.experiments.events import ENTRIES as EVENT
 from orchestrator.experiments.inputs import ENTRIES as INPUTS
 from orchestrator.experiments.scenario import ENTRIES, names, read_scenario
+from orchestrator.experiments.waypoints import ENTRIES as PATH
 from orchestrator.experiments.wiring import read_wiring
 
 _PAGE = Template("""\
@@ -24,6 +25,10 @@ This page is written by `auv-fmu docs`, from the declarations; a test runs its e
 ## Entries
 
 $entries
+
+### Path
+
+$path
 
 ### Events
 
@@ -111,6 +116,21 @@ title = "Still water"
 "plant.tau_w" = false
 ```
 
+A path through waypoints, from a table `survey.csv` beside the file:
+
+```toml
+title = "A survey"
+
+[components]
+planner = "PathPlanner"
+
+[path]
+file = "survey.csv"
+
+[parameters]
+planner.cruise = 0.4
+```
+
 A controller of one's own, from an FMU beside the file, is in [the guide](own-controller.md).
 """)
 
@@ -121,7 +141,7 @@ def scenario_page() -> str:
     entries = (
         (f"`{name}`", entry.kind, entry.meaning, entry.default) for name, entry in ENTRIES.items()
     )
-    events, inputs = (
+    path, events, inputs = (
         table(
             ("entry", "value", "meaning", "without it"),
             (
@@ -129,7 +149,7 @@ def scenario_page() -> str:
                 for name, entry in declared.items()
             ),
         )
-        for declared in (EVENT, INPUTS)
+        for declared in (PATH, EVENT, INPUTS)
     )
     components = (
         (f"`{name}`", f"[{fmu}](components/{fmu}.md)") for name, fmu in wiring["components"].items()
@@ -141,6 +161,7 @@ def scenario_page() -> str:
     figures = ((f"`{kind}`", ", ".join(used)) for kind, used in drawn.items())
     return _PAGE.substitute(
         entries=table(("entry", "value", "meaning", "without it"), entries),
+        path=path,
         events=events,
         inputs=inputs,
         components=table(("component", "FMU"), components),

@@ -72,6 +72,26 @@ def real(text: str) -> float:
     return float(_plain(text))
 
 
+def finite(text: str, where: str) -> float:
+    """A number that can be computed with, from a cell of a table.
+
+    Args:
+        text: of the cell.
+        where: it stands, for the message.
+
+    Raises:
+        ValueError: it is none.
+
+    """
+    try:
+        number = real(text)
+    except ValueError:
+        raise ValueError(f"{where}: {text[:40]!r} is no number") from None
+    if not isfinite(number):
+        raise ValueError(f"{where}: {text[:40]!r} is not finite")
+    return number
+
+
 def _plain(text: str) -> str:
     if "_" in text or not text.isascii():
         raise ValueError(f"{text!r} is no plain number")

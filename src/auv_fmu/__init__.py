@@ -12,6 +12,7 @@ module                      what it states
 :mod:`.plant`               section 4.1: the simulated vehicle with six degrees of freedom
 :mod:`.control_point`       (9) to (13): the control point and its Jacobian
 :mod:`.motion_planner`      Definition 1: the reference and its derivatives in closed form
+:mod:`.path_planner`        a reference through waypoints, not in the paper
 :mod:`.disturbance`         (56): friction, waves and currents
 :mod:`.saturation`          Definition 2: saturation functions, Lemma 1
 :mod:`.observer`            (18), (23), (24), (50), (51): the velocity observer

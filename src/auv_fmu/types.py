@@ -10,3 +10,11 @@ Vector6 = tuple[float, float, float, float, float, float]
 #: A rotation matrix R from body to earth as its columns (R e1, R e2, R e3): the directions of
 #: the body axes in the earth frame.
 Rotation = tuple[Vector3, Vector3, Vector3]
+
+#: One number for each of as many points as a path may have.
+Vector32 = tuple[
+    float, float, float, float, float, float, float, float,
+    float, float, float, float, float, float, float, float,
+    float, float, float, float, float, float, float, float,
+    float, float, float, float, float, float, float, float,
+]  # fmt: skip

@@ -27,6 +27,7 @@ def test_docs_writes_the_page_and_those_of_the_components(tmp_path):
 @pytest.mark.parametrize("example", EXAMPLES, ids=range(len(EXAMPLES)))
 def test_example_runs_and_is_drawn(example, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "survey.csv").write_text("x,y,z\n3,6,0\n15,6,4\n15,10,4\n")
     (tmp_path / "mine.toml").write_text(example)
     assert main(["run", "mine.toml", "--stop-time", "2"]) == 0
     folder = tmp_path / "results/mine"

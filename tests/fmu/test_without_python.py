@@ -29,7 +29,7 @@ from orchestrator.system.structure import System
 from support.instances import NAMES
 from support.runs import run
 
-#: Both controllers, so that all five FMUs are run.
+#: Both controllers, so that all FMUs of the paper are run.
 SCENARIOS = ("fig4", "fig5-pd")
 WHOLE, SHORT = Experiment(100.0, 0.02), Experiment(20.0, 0.02)
 

@@ -13,12 +13,13 @@ from itertools import chain, pairwise
 from math import hypot, isclose, isfinite
 from typing import Any
 
-from auv_fmu import motion_planner, plant
+from auv_fmu import motion_planner, path_planner, plant
 from auv_fmu.attitude import rotation_from_quaternion
 from auv_fmu.motion_planner import PlannerState
 from auv_fmu.plant import PlantState
 from fmus.auv_plant.ports import PARAMETERS as OF_THE_PLANT
 from fmus.motion_planner.ports import PARAMETERS as OF_THE_PLANNER
+from fmus.path_planner.ports import PARAMETERS as OF_THE_PATH
 from support import states
 from support.calls import CHOICES
 from support.raw import Description, Variable
@@ -229,9 +230,21 @@ def _planner(said: dict[str, Any]) -> Iterator[str]:
         yield "outputs that are not those of the state"
 
 
+def _path(said: dict[str, Any]) -> Iterator[str]:
+    parameters, state = OF_THE_PATH.of(said["parameters"]), path_planner.PathState(*said["state"])
+    first = path_planner.first_corner(parameters.waypoints, state.start)
+    corner = path_planner.corner_ahead(parameters.waypoints, first, state.t)
+    reference = path_planner.reference(parameters.waypoints, corner, state.t)
+    along = path_planner.course(parameters.waypoints, corner, reference.dy_d)
+    eta_d = path_planner.posture(reference.y_d, along, parameters.ell)
+    if not _near(said["outputs"], [*chain(*reference), *eta_d]):
+        yield "outputs that are not those of the state"
+
+
 _INVARIANTS: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "AuvPlant": _plant,
     "MotionPlanner": _planner,
+    "PathPlanner": _path,
 }
 
 

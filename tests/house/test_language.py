@@ -45,7 +45,7 @@ def test_page_names_the_functions_and_what_stands_outside():
         ("    return x % 2.0", "the operator Mod"),
         ("    return sum(a * x for a in (1.0, 2.0))", "GeneratorExp"),
         ("    return [x][0]", "List"),
-        ("    return (x, 1.0)[0:1]", "a subscript that is not a constant"),
+        ("    return (x, 1.0)[0:1]", "a subscript for more than one element"),
         ("    return x if x is x else 1.0", "a comparison other than of size"),
         ("    return cos(x=x)", "a call with names of arguments"),
         ("    return (lambda y: y)(x)", "Lambda"),

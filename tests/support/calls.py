@@ -130,8 +130,11 @@ class Draw:
         if variable.kind == "Boolean":
             return self.random.randrange(2)
         if variable.kind == "Integer":
-            return self.random.choice((-(2**31), -1, 0, 1, 42, 2**31 - 1))
-        value = (start or 0.0) * self.random.uniform(0.5, 1.5) or self.random.uniform(-0.5, 0.5)
+            some = (-(2**31), -1, 0, 1, 42, 2**31 - 1) if low is None else (start,)
+            return self.random.choice(some)
+        spread = SPREADS.get(self.description.name, 0.5)
+        value = (start or 0.0) * self.random.uniform(1.0 - spread, 1.0 + spread)
+        value = value or self.random.uniform(-0.5, 0.5)
         value = value if low is None else max(low, value)
         return value if high is None else min(high, value)
 
@@ -377,6 +380,9 @@ class Setting(NamedTuple):
     time: float = 0.0
 
 
+#: How far good values may lie from those at the start, where they must fit together [share].
+SPREADS = {"PathPlanner": 0.02}
+
 #: Values with which a state or an output of a step leaves the range of numbers.
 OVERFLOWING = {
     "AuvPlant": Setting({"m11": 1e-9}, {"tau_w.u": 1e300}, {"tau_w.u": 0.0}),
@@ -391,6 +397,7 @@ NO_START = {
     "ObserverController": Setting({}, {"dy_d.x": 1e200}, {"dy_d.x": 0.0}),
     "PdController": Setting({}, {"dy_d.x": 1e200}, {"dy_d.x": 0.0}),
     "MotionPlanner": Setting({}, {"m11": 1e-9, "tau_d.u": 1e300}, {"tau_d.u": 5.0}),
+    "PathPlanner": Setting({}, {"turn_max": 0.0}, {"turn_max": 4.0}),
 }
 
 

@@ -17,7 +17,7 @@ from fmus.slave.component import Component
 
 #: Names of all components, and of those with inputs.
 NAMES = [*components()]
-WITH_INPUTS = [name for name in NAMES if name != "MotionPlanner"]
+WITH_INPUTS = [name for name in NAMES if not name.endswith("Planner")]
 
 
 def component(name: str) -> type[Component[Any, Any, Any, Any]]:

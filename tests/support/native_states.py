@@ -23,6 +23,7 @@ _SHAPES = {
     "DisturbanceGenerator": (),
     "MotionPlanner": (3, 0, 0, 5),
     "ObserverController": (3, 3, 4),
+    "PathPlanner": (0, 0),
     "PdController": (4,),
 }
 

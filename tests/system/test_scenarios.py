@@ -74,6 +74,8 @@ def test_all_figures_are_there():
             "fault-sensor",
             "fault-thruster",
             "current-step",
+            "path",
+            "path-pd",
         ]
     )
 

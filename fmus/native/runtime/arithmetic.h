@@ -89,6 +89,15 @@ static inline double logarithm_1p(double x, Error *error) {
     return log1p(x);
 }
 
+/* A place in an array of n elements; negative ones count from its end. */
+static inline int place_in(int i, int n, Error *error) {
+    if (i >= 0 && i < n) return i;
+    if (i < 0 && i >= -n) return i + n;
+    raise_error(error, "IndexError: tuple index out of range");
+    return 0;
+}
+
+#define PLACE(i, n) place_in(i, n, error)
 #define DIV(a, b) quotient(a, b, error)
 #define SQRT(x) square_root(x, error)
 #define COS(x) cosine(x, error)

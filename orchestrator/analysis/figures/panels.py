@@ -91,15 +91,16 @@ def _frame_path(axes: Any, points: np.ndarray) -> None:
         xlabel="x north [m]", ylabel="y east [m]", zlabel="z down [m]",
     )  # fmt: skip
     box = np.maximum(extent, 0.5 * extent.max())
-    # A tall box would reach into the panel below.
-    axes.set_box_aspect(box, zoom=min(0.95, 0.68 * float(np.linalg.norm(box) / box[2])))
+    flat = float(box.max() / box[2]) - 1.0
+    # A tall box would reach into the panel below, a flat one into that beside it.
+    zoom = min(0.95 - 0.1 * flat, 0.68 * float(np.linalg.norm(box) / box[2]))
+    axes.set_box_aspect(box, zoom=zoom)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(MaxNLocator(4))
     axes.tick_params(labelsize="small", pad=0)
-    # Below a flat box the names of the axes would lie upon their numbers.
-    below = 8.0 * (box.max() / box[2] - 1.0) - 2.0
-    for axis, pad in ((axes.xaxis, below), (axes.yaxis, below), (axes.zaxis, 4)):
-        axis.labelpad = pad
+    # Below a flat box the names of the axes would lie upon their numbers, and beside it far away.
+    axes.xaxis.labelpad = axes.yaxis.labelpad = 8 * flat - 2
+    axes.zaxis.labelpad = 4 - 8 * flat
 
 
 def title(axes: Axes, text: str) -> None:

@@ -45,6 +45,7 @@ SECTION_4_1 = {
         "tau_d": (5.0, 1.0, 2.0),
         "eta0": (0.0, 0.0, -2.0, 0.0, 0.0),
     },
+    "path_planner.Parameters": {"ell": 0.35},
     "LongestSteps": dict.fromkeys(("plant", "controller", "planner"), 0.02),
     "Setting": {"h": 0.02},
 }
@@ -55,6 +56,17 @@ OURS = {
     "PdGains": {"printed_jacobian": False},
     "plant.Parameters": {"nu0": ZERO_6, "current": ZERO_3, "T": ZERO_3},
     "motion_planner.Parameters": {"nu0": ZERO_5},
+    "Waypoints": {
+        "n": 6,
+        "x": (3.0, 15.0, 15.0, 3.0, 3.0, 15.0, *(0.0,) * 26),
+        "y": (6.0, 6.0, 10.0, 10.0, 14.0, 14.0, *(0.0,) * 26),
+        "z": (0.0, 4.0, 4.0, 4.0, 4.0, 0.0, *(0.0,) * 26),
+        "t": (3.0, 28.0, 36.0, 60.0, 68.0, 93.0, *(0.0,) * 26),
+        "timed": False,
+        "cruise": 0.5,
+        "rounding": 6.0,
+    },
+    "path_planner.Parameters": {"speed_max": 2.5, "turn_max": 4.0},
 }
 
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from fmus.packaging.discovery import components
 from fmus.slave.callbacks import explained
 from support.equations import WHY, bits, equations, filled, flat, structure
@@ -144,6 +145,20 @@ def test_restarts_of_the_observer(random):
 def test_limits_that_leave_an_actuator_nothing(random):
     both, wild = equations("fmus.auv_plant"), 0.3
     parameters = value(both.parameters, random, wild)
+    why = both.call("check", filled(both.parameters, parameters))
+    assert why == raised(lambda: both.python("check", parameters=parameters) or ())[0]
+
+
+@given(random=randoms, n=st.integers(0, MOST + 2), timed=st.booleans())
+def test_paths_are_refused_alike(random, n, timed):
+    """Most of them somewhere on the way; more waypoints than there are, for a place beyond them."""
+    both, default = equations("fmus.path_planner"), Parameters()
+    series = [tuple(random.uniform(-15.0, 15.0) for _ in range(MOST)) for _ in "xyz"]
+    t = tuple(sorted(random.uniform(0.0, 2000.0) for _ in range(MOST)))
+    flat_z = tuple(0.2 * z for z in series[2])
+    T = random.uniform(1.0, 40.0)
+    waypoints = Waypoints(n, *series[:2], flat_z, t, timed, random.uniform(0.05, 1.0), T)
+    parameters = default._replace(waypoints=waypoints)
     why = both.call("check", filled(both.parameters, parameters))
     assert why == raised(lambda: both.python("check", parameters=parameters) or ())[0]
 

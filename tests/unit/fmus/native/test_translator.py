@@ -84,6 +84,14 @@ def test_each_function_has_its_docstring_above_it(package):
         ("def begin(state: A) -> A:\n    x, y = state\n    return A(x)\n", "2 names for 1 values"),
         ("def begin(parameters: A) -> A:\n    return A(max(1.0, 2.0))\n", "10: the name max"),
         ("def begin(t: int, h: int) -> A:\n    t, h = h, t\n    return A(1.0)\n", "10: h is given"),
+        (
+            "def begin(parameters: A, t: int) -> A:\n    return A(parameters[t])\n",
+            "10: a computed subscript of what is no tuple of equal parts",
+        ),
+        (
+            "def begin(state: tuple[float, float], t: float) -> A:\n    return A(state[t])\n",
+            "10: a subscript that is no whole number",
+        ),
         ("def begin(parameters: list[float]) -> A:\n    return A(1.0)\n", "is no type"),
     ],
 )  # fmt: skip

@@ -123,7 +123,7 @@ def test_what_is_ours_is_stated_in_the_file(name):
             assert getattr(scenario, entry)
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", [name for name in names() if name.startswith("fig")])
 def test_what_the_paper_never_gives_is_ours(name):
     """End times and noise, and that Fig. 3 is without (56): readings 7 and 8."""
     scenario = read_scenario(name)

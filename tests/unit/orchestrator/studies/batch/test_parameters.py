@@ -12,8 +12,11 @@ from orchestrator.errors import InputError
 from orchestrator.studies.batch.parameters import CHOICES, DEFAULTS, PATHS, setting_of
 from orchestrator.system.names import port_name
 
+#: Of all components but those that the batch engine refuses: it runs the paper's loop alone.
 PORTS = {
-    name: import_module(module.replace(".slave", ".ports")) for name, module in components().items()
+    name: import_module(module.replace(".slave", ".ports"))
+    for name, module in components().items()
+    if name != "PathPlanner"
 }
 FMUS = {
     "plant": "AuvPlant",

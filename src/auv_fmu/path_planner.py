@@ -1,0 +1,364 @@
+"""A reference through waypoints: straight legs at constant velocity, rounded where they meet.
+
+It is not in the paper, whose tracking theorem asks for no more of a reference than that it is twice
+continuously differentiable. A point that runs from waypoint to waypoint at constant velocities v_k
+jumps from one to the next at each corner. The reference is where this point is on the average, over
+the time T around the moment and weighted by a parabola. So a corner at waypoint p_k, passed at t_k,
+becomes a rounding that takes the time T: in it, with a = (t - t_k) / T + 1/2 from 0 to 1,
+
+    y_d = p_k + v_k (t - t_k) + (v_k+1 - v_k) T (a^3 - a^4 / 2)
+    dy_d = v_k + (v_k+1 - v_k) (3 a^2 - 2 a^3)
+    ddy_d = (v_k+1 - v_k) 6 a (1 - a) / T
+
+- y_d is twice continuously differentiable, and its derivatives are exact.
+- Legs that take longer than T are straight and at constant velocity between their roundings. A
+  corner is cut by 3/32 |v_k+1 - v_k| T.
+- The reference never leaves the hull of the waypoints, and is nowhere faster than its fastest leg;
+  |ddy_d| is at most 3/2 of the largest |v_k+1 - v_k| / T where roundings do not overlap.
+- Before the first corner and behind the last one it rests: start and arrival are corners, too.
+- Roundings may overlap: where many waypoints lie close together, they are what smooths the curve.
+
+A spline through the waypoints would meet them exactly, and swing out beside long legs, at a speed
+that nobody has chosen.
+"""
+
+from __future__ import annotations
+
+from math import atan2, degrees, sqrt
+from typing import NamedTuple
+
+from auv_fmu.actuators import Limits
+from auv_fmu.control_point import ELL
+from auv_fmu.euler import advance
+from auv_fmu.motion_planner import STEEPEST, Reference
+from auv_fmu.types import Vector3, Vector5, Vector32
+from auv_fmu.vectors import difference, distance, norm
+from auv_fmu.vehicle import Vehicle
+
+#: Most waypoints of a path, as many as a Vector32 holds; and those that the default leaves over.
+MOST = 32
+_UNUSED = (0.0,) * 26
+
+#: Moments of a rounding at which it is held against the limits, as a share of it: the middle of it,
+#: where a corner of equal speeds asks for most, is among them.
+_BETWEEN = 1 / 32
+
+_AT_REST: Vector3 = (0.0, 0.0, 0.0)
+
+
+class ImpossiblePath(ArithmeticError):
+    """The vehicle cannot follow the path."""
+
+
+class Waypoints(NamedTuple):
+    """Points to pass, and when; the defaults are a small survey, near the vehicle of Fig. 4."""
+
+    n: int = 6  #: how many
+    x: Vector32 = (3.0, 15.0, 15.0, 3.0, 3.0, 15.0, *_UNUSED)  #: [m]
+    y: Vector32 = (6.0, 6.0, 10.0, 10.0, 14.0, 14.0, *_UNUSED)  #: [m]
+    z: Vector32 = (0.0, 4.0, 4.0, 4.0, 4.0, 0.0, *_UNUSED)  #: [m]
+    t: Vector32 = (3.0, 28.0, 36.0, 60.0, 68.0, 93.0, *_UNUSED)  #: when [s], if they are timed
+    timed: bool = False  #: whether at their times, or at the cruise speed
+    cruise: float = 0.5  #: speed on all legs [m/s], if they are not
+    rounding: float = 6.0  #: T, the time that a corner is rounded in [s]
+
+
+class Parameters(NamedTuple):
+    """All parameters of the planner."""
+
+    waypoints: Waypoints = Waypoints()
+    vehicle: Vehicle = Vehicle()  #: that is to follow
+    ell: float = ELL  #: distance of its control point [m]
+    limits: Limits = Limits()  #: of its actuators
+    speed_max: float = 2.5  #: that is let pass [m/s]: with (2) and (3) a straight run ends at 2.67
+    turn_max: float = 4.0  #: that is let pass [rad/s]: where a turn on the spot ends
+
+
+class PathState(NamedTuple):
+    """Where on the path the reference is."""
+
+    start: float  #: time at which the run began [s]
+    t: float  #: time [s]
+
+
+class Corner(NamedTuple):
+    """A waypoint on the way."""
+
+    k: int  #: its number, from 0; n: behind the last one
+    t: float  #: when it would be passed without roundings [s]
+
+
+class Demand(NamedTuple):
+    """What a moment of the path asks of the vehicle."""
+
+    speed: float  #: [m/s]
+    turn: float  #: rate at which the path turns [rad/s]
+    tau: Vector3  #: (u, q, r) [N, N.m]
+
+
+# The path
+
+
+def waypoint(waypoints: Waypoints, k: int) -> Vector3:
+    """Waypoint k [m], from 0."""
+    return waypoints.x[k], waypoints.y[k], waypoints.z[k]
+
+
+def duration(waypoints: Waypoints, k: int) -> float:
+    """How long the leg to waypoint k takes [s]."""
+    if waypoints.timed:
+        return waypoints.t[k] - waypoints.t[k - 1]
+    return distance(waypoint(waypoints, k - 1), waypoint(waypoints, k)) / waypoints.cruise
+
+
+def velocity(waypoints: Waypoints, k: int) -> Vector3:
+    """v_k [m/s], of the leg to waypoint k: nothing before the first and behind the last one."""
+    if not 0 < k < waypoints.n:
+        return _AT_REST
+    T = duration(waypoints, k)
+    x, y, z = difference(waypoint(waypoints, k), waypoint(waypoints, k - 1))
+    return x / T, y / T, z / T
+
+
+def first_corner(waypoints: Waypoints, start: float) -> Corner:
+    """The start of the path: the whole of its rounding lies ahead, unless times say otherwise.
+
+    Args:
+        waypoints: of the path.
+        start: time at which the run began [s].
+
+    """
+    return Corner(0, waypoints.t[0] if waypoints.timed else start + waypoints.rounding / 2)
+
+
+def next_corner(waypoints: Waypoints, corner: Corner) -> Corner:
+    """The corner behind one."""
+    k = corner.k + 1
+    if k >= waypoints.n:
+        return Corner(waypoints.n, corner.t)
+    return Corner(k, waypoints.t[k] if waypoints.timed else corner.t + duration(waypoints, k))
+
+
+def corner_ahead(waypoints: Waypoints, corner: Corner, t: float) -> Corner:
+    """The first corner, from a given one on, whose rounding is not over.
+
+    Args:
+        waypoints: of the path.
+        corner: from which to look.
+        t: time [s].
+
+    """
+    while corner.k < waypoints.n and corner.t + waypoints.rounding / 2 <= t:
+        corner = next_corner(waypoints, corner)
+    return corner
+
+
+def reference(waypoints: Waypoints, corner: Corner, t: float) -> Reference:
+    """y_d, dy_d/dt and d2y_d/dt2 in closed form.
+
+    Args:
+        waypoints: of the path.
+        corner: the first whose rounding is not over.
+        t: time [s].
+
+    """
+    T = waypoints.rounding
+    k = corner.k if corner.k < waypoints.n else waypoints.n - 1
+    v = velocity(waypoints, corner.k)
+    y_d, dy_d, ddy_d = advance(waypoint(waypoints, k), v, t - corner.t), v, _AT_REST
+    while corner.k < waypoints.n and corner.t - T / 2 < t:
+        a = (t - corner.t) / T + 0.5
+        v_next = velocity(waypoints, corner.k + 1)
+        jump = difference(v_next, v)
+        y_d = advance(y_d, jump, T * a * a * a * (1.0 - a / 2))
+        dy_d = advance(dy_d, jump, a * a * (3.0 - 2 * a))
+        ddy_d = advance(ddy_d, jump, 6 * a * (1.0 - a) / T)
+        corner = next_corner(waypoints, corner)
+        v = v_next
+    return Reference(y_d, dy_d, ddy_d)
+
+
+def course(waypoints: Waypoints, corner: Corner, dy_d: Vector3) -> Vector3:
+    """A vector in the direction of the reference.
+
+    Where it rests, that is the direction of the last leg before; at the start, of the first one.
+
+    Args:
+        waypoints: of the path.
+        corner: the first whose rounding is not over.
+        dy_d: velocity of the reference [m/s].
+
+    """
+    k = corner.k
+    while norm(dy_d) == 0.0 and k > 1:
+        k -= 1
+        dy_d = velocity(waypoints, k)
+    while norm(dy_d) == 0.0 and k < waypoints.n:
+        k = k + 1
+        dy_d = velocity(waypoints, k)
+    return dy_d
+
+
+def posture(y_d: Vector3, along: Vector3, ell: float) -> Vector5:
+    """Posture (x, y, z, theta, psi) of a vehicle on the path that points along it.
+
+    Args:
+        y_d: its control point [m], earth frame.
+        along: direction of the path, earth frame, of any length but 0.
+        ell: distance of the control point [m].
+
+    """
+    dx, dy, dz = along
+    x, y, z = advance(y_d, along, -ell / norm(along))
+    return x, y, z, atan2(-dz, sqrt(dx * dx + dy * dy)), atan2(dy, dx)
+
+
+# What it asks of the vehicle
+
+
+def demand(vehicle: Vehicle, ell: float, moment: Reference) -> Demand:
+    """What (2) asks of the actuators where the vehicle turns steadily with the path.
+
+    In a steady turn sway and heave are v = -m11 u r / d22 and w = m11 u q / d33, so the speed of
+    the control point (10) gives the surge u, and (2) the force and moments. The force that speeds
+    the vehicle up along the path is added to it.
+
+    Args:
+        vehicle: that follows.
+        ell: distance of its control point [m].
+        moment: of the reference, whose velocity is neither zero nor vertical.
+
+    Raises:
+        ImpossiblePath: the path turns within the length ell: no steady motion of the vehicle does.
+
+    """
+    m11, m22, m33, _, _, d11, d22, d33, d55, d66, righting_pitch = vehicle
+    (x, y, z), (dx, dy, dz), (ddx, ddy, ddz) = moment
+    speed, level = norm(moment.dy_d), sqrt(dx * dx + dy * dy)
+    faster = (dx * ddx + dy * ddy) / level
+    q = (dz * faster - ddz * level) / (speed * speed)
+    r = (dx * ddy - dy * ddx) / (level * speed)
+    # speed^2 = u^2 + (v + ell r)^2 + (w - ell q)^2, with the sway and heave that belong to u.
+    sway, heave = m11 * r / d22, m11 * q / d33
+    A = 1.0 + sway * sway + heave * heave
+    B = ell * (sway * r + heave * q)
+    C = ell * ell * (r * r + q * q) - speed * speed
+    if B * B < A * C:
+        raise ImpossiblePath(
+            f"at ({x:.3g}, {y:.3g}, {z:.3g}) m the path turns at {sqrt(r * r + q * q):.3g} rad/s "
+            f"with {speed:.3g} m/s: more tightly than the vehicle's control point can, {ell:g} m "
+            f"ahead; round for longer"
+        )
+    u = (B + sqrt(B * B - A * C)) / A
+    v, w = -sway * u, heave * u
+    return Demand(
+        speed,
+        sqrt(r * r + q * q),
+        (
+            m11 * (dx * ddx + dy * ddy + dz * ddz) / speed + d11 * u - m22 * v * r + m33 * w * q,
+            d55 * q + righting_pitch * -dz / speed - (m33 - m11) * u * w,
+            d66 * r - (m11 - m22) * u * v,
+        ),
+    )
+
+
+# Whether it can be followed
+
+
+def check(parameters: Parameters) -> None:
+    """Refuse a path that the vehicle cannot follow, and say where.
+
+    Raises:
+        ImpossiblePath: waypoints make no path, or it asks for more than a limit.
+
+    """
+    waypoints, vehicle, _, _, _, _ = parameters
+    if not (vehicle.d22 > 0.0 and vehicle.d33 > 0.0):
+        raise ImpossiblePath("d22 and d33 must be positive: nothing else ends a drift in a turn")
+    k = 1
+    while k < waypoints.n:
+        _check_leg(waypoints, k)
+        k = k + 1
+    if norm(course(waypoints, first_corner(waypoints, 0.0), _AT_REST)) == 0.0:
+        raise ImpossiblePath("all waypoints are the same: there is no way to go")
+    corner = first_corner(waypoints, 0.0)
+    ahead = corner
+    while corner.k < waypoints.n:
+        ahead = corner_ahead(waypoints, ahead, corner.t - waypoints.rounding / 2)
+        _check_rounding(parameters, corner, ahead)
+        corner = next_corner(waypoints, corner)
+
+
+def _check_leg(waypoints: Waypoints, k: int) -> None:
+    """Refuse a leg, to waypoint k, that nothing can go along."""
+    before, behind = waypoint(waypoints, k - 1), waypoint(waypoints, k)
+    x, y, z = difference(behind, before)
+    if waypoints.timed and not waypoints.t[k] > waypoints.t[k - 1]:
+        raise ImpossiblePath(
+            f"waypoint {k + 1:d} is to be passed at t = {waypoints.t[k]:g} s, and the one before "
+            f"it at {waypoints.t[k - 1]:g} s: times must grow"
+        )
+    if not waypoints.timed and distance(before, behind) == 0.0:
+        raise ImpossiblePath(
+            f"waypoints {k:d} and {k + 1:d} are the same; a rest takes waypoints with times"
+        )
+    climb = atan2(abs(z), sqrt(x * x + y * y))
+    if climb > STEEPEST:
+        raise ImpossiblePath(
+            f"the way from waypoint {k:d} to {k + 1:d} climbs or dives at {degrees(climb):.1f} "
+            f"degrees; (1) has a pole at 90, so it must stay within {degrees(STEEPEST):g}"
+        )
+
+
+def _check_rounding(parameters: Parameters, corner: Corner, ahead: Corner) -> None:
+    """Refuse a rounding that asks for too much, also at its ends, which are those of its legs.
+
+    Args:
+        parameters: of the planner.
+        corner: to be rounded.
+        ahead: the first whose rounding is not over at the beginning of this one.
+
+    """
+    waypoints = parameters.waypoints
+    before, i = _AT_REST, 0
+    while i * _BETWEEN <= 1.0:
+        t = corner.t + waypoints.rounding * (i * _BETWEEN - 0.5)
+        moment = reference(waypoints, corner_ahead(waypoints, ahead, t), t)
+        dx, dy, dz = moment.dy_d
+        moves = norm(moment.dy_d) > 0.0
+        if before[0] * dx + before[1] * dy + before[2] * dz < 0.0 or (
+            not moves and norm(moment.ddy_d) > 0.0
+        ):
+            raise ImpossiblePath(
+                f"the path turns back on the spot at waypoint {corner.k + 1:d}, which no vehicle "
+                f"does; a waypoint beside it makes a turn of it"
+            )
+        if moves:
+            _check_moment(parameters, corner.k + 1, moment)
+        before = moment.dy_d
+        i = i + 1
+
+
+def _check_moment(parameters: Parameters, number: int, moment: Reference) -> None:
+    """Refuse a moment that asks for too much, near the waypoint of a number."""
+    _, vehicle, ell, (least, most), speed_max, turn_max = parameters
+    speed, turn, (tau_u, tau_q, tau_r) = demand(vehicle, ell, moment)
+    y_d = moment.y_d
+    _hold("a speed", speed, 0.0, speed_max, "m/s", number, y_d)
+    _hold("a turn", turn, 0.0, turn_max, "rad/s", number, y_d)
+    _hold("a driving force", tau_u, least[0], most[0], "N", number, y_d)
+    _hold("a moment in pitch", tau_q, least[1], most[1], "N.m", number, y_d)
+    _hold("a moment in yaw", tau_r, least[2], most[2], "N.m", number, y_d)
+
+
+def _hold(
+    what: str, asked: float, least: float, most: float, unit: str, number: int, y_d: Vector3
+) -> None:
+    """Refuse what is out of bounds."""
+    if not least <= asked <= most:
+        limit = least if asked < least else most
+        raise ImpossiblePath(
+            f"near waypoint {number:d}, at ({y_d[0]:.3g}, {y_d[1]:.3g}, {y_d[2]:.3g}) m, the path "
+            f"asks for {what} of {asked:.3g} {unit}, where {limit:.3g} is the limit; go slower, or "
+            f"round for longer"
+        )

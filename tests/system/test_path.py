@@ -1,0 +1,73 @@
+"""A reference through waypoints, in the place of the planner of the paper."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from auv_fmu import path_planner
+from auv_fmu.path_planner import Waypoints
+from orchestrator.analysis.signals import tracking_error
+from orchestrator.errors import InputError
+from orchestrator.experiments.scenario import read_scenario
+from orchestrator.experiments.wiring import closed_loop
+from orchestrator.system.names import PortName
+from support.runs import run
+
+#: Near the default path, at times: straight ahead, a rest, and a turn to starboard.
+TABLE = "t,x,y,z\n3,3,6,0\n23,13,6,2\n33,13,6,2\n60,13,16,2\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "distances", "peak"), [("path", (0.65, 0.32), 47.0), ("path-pd", (0.84, 0.41), 29.0)]
+)
+def test_controllers_follow_the_survey_as_its_remark_says(native: Path, name, distances, peak):
+    """In the first pair of corners, and in the second."""
+    result = run(closed_loop(native, read_scenario(name)), 100.0, 0.02)
+    assert result.failure is None
+    away = np.linalg.norm(tracking_error(result), axis=1)
+    corners = [away[(result.time > a) & (result.time < b)].max() for a, b in ((25, 50), (55, 80))]
+    assert corners == pytest.approx(distances, abs=0.006)
+    assert np.abs(result["controller.tau.u"]).max() == pytest.approx(peak, abs=0.5)
+    assert away[-250:].max() < 0.05
+
+
+@pytest.mark.parametrize("kind", ["dist", "native"])
+@pytest.mark.parametrize("step", [0.1, 0.7])
+def test_fmu_gives_the_closed_form_at_whatever_step(request, kind: str, step: float):
+    """Also where a step leads over whole roundings."""
+    folder = request.getfixturevalue(kind)
+    result = run(closed_loop(folder, read_scenario("path")), 98.0, step)
+    waypoints = Waypoints()
+    first = path_planner.first_corner(waypoints, 0.0)
+    for i in range(0, len(result.time), 7):
+        t = float(result.time[i])
+        corner = path_planner.corner_ahead(waypoints, first, t)
+        reference = path_planner.reference(waypoints, corner, t)
+        for group, expected in zip(("y_d", "dy_d", "ddy_d"), reference, strict=True):
+            found = result.group(*(f"planner.{group}.{axis}" for axis in "xyz"))[i]
+            np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
+def test_path_from_a_table_is_passed_at_its_times(workplace: Path, native: Path):
+    (workplace / "survey.csv").write_text(TABLE)
+    (workplace / "mine.toml").write_text(
+        '[components]\nplanner = "PathPlanner"\n[path]\nfile = "survey.csv"\n'
+    )
+    scenario = read_scenario(str(workplace / "mine.toml"))
+    result = run(closed_loop(native, scenario), 66.0, 0.02)
+    y_d = result.group("planner.y_d.x", "planner.y_d.y", "planner.y_d.z")
+    np.testing.assert_allclose(y_d[0], (3, 6, 0), atol=1e-12)
+    np.testing.assert_allclose(y_d[round(28.0 / 0.02)], (13, 6, 2), atol=1e-12)
+    np.testing.assert_allclose(y_d[-1], (13, 16, 2), atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["dist", "native"])
+def test_path_that_the_vehicle_cannot_follow_is_refused_in_one_line(request, kind: str):
+    system = closed_loop(request.getfixturevalue(kind), read_scenario("path"))
+    sharp = system.with_parameters({PortName("planner", "rounding"): 1.0})
+    with pytest.raises(InputError, match=r"planner: .*at \(14\.9, .*more tightly than") as error:
+        run(sharp, 1.0, 0.02)
+    assert "\n" not in str(error.value)
