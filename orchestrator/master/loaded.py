@@ -373,8 +373,10 @@ def _shared_callbacks() -> fmi2CallbackFunctions:
     """Those of all instances: fmpy's proxy, which formats the messages, knows one logger only."""
     callbacks = fmi2CallbackFunctions()
     callbacks.logger = _log
-    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    # The functions of C themselves: made into callbacks of Python, they would cost an FMU that
+    # allocates in every step more than the step.
+    callbacks.allocateMemory = ctypes.cast(fmpy.calloc, fmi2CallbackAllocateMemoryTYPE)
+    callbacks.freeMemory = ctypes.cast(fmpy.free, fmi2CallbackFreeMemoryTYPE)
     addLoggerProxy(ctypes.byref(callbacks))
     return callbacks
 

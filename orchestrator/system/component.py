@@ -107,15 +107,18 @@ class Component:
         )
 
     def has_feedthrough(self, output: str) -> bool:
-        """Whether an output depends on an input of the same instant.
+        """Whether an output depends on an input of the same instant."""
+        return output in self._feedthrough
 
-        An FMU that does not say must be taken to have it (FMI 2.0.4, section 2.2.8).
-        """
-        for unknown in self.description.outputs:
-            if unknown.variable.name == output:
-                known = unknown.dependencies
-                return known is None or any(v.causality == "input" for v in known)
-        return False
+    @cached_property
+    def _feedthrough(self) -> frozenset[str]:
+        """An FMU that does not say must be taken to have it (FMI 2.0.4, section 2.2.8)."""
+        return frozenset(
+            unknown.variable.name
+            for unknown in self.description.outputs
+            if unknown.dependencies is None
+            or any(variable.causality == "input" for variable in unknown.dependencies)
+        )
 
 
 def read_component(
