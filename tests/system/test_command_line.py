@@ -302,8 +302,9 @@ def test_bad_input_is_one_line_and_status_2(workplace, capsys, arguments, reason
 
 
 def test_bad_usage_is_status_2():
+    assert main(["run", "fig4", "--order", "random"]) == 2
     with pytest.raises(SystemExit) as stop:
-        main(["run", "fig4", "--order", "random"])
+        main(["run", "fig4", "--kind", "random"])
     assert stop.value.code == 2
 
 
