@@ -44,7 +44,7 @@ def fmus(native: Path, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 def test_nothing_is_wrong_and_nothing_stays_of_a_run_side_by_side(fmus, tmp_path: Path):
     """With states that are saved, serialised, restored and freed."""
-    assert said_by(sanitized_host("host", tmp_path), *fmus).endswith("5 FMUs, 1000 steps each\n")
+    assert said_by(sanitized_host("host", tmp_path), *fmus).endswith("6 FMUs, 1000 steps each\n")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -59,6 +59,6 @@ def test_nothing_is_wrong_whatever_a_host_calls(fmus: list[str], tmp_path: Path,
 def test_threads_do_not_touch_the_same(native: Path, tmp_path: Path):
     """Each FMU in a thread, and each library in four."""
     fmus, host = sanitized(native, tmp_path, THREADS), sanitized_host("threads", tmp_path, THREADS)
-    assert said_by(host, *fmus) == "5 threads\n"
+    assert said_by(host, *fmus) == "6 threads\n"
     for place in range(0, len(fmus), 2):
         assert said_by(host, *fmus[place : place + 2] * 4) == "4 threads\n"

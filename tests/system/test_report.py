@@ -179,7 +179,7 @@ def test_files_on_the_command_line_come_after_the_scenarios(tmp_path, monkeypatc
     monkeypatch.setattr(paper, "write_report", write_report)
     assert main(["report", "mine.toml", "--out", str(tmp_path)]) == 0
     [(folder, scenarios, command)] = asked
-    assert (folder, scenarios[-2:]) == (tmp_path, ["fig7c", "mine.toml"])
+    assert (folder, scenarios[-2:]) == (tmp_path, ["path-pd", "mine.toml"])
     assert command == ["auv-fmu", "report", "mine.toml", "--out", str(tmp_path)]
     assert capsys.readouterr().out == "a\nb\n"
 

@@ -19,7 +19,8 @@ def test_loop_starts_where_section_4_1_says():
     [start] = closed_loop(0, Setting(plant=QUIET))
     y, origin = (2.35, 6.0, 0.0), (0.0, 0.0, 0.0)
     assert start.t == 0.0
-    assert start.vehicles.plant == ((2.0, 6.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0,) * 6, origin)
+    level = (1.0, 0.0, 0.0, 0.0)
+    assert start.vehicles.plant == ((2.0, 6.0, 0.0), level, (0.0,) * 6, origin, origin)
     assert start.scene.plant == (origin, y, origin, (0.0,) * 6)
     assert start.vehicles.planner == ((0.0, 0.0, -2.0), 0.0, 0.0, (0.0,) * 5)
     assert start.controller_state == (y, origin, (0.0,) * 4)
