@@ -56,7 +56,7 @@ typedef struct {
 typedef struct {
     const size_t *targets, *sources;
     const double *factors, *offsets;
-    const mapping *mappings; /* in the order of their connections */
+    const mapping *mappings;
     const member *members;
     size_t n_connections, n_mappings, n_members;
     size_t every; /* how many steps one of its components takes in one of its own */
@@ -151,13 +151,17 @@ static double mapped(const mapping *this, double value) {
     return value;
 }
 
+/* No target is a source of the same stage, so what is mapped can be moved again. */
 static void gather(const stage *this, double values[]) {
-    const mapping *map = this->mappings, *const end = map + this->n_mappings;
-    size_t i;
+    const size_t *to = this->targets, *from = this->sources;
+    size_t i, j;
     for (i = 0; i < this->n_connections; i++) {
-        double value = values[this->sources[i]];
-        if (map < end && map->connection == i) value = mapped(map++, value);
-        values[this->targets[i]] = this->factors[i] * value + this->offsets[i];
+        values[to[i]] = this->factors[i] * values[from[i]] + this->offsets[i];
+    }
+    for (j = 0; j < this->n_mappings; j++) {
+        i = this->mappings[j].connection;
+        values[to[i]] =
+            this->factors[i] * mapped(&this->mappings[j], values[from[i]]) + this->offsets[i];
     }
 }
 
