@@ -84,12 +84,19 @@ def left(one_left: Path) -> None:
     ("scenario", "options", "then"),
     [
         ("fig4", ["--loop", "python", "--interval", "0.1"], ["--isolate"]),
-        ("fig4", ["--kind", "native", "--loop", "compiled", "--format", "parquet"], []),
+        pytest.param(
+            "fig4",
+            ["--kind", "native", "--loop", "compiled", "--format", "parquet"],
+            [],
+            id="parquet",
+        ),
         ("fig3b", ["--loop", "compiled", "--order", "jacobi", "--step", "0.03"], []),
     ],
 )
 def test_a_run_that_is_killed_and_resumed_is_one_that_was_not(scenario, options, then):
     """Twice killed: behind its second checkpoint, and behind the next but one."""
+    if "parquet" in options:
+        pytest.importorskip("pyarrow")
     arguments = [scenario, "--stop-time", "2", "--no-figures", *options]
     assert run(*arguments, out="whole") == 0
     killed_after(2, *arguments, *CHECKPOINTS, out="killed")
