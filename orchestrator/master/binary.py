@@ -108,11 +108,18 @@ def check_binary(component: Component, folder: Path) -> None:
     """
     binaries = folder / "binaries"
     identifier = component.description.coSimulation.modelIdentifier
-    file = f"{identifier}{fmpy.sharedLibraryExtension}"
+    suffix = fmpy.sharedLibraryExtension
+    file = f"{identifier}{suffix}"
     if (binaries / fmpy.platform / file).is_file():
         return
     others = sorted({path.parent.name for path in binaries.glob(f"*/{glob.escape(identifier)}.*")})
-    there = f"binaries for {', '.join(others)} alone" if others else "no binaries at all"
+    named_otherwise = sorted(path.name for path in (binaries / fmpy.platform).glob(f"*{suffix}"))
+    if others:
+        there = f"binaries for {', '.join(others)} alone"
+    elif named_otherwise:
+        there = f"{', '.join(named_otherwise)} instead"
+    else:
+        there = "no binaries at all"
     raise InputError(
         f"{named(component)} has no {file} for this machine, {fmpy.platform}: it has {there}"
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -210,6 +211,15 @@ def test_a_machine_for_which_there_is_no_library_is_named(tmp_path: Path, way):
         run(system_of(fmu), **way)
     assert "a: plain.fmu has no others.so for this machine, linux64" in str(error.value)
     assert str(error.value).endswith("it has binaries for win64 alone")
+
+
+def test_a_library_of_another_name_is_named(tmp_path: Path):
+    renamed = tmp_path / "renamed.fmu"
+    with ZipFile(build(tmp_path)) as fmu, ZipFile(renamed, "w") as archive:
+        for name in fmu.namelist():
+            archive.writestr(name.replace("others.so", "another.so"), fmu.read(name))
+    with pytest.raises(InputError, match="it has another.so instead"):
+        run(system_of(renamed))
 
 
 def test_an_fmu_that_cannot_be_instantiated_says_that_it_needs_a_tool(tmp_path):
