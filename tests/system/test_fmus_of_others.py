@@ -218,7 +218,7 @@ def test_a_library_of_another_name_is_named(tmp_path: Path):
     with ZipFile(build(tmp_path)) as fmu, ZipFile(renamed, "w") as archive:
         for name in fmu.namelist():
             archive.writestr(name.replace("others.so", "another.so"), fmu.read(name))
-    with pytest.raises(InputError, match="it has another.so instead"):
+    with pytest.raises(InputError, match=r"it has another\.so instead"):
         run(system_of(renamed))
 
 
