@@ -4,15 +4,9 @@ from __future__ import annotations
 
 from auv_fmu.motion_planner import ETA_D0, NU_D0, TAU_D, Parameters
 from fmus.ports.groups import ParameterSet
-from fmus.ports.port import H_MAX, Port, outputs, parameters
-from fmus.ports.quantities import (
-    ACCELERATION,
-    ETA_WITHOUT_ROLL,
-    NU_WITHOUT_ROLL,
-    POSITION,
-    TAU,
-    VELOCITY,
-)
+from fmus.ports.planners import reference
+from fmus.ports.port import H_MAX, Port, parameters
+from fmus.ports.quantities import ETA_WITHOUT_ROLL, NU_WITHOUT_ROLL, TAU
 from fmus.ports.vehicle import CONTROL_POINT, VEHICLE
 
 DESCRIPTION = "Motion planner: helical reference with velocity and acceleration"
@@ -30,10 +24,7 @@ PARAMETERS = ParameterSet(
 )
 
 PORTS: tuple[Port, ...] = (
-    *outputs("y_d", POSITION, "Desired control point"),
-    *outputs("dy_d", VELOCITY, "Desired velocity"),
-    *outputs("ddy_d", ACCELERATION, "Desired acceleration, in closed form"),
-    *outputs("eta_d", ETA_WITHOUT_ROLL, "Posture of the reference vehicle"),
+    *reference("Posture of the reference vehicle"),
     *PARAMETERS.before(*_NU0),
     H_MAX,
     *_NU0,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from fmus.ports.groups import ParameterSet
-from fmus.ports.port import POSITIVE, Port, outputs, parameter
-from fmus.ports.quantities import ACCELERATION, ETA_WITHOUT_ROLL, POSITION, VELOCITY
+from fmus.ports.planners import reference
+from fmus.ports.port import POSITIVE, Port, parameter
 from fmus.ports.vehicle import CONTROL_POINT, LIMITS, VEHICLE
 
 DESCRIPTION = "Path planner: reference through waypoints with velocity and acceleration"
@@ -72,10 +72,7 @@ PARAMETERS = ParameterSet(
 _WAYS = (_COUNT, *(port for k in zip(_X, _Y, _Z, _T) for port in k), _TIMED, _CRUISE, _ROUNDING)
 
 PORTS: tuple[Port, ...] = (
-    *outputs("y_d", POSITION, "Desired control point"),
-    *outputs("dy_d", VELOCITY, "Desired velocity"),
-    *outputs("ddy_d", ACCELERATION, "Desired acceleration, in closed form"),
-    *outputs("eta_d", ETA_WITHOUT_ROLL, "Posture of a vehicle that points along the path"),
+    *reference("Posture of a vehicle that points along the path"),
     *_WAYS,
     *(port for port in PARAMETERS.ports if port not in _WAYS),
 )

@@ -9,6 +9,7 @@ module                   what it states
 :mod:`.groups`           flat values of ports from groups, and groups from flat values
 :mod:`.vehicle`          parameters of (2)
 :mod:`.controllers`      what the controllers have in common
+:mod:`.planners`         what the planners have in common
 :mod:`.description`      what modelDescription.xml says in every version of FMI
 :mod:`.description_fmi2` modelDescription.xml of FMI 2.0
 :mod:`.description_fmi3` modelDescription.xml and buildDescription.xml of FMI 3.0
