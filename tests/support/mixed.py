@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import re
-import shutil
-import subprocess
 from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 from zipfile import ZipFile
 
-import pytest
 from hypothesis import strategies as st
 
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
+from support.compiled import library_of
 
 _SOURCE = Path(__file__).with_name("mixed.c")
 
@@ -103,27 +99,13 @@ def _variable(name: str, kind: str, reference: int, causality: str) -> str:
     )
 
 
-@cache
-def _library() -> bytes:
-    """The FMU's library; the test is skipped where there is no compiler."""
-    compiler = shutil.which("cc")
-    if compiler is None:
-        pytest.skip("no C compiler")
-    with TemporaryDirectory() as folder:
-        library = Path(folder, "mixed.so")
-        subprocess.run(
-            [compiler, "-shared", "-fPIC", "-O1", "-w", "-o", library, _SOURCE], check=True
-        )
-        return library.read_bytes()
-
-
 def build(folder: Path, shape: Shape) -> Path:
     """The FMU of a shape."""
     fmu = folder / f"{abs(hash(shape)):x}.fmu"
     if not fmu.exists():
         with ZipFile(fmu, "w") as archive:
             archive.writestr("modelDescription.xml", shape.description())
-            archive.writestr("binaries/linux64/mixed.so", _library())
+            archive.writestr("binaries/linux64/mixed.so", library_of(_SOURCE))
             archive.writestr("resources/nothing.txt", "")
     return fmu
 

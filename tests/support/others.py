@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
-from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from zipfile import ZipFile
-
-import pytest
 
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.isolated import Isolation
@@ -19,6 +13,7 @@ from orchestrator.master.table import Table
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
+from support.compiled import library_of
 
 _SOURCE = Path(__file__).with_name("others.c")
 
@@ -70,19 +65,6 @@ def _description(attributes: str) -> str:
     )
 
 
-@cache
-def _library(peculiarity: str) -> bytes:
-    compiler = shutil.which("cc")
-    if compiler is None:
-        pytest.skip("no C compiler")
-    with TemporaryDirectory() as folder:
-        library = Path(folder, "others.so")
-        define = [f"-D{peculiarity}"] * bool(peculiarity)
-        options = ["-shared", "-fPIC", "-O1", "-w", *define]
-        subprocess.run([compiler, *options, "-o", library, _SOURCE], check=True)
-        return library.read_bytes()
-
-
 def build(
     folder: Path,
     peculiarity: str = "",
@@ -101,9 +83,10 @@ def build(
 
     """
     fmu = folder / f"{peculiarity or 'plain'}.fmu"
+    define = [f"-D{peculiarity}"] * bool(peculiarity)
     with ZipFile(fmu, "w") as archive:
         archive.writestr("modelDescription.xml", _description(attributes).replace(*change))
-        archive.writestr(f"binaries/{platform}/others.so", _library(peculiarity))
+        archive.writestr(f"binaries/{platform}/others.so", library_of(_SOURCE, *define))
     return fmu
 
 

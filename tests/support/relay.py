@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
 from collections.abc import Mapping, Sequence
-from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 from zipfile import ZipFile
-
-import pytest
 
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.transformation import Linear, Mapped, Transformation
+from support.compiled import library_of
 
 _SOURCE = Path(__file__).with_name("relay.c")
 
@@ -25,19 +20,6 @@ INPUTS, OUTPUTS, PARAMETERS = ("u", "v"), ("g", "y", "t", "h"), ("a", "c")
 
 _VARIABILITY = {"input": "continuous", "output": "continuous", "parameter": "fixed"}
 _START = {"input": ' start="0"', "output": "", "parameter": ' start="0"'}
-
-
-@cache
-def _library() -> bytes:
-    """The FMU's library; the test is skipped where there is no compiler."""
-    compiler = shutil.which("cc")
-    if compiler is None:
-        pytest.skip("no C compiler")
-    with TemporaryDirectory() as folder:
-        library = Path(folder, "relay.so")
-        options = ["-shared", "-fPIC", "-O1", "-w", "-ffp-contract=off"]
-        subprocess.run([compiler, *options, "-o", library, _SOURCE], check=True)
-        return library.read_bytes()
 
 
 def _description(declares: bool, step: float | None) -> str:
@@ -74,7 +56,7 @@ def relay(folder: Path, declares: bool = True, step: float | None = None) -> Pat
     if not fmu.exists():
         with ZipFile(fmu, "w") as archive:
             archive.writestr("modelDescription.xml", _description(declares, step))
-            archive.writestr("binaries/linux64/relay.so", _library())
+            archive.writestr("binaries/linux64/relay.so", library_of(_SOURCE, "-ffp-contract=off"))
     return fmu
 
 
