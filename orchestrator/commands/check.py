@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from orchestrator.commands.options import BAD_INPUT, OK
+from orchestrator.commands.options import BAD_INPUT, OK, add_variant
 from orchestrator.commands.streams import show
 from orchestrator.experiments.preparation import Request, loaded, prepare
 from orchestrator.findings import Findings
@@ -27,11 +27,7 @@ def add_to(commands: Any) -> None:
     check.add_argument(
         "file", metavar="FILE.fmu|FILE.ssp|FILE.toml|SCENARIO", help="what is looked at, not run"
     )
-    check.add_argument(
-        "--variant",
-        metavar="NAME",
-        help="which description in an SSP: NAME.ssd; default: SystemStructure",
-    )
+    add_variant(check)
     check.set_defaults(action=_check)
 
 

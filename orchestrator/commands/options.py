@@ -28,15 +28,20 @@ def add_system(parser: argparse.ArgumentParser) -> None:
         metavar="SCENARIO|FILE.toml|FILE.ssp",
         help="a scenario of `auv-fmu list`, a scenario file, or an SSP",
     )
-    parser.add_argument(
-        "--variant",
-        metavar="NAME",
-        help="which description in an SSP: NAME.ssd; default: SystemStructure",
-    )
+    add_variant(parser)
     parser.add_argument(
         "--strict",
         action="store_true",
         help="refuse what otherwise is a warning",
+    )
+
+
+def add_variant(parser: argparse.ArgumentParser) -> None:
+    """Which system of an archive."""
+    parser.add_argument(
+        "--variant",
+        metavar="NAME",
+        help="which description in an SSP: NAME.ssd; default: SystemStructure",
     )
 
 

@@ -80,7 +80,7 @@ def _table(reader: Any, ports: Mapping[str, str], prefixes: Collection[str]) -> 
     time, columns = array("d"), {port: array("d") for port in places}
     for row in _rows(reader, len(names)):
         where = f"line {reader.line_num}"
-        time.append(finite(row[clock], f"{where}, time"))
+        time.append(finite(row[clock], f"{where}, time:"))
         if time[-1] < 0.0:
             raise ValueError(f"{where}: time {time[-1]:g} s is before the start at 0 s")
         if len(time) > 1 and not time[-1] > time[-2]:
@@ -144,4 +144,4 @@ def _port_of(name: str, ports: Collection[str], prefixes: Collection[str]) -> st
 def _value(text: str, kind: str, where: str) -> float:
     words = BOOLEANS if kind == "Boolean" else {}
     word = text.strip().lower()
-    return float(words[word]) if word in words else finite(text, where)
+    return float(words[word]) if word in words else finite(text, f"{where}:")

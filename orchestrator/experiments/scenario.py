@@ -111,12 +111,7 @@ ENTRIES: dict[str, Entry] = {
         "none",
     ),
     "stop_time": Entry("number", is_number, "End of the run [s].", "100 s"),
-    "step": Entry(
-        "number",
-        is_number,
-        "Communication step [s].",
-        "0.02 s",
-    ),
+    "step": Entry("number", is_number, "Communication step [s].", "0.02 s"),
     "steps": Entry(
         "table of numbers",
         _is_table_of_numbers,
@@ -238,9 +233,7 @@ def _path_parameters(
     path: Path, said: Mapping[str, str], others: Mapping[PortName, Any]
 ) -> dict[PortName, Any]:
     """What a path comes to, in a scenario with other parameters."""
-    check_entries(f"{path}: path", said, PATH)
-    if "file" not in said:
-        raise InputError(f"{path}: path: name a file")
+    _check_table(path, "path", said, PATH)
     found = path_parameters(path.parent / said["file"], said.get("component", PLANNER))
     for name in found.keys() & others.keys():
         raise InputError(f"{path}: {name} is given by {said['file']} already")
@@ -248,7 +241,14 @@ def _path_parameters(
 
 
 def _inputs(path: Path, table: Mapping[str, Any]) -> Inputs:
-    check_entries(f"{path}: inputs", table, INPUTS)
-    if "file" not in table:
-        raise InputError(f"{path}: inputs: name a file")
+    _check_table(path, "inputs", table, INPUTS)
     return Inputs(**{**table, "file": path.parent / table["file"]})
+
+
+def _check_table(
+    path: Path, entry: str, said: Mapping[str, Any], entries: Mapping[str, Entry]
+) -> None:
+    """Check what a scenario says of a table in a file of its own."""
+    check_entries(f"{path}: {entry}", said, entries)
+    if "file" not in said:
+        raise InputError(f"{path}: {entry}: name a file")

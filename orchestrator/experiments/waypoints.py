@@ -70,4 +70,4 @@ def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
 def _waypoint(row: Mapping[Any, Any], names: Sequence[str], where: str) -> dict[str, float]:
     if None in row or None in row.values():
         raise ValueError(f"{where} has not {len(names)} values")
-    return {name: finite(row[name], f"{where}, {name}") for name in names}
+    return {name: finite(row[name], f"{where}, {name}:") for name in names}

@@ -73,10 +73,10 @@ def real(text: str) -> float:
 
 
 def finite(text: str, where: str) -> float:
-    """A number that can be computed with, from a cell of a table.
+    """A number that can be computed with, from a file.
 
     Args:
-        text: of the cell.
+        text: of the number.
         where: it stands, for the message.
 
     Raises:
@@ -86,9 +86,9 @@ def finite(text: str, where: str) -> float:
     try:
         number = real(text)
     except ValueError:
-        raise ValueError(f"{where}: {text[:40]!r} is no number") from None
+        raise ValueError(f"{where} {text[:40]!r} is no number") from None
     if not isfinite(number):
-        raise ValueError(f"{where}: {text[:40]!r} is not finite")
+        raise ValueError(f"{where} {text[:40]!r} is not finite")
     return number
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from math import isfinite
 from pathlib import Path
 from typing import TypeVar
 from urllib.parse import unquote, urlsplit
@@ -18,7 +17,7 @@ from orchestrator.system.ssp.validation import violations
 from orchestrator.system.transformation import Linear
 from orchestrator.system.units import UndefinedUnit, Unit, conversion
 from orchestrator.system.unpacking import unpacked
-from orchestrator.system.values import real
+from orchestrator.system.values import finite
 
 _SUFFIX = Path(STRUCTURE).suffix
 
@@ -192,12 +191,9 @@ def number(name: str, text: str) -> float:
 
     """
     try:
-        found = real(text)
-    except ValueError:
-        raise InputError(f"{name} {text!r} is no number") from None
-    if not isfinite(found):
-        raise InputError(f"{name} {text!r} is not finite")
-    return found
+        return finite(text, name)
+    except ValueError as error:
+        raise InputError(str(error)) from None
 
 
 def listed(names: Sequence[str], between: str = ", ") -> str:
