@@ -8,7 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.analysis import gains
-from orchestrator.commands.options import OK, add_fmi, add_kind, add_out, add_set, assignments
+from orchestrator.commands.options import (
+    OK,
+    add_fmi,
+    add_force,
+    add_kind,
+    add_out,
+    add_set,
+    assignments,
+)
 from orchestrator.commands.streams import show
 from orchestrator.errors import InputError
 from orchestrator.experiments import bundle
@@ -40,6 +48,7 @@ def add_to(commands: Any) -> None:
     )
     folders = f"{DEFAULT_FOLDERS[PYTHON]} or {DEFAULT_FOLDERS[NATIVE]}"
     add_out(build, None, f"{folders}, or the folder of SCRIPT.py")
+    add_force(build)
     build.add_argument(
         "--loader",
         choices=("native", "plain"),
@@ -60,7 +69,7 @@ def _build(options: argparse.Namespace) -> int:
     if options.script is not None:
         if options.kind != PYTHON:
             raise InputError(f"{options.script}: only the bundle's components are translated to C")
-        show(build_own(options.script, options.out, options.loader))
+        show(build_own(options.script, options.out, options.loader, force=options.force))
         return OK
     folder = options.out or DEFAULT_FOLDERS[options.kind]
     written = bundle.build(
@@ -69,6 +78,7 @@ def _build(options: argparse.Namespace) -> int:
         kind=options.kind,
         fmi=options.fmi,
         platforms=options.platforms,
+        force=options.force,
     )
     for path in written:
         show(path)

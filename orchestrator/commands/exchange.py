@@ -13,6 +13,7 @@ from orchestrator.commands.options import (
     FAILED,
     OK,
     add_fmi,
+    add_force,
     add_kind,
     add_out,
     add_set,
@@ -57,6 +58,7 @@ def add_to(commands: Any) -> None:
     add_fmi(export)
     add_set(export)
     add_out(export, None, "exports/SCENARIO/")
+    add_force(export)
     export.set_defaults(action=_export)
 
     others = commands.add_parser("hosts", help="run a scenario in other co-simulation tools")
@@ -104,8 +106,8 @@ def _export(options: argparse.Namespace) -> int:
     )
     if left := left_behind(prepared.scenario):
         say(f"warning: {left}")
-    folder = options.out or Path("exports", prepared.scenario.name)
-    with replaced(folder) as unfinished:
+    folder = options.out or Path("exports", prepared.scenario.stem)
+    with replaced(folder, force=options.force) as unfinished:
         written = FORMATS[options.format](system, unfinished)
     for path in written:
         show(folder / path.relative_to(unfinished))

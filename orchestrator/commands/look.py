@@ -17,21 +17,21 @@ from orchestrator.analysis.visible import VisibleRows
 from orchestrator.commands.options import (
     OK,
     add_experiment,
+    add_force,
     add_set,
     add_system,
     read,
     request,
     status,
 )
-from orchestrator.commands.streams import show
-from orchestrator.errors import InputError, reason
+from orchestrator.commands.streams import say, show
+from orchestrator.errors import InputError
+from orchestrator.experiments.folder import VIEW, replaced
 from orchestrator.experiments.preparation import prepare
-from orchestrator.experiments.record import add_to_record
-from orchestrator.experiments.stored import read_record, read_result, table_in
+from orchestrator.experiments.stored import changed_files, read_record, read_result, table_in
 from orchestrator.master.observer import Observer
 from orchestrator.master.progress import Progress
 from orchestrator.master.simulation import simulate
-from orchestrator.system.atomic import whole
 
 #: What a plot can be written as.
 _PLOTS = (".png", ".svg", ".pdf")
@@ -72,6 +72,7 @@ def add_to(commands: Any) -> None:
 
 def _add_file(parser: argparse.ArgumentParser, text: str, default: Path | None = None) -> None:
     parser.add_argument("--out", type=Path, metavar="FILE", default=default, help=text)
+    add_force(parser)
 
 
 def _plot(options: argparse.Namespace) -> int:
@@ -81,12 +82,20 @@ def _plot(options: argparse.Namespace) -> int:
     patterns = [text for text in options.what if not _is_there(text)]
     if not paths:
         raise InputError(f"{patterns[0]}: no such result; give the folder or the table of a run")
+    for path in paths:
+        _warn(table_in(path))
     runs = [read_result(path, lambda columns: wanted(columns, patterns)) for path in paths]
     names = [name for name, _ in runs]
     labels = names if len(set(names)) == len(names) else list(map(str, paths))
     figure = plot(list(zip(labels, (table for _, table in runs), strict=True)), patterns)
-    _write(options.out, lambda unfinished: save(figure, unfinished))
+    _write(options, options.out, lambda unfinished: save(figure, unfinished))
     return OK
+
+
+def _warn(table: Path) -> None:
+    """Say of a result that is not what the run wrote."""
+    for file in changed_files(table):
+        say(f"warning: {file} was changed since the run wrote it")
 
 
 def _is_there(text: str) -> bool:
@@ -98,23 +107,23 @@ def _is_there(text: str) -> bool:
 
 def _view(options: argparse.Namespace) -> int:
     file = table_in(options.result)
-    out = options.out or file.with_name("view.html")
+    out = options.out or file.with_name(VIEW)
     if out.suffix != ".html":
         raise InputError(f"{out}: write a .html")
+    _warn(file)
     name, table = read_result(file)
     title = str(read_record(file).get("title") or name)
     try:
         text = page(title, table)
     except InputError as error:
         raise InputError(f"{options.result}: {error}") from error
-    _write(out, lambda unfinished: unfinished.write_text(text, encoding="utf-8"))
-    add_to_record(out)
+    _write(options, out, lambda unfinished: unfinished.write_text(text, encoding="utf-8"))
     return OK
 
 
 def _animate(options: argparse.Namespace) -> int:
     scenario, system = read(options)
-    out = options.out or Path("results", f"{scenario.name}.gif")
+    out = options.out or Path("results", f"{scenario.stem}.gif")
     check_film(out, options.fps)
     prepared = prepare(scenario, system, request(options))
     seen = VisibleRows()
@@ -129,16 +138,12 @@ def _animate(options: argparse.Namespace) -> int:
     if missing := seen.missing(*CONTROL_POINT):
         raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
     title = scenario.title or scenario.name
-    _write(out, lambda unfinished: animate(title, seen, unfinished, options.fps))
+    _write(options, out, lambda unfinished: animate(title, seen, unfinished, options.fps))
     return status(scenario.name, ending)
 
 
-def _write(path: Path, write: Callable[[Path], object]) -> None:
+def _write(options: argparse.Namespace, path: Path, write: Callable[[Path], object]) -> None:
     """Write a file whole or not at all, and say where it is."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with whole(path) as partial:
-            write(partial)
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {reason(error)}; choose --out FILE") from error
+    with replaced(path.parent, [path.name], force=options.force) as unfinished:
+        write(unfinished / path.name)
     show(path)

@@ -120,6 +120,16 @@ def add_out(parser: argparse.ArgumentParser, default: Path | None, otherwise: st
     )
 
 
+def add_force(parser: argparse.ArgumentParser) -> None:
+    """What becomes of files of the user's that are in the way."""
+    parser.add_argument(
+        "--force",
+        action="store_true",
+        help="move files of yours aside that have names of files that are written, to NAME.~1~; "
+        "otherwise they stay, and nothing is written",
+    )
+
+
 def read(options: argparse.Namespace, fmi: str = FMI[0]) -> tuple[Scenario, System]:
     """What is run; what is not as it should be, and does no harm, becomes a warning."""
     findings = Findings(options.strict)

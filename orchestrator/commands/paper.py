@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from orchestrator.commands.options import OK, add_kind, add_out
+from orchestrator.commands.options import OK, add_force, add_kind, add_out
 from orchestrator.commands.streams import show
 from orchestrator.experiments.scenario import names
 from orchestrator.paper.report import write_report
@@ -31,12 +31,14 @@ def add_to(commands: Any) -> None:
     )
     add_kind(report)
     add_out(report, Path("results", "report"))
+    add_force(report)
     report.set_defaults(action=_report)
 
     table = commands.add_parser(
         "table", help="hold the printed table of section 4.2 against all that the paper leaves open"
     )
     add_out(table, Path("results", "table"))
+    add_force(table)
     table.set_defaults(action=_table)
 
 
@@ -50,12 +52,13 @@ def _report(options: argparse.Namespace) -> int:
         kind=options.kind,
         ready=ready,
         variants=options.studies,
+        force=options.force,
     ):
         show(path)
     return OK
 
 
 def _table(options: argparse.Namespace) -> int:
-    for path in write_table(options.out, options.command):
+    for path in write_table(options.out, options.command, options.force):
         show(path)
     return OK

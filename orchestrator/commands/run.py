@@ -15,6 +15,7 @@ import numpy as np
 from orchestrator.analysis.metrics import LAST_SECONDS
 from orchestrator.commands.options import (
     add_experiment,
+    add_force,
     add_loop,
     add_out,
     add_set,
@@ -40,6 +41,7 @@ def add_to(commands: Any) -> None:
     add_experiment(run)
     add_set(run)
     add_out(run, None, "results/SCENARIO/")
+    add_force(run)
     run.add_argument(
         "--interval",
         type=float,
@@ -111,7 +113,7 @@ def _run(options: argparse.Namespace) -> int:
         inputs=inputs_of(options.inputs),
     )
     runs = with_companion(prepare(*read(options), wanted), wanted)
-    folder = options.out or Path("results", runs[0].scenario.name)
+    folder = options.out or Path("results", runs[0].scenario.stem)
     files = Files(
         options.interval,
         options.columns,
@@ -119,6 +121,7 @@ def _run(options: argparse.Namespace) -> int:
         options.figures,
         options.checkpoint_every,
         options.resume,
+        options.force,
     )
     # Until all is said: who stops a run several times wants to know, too, where its rows are.
     with held_interrupts(_answer):

@@ -6,7 +6,7 @@ import argparse
 import os
 from typing import Any
 
-from orchestrator.commands.options import INTERRUPTED, OK, add_kind, add_loop, add_out
+from orchestrator.commands.options import INTERRUPTED, OK, add_force, add_kind, add_loop, add_out
 from orchestrator.commands.streams import say, show
 from orchestrator.studies.study import ENGINES, read_study, ready_studies
 from orchestrator.studies.sweep import Means, folder_of, swept
@@ -37,13 +37,21 @@ def add_to(commands: Any) -> None:
         "--workers", type=int, metavar="N", help="processes on this machine; default: its cores"
     )
     add_out(sweep, None, "results/NAME/")
+    add_force(sweep)
     sweep.set_defaults(action=_sweep)
 
 
 def _sweep(options: argparse.Namespace) -> int:
     study = read_study(options.study)
     folder = folder_of(study, options.out)
-    means = Means(options.engine, options.kind, options.loop, options.scheduler, options.workers)
+    means = Means(
+        options.engine,
+        options.kind,
+        options.loop,
+        options.scheduler,
+        options.workers,
+        options.force,
+    )
     try:
         result = swept(study, means, folder, options.command, say, progress=True)
     except KeyboardInterrupt:

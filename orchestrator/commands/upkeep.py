@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from orchestrator.commands.options import OK, add_out
+from orchestrator.commands.options import OK, add_force, add_out
 from orchestrator.commands.streams import show
 from orchestrator.exchange.reference import write_reference
 from orchestrator.experiments.bundle import current_fmus, run_fmus
@@ -15,22 +15,23 @@ from orchestrator.experiments.scenario_page import scenario_page
 from orchestrator.paper.errata import errata_page
 from orchestrator.studies.ready_page import ready_page
 from orchestrator.studies.study_page import study_page
-from orchestrator.system.atomic import whole
 
 
 def add_to(commands: Any) -> None:
     """Add these commands to the parser."""
     reference = commands.add_parser("reference", help="write reference results of every FMU")
     add_out(reference, Path("reference"))
+    add_force(reference)
     reference.set_defaults(action=_reference)
 
     docs = commands.add_parser("docs", help="write the pages that say what the code says")
     add_out(docs, Path("docs"))
+    add_force(docs)
     docs.set_defaults(action=_docs)
 
 
 def _reference(options: argparse.Namespace) -> int:
-    with replaced(options.out) as unfinished:
+    with replaced(options.out, force=options.force) as unfinished:
         written = write_reference(current_fmus(), unfinished)
     for path in written:
         show(options.out / path.relative_to(unfinished))
@@ -38,16 +39,16 @@ def _reference(options: argparse.Namespace) -> int:
 
 
 def _docs(options: argparse.Namespace) -> int:
-    written = run_fmus("packaging.documentation", options.out / "components")
     pages = {
         "scenarios.md": scenario_page(),
         "studies.md": study_page(),
         "ready-studies.md": ready_page(),
         "paper.md": errata_page(),
     }
-    for name, text in pages.items():
-        with whole(options.out / name) as partial:
-            partial.write_text(text, encoding="utf-8")
-    for path in (*written, *(options.out / name for name in pages)):
-        show(path)
+    with replaced(options.out, pages, force=options.force) as unfinished:
+        written = run_fmus("packaging.documentation", unfinished / "components")
+        for name, text in pages.items():
+            (unfinished / name).write_text(text, encoding="utf-8")
+    for path in (*written, *(unfinished / name for name in pages)):
+        show(options.out / path.relative_to(unfinished))
     return OK

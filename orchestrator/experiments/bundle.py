@@ -31,7 +31,7 @@ from orchestrator.experiments.wiring import closed_loop
 from orchestrator.system.atomic import to_disk
 from orchestrator.system.children import run_module
 from orchestrator.system.component import WRITABLE
-from orchestrator.system.leftovers import claimed, remove_left
+from orchestrator.system.leftovers import claimed
 from orchestrator.system.ssp.writing import ssp_bytes
 
 #: The kinds of FMU that a component comes as: Python sources, or their translation to C.
@@ -63,6 +63,7 @@ def build(
     kind: str = PYTHON,
     fmi: str = FMI[0],
     platforms: str | None = None,
+    force: bool = False,
 ) -> list[Path]:
     """Bring a folder with FMUs and SSP up to date.
 
@@ -73,6 +74,7 @@ def build(
         kind: one of :data:`KINDS`.
         fmi: version, one of :data:`FMI`.
         platforms: of the native kind, with commas between them; None: this machine.
+        force: move aside files of the user's that have names of these.
 
     Returns:
         The files that had to be written.
@@ -81,7 +83,7 @@ def build(
         InputError: the folder cannot be written, or the FMUs cannot be built.
 
     """
-    with replaced(folder) as unfinished:
+    with replaced(folder, (ARCHIVE, MANIFEST, CHECKSUMS, BILL), force=force) as unfinished:
         # What is up to date is taken along, and not written anew.
         for path in (*folder.glob("*.fmu"), folder / MANIFEST):
             if path.is_file():
@@ -151,7 +153,6 @@ def current_fmus(kind: str = PYTHON, fmi: str = FMI[0]) -> Path:
         return folder
     try:
         cache_folder.mkdir(parents=True, exist_ok=True)
-        remove_left(cache_folder, f"{_PARTIAL}*")
         partial = Path(mkdtemp(prefix=_PARTIAL, dir=cache_folder))
         try:
             with claimed(partial):

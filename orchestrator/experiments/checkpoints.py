@@ -22,18 +22,20 @@ FOLDER = "checkpoint"
 
 def checkpoints_of(
     runs: Sequence[Prepared],
-    folder: Path,
+    folders: Sequence[Path],
     every: float | None,
     resume: bool,
+    force: bool = False,
     say: Callable[[str], None] = lambda _: None,
 ) -> list[Checkpoints]:
     """The checkpoints of some runs, one after the other.
 
     Args:
         runs: whose results go into a folder: of the first into it, of the others below it.
-        folder: of the first one's checkpoints.
+        folders: of their checkpoints.
         every: one for so many simulated seconds [s]; None: as often as before, if runs are resumed.
         resume: begin with those that are there.
+        force: move aside what is there otherwise.
         say: takes notes for the user.
 
     Returns:
@@ -44,27 +46,26 @@ def checkpoints_of(
 
     """
     if resume and every is None:
-        every = interval_in(folder)
+        every = interval_in(folders[0])
         if every is None:
             raise InputError(
-                f"there is nothing to resume in {folder}; a run leaves something there with "
+                f"there is nothing to resume in {folders[0]}; a run leaves something there with "
                 "--checkpoint-every"
             )
     if every is None:
         return []
     for prepared in runs:
         check_gives_states(prepared.system)
-    places = [folder, *(folder / prepared.scenario.name for prepared in runs[1:])]
     found = [
-        Checkpoints(place, _identity(prepared), every, resume)
-        for place, prepared in zip(places, runs, strict=True)
+        Checkpoints(folder, _identity(prepared), every, resume, force)
+        for folder, prepared in zip(folders, runs, strict=True)
     ]
     times = [checkpoints.time for checkpoints in found]
     for prepared, time in zip(runs, times, strict=True):
         if time is not None:
             say(f"{prepared.scenario.name}: goes on at t = {time:g} s")
     if resume and not any(times):
-        say(f"there is nothing to resume in {folder}: begins at the start")
+        say(f"there is nothing to resume in {folders[0]}: begins at the start")
     return found
 
 

@@ -9,9 +9,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from orchestrator.errors import InputError, reason
+from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import run_fmus
-from orchestrator.system.atomic import whole
+from orchestrator.experiments.folder import replaced
 from orchestrator.system.leftovers import process_folder
 
 _TEMPLATES = Path(__file__).with_name("templates")
@@ -45,26 +45,30 @@ def new_controller(name: str, folder: Path | None = None, base: str = BASES[0]) 
         "scenario.toml": "scenario.toml",
         "README.md": "README.md",
     }
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if any(folder.iterdir()):
-            raise InputError(f"{folder}: is not empty, and nothing in it is replaced")
+    if folder.is_dir() and any(folder.iterdir()):
+        raise InputError(f"{folder}: is not empty, and nothing in it is replaced")
+    with replaced(folder, contents) as unfinished:
         for target, template in contents.items():
             text = (_TEMPLATES / template).read_text(encoding="utf-8")
             text = text.replace(_CLASS, class_name).replace(_MODULE, module)
-            (folder / target).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write into {folder}: {reason(error)}") from error
+            (unfinished / target).write_text(text, encoding="utf-8")
     return [*(folder / target for target in contents), build_own(folder / f"{module}.py")]
 
 
-def build_own(script: Path, folder: Path | None = None, loader: str | None = None) -> Path:
+def build_own(
+    script: Path,
+    folder: Path | None = None,
+    loader: str | None = None,
+    *,
+    force: bool = False,
+) -> Path:
     """Build the FMU of a user's script.
 
     Args:
         script: a Python file with one slave.
         folder: of the FMU, which gets the name of the slave's class; None: the script's own.
         loader: `native` or `plain`; None: native where it can be compiled.
+        force: move aside a file of the user's that has the name of the FMU.
 
     Raises:
         InputError: the script is missing or fails, or the folder cannot be written.
@@ -75,14 +79,10 @@ def build_own(script: Path, folder: Path | None = None, loader: str | None = Non
     options = [str(script), *(("--loader", loader) if loader else ())]
     with TemporaryDirectory(dir=process_folder()) as temporary:
         [built] = run_fmus("packaging.own", Path(temporary), *options)
-        path = (script.parent if folder is None else folder) / built.name
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with whole(path) as partial:
-                shutil.copyfile(built, partial)
-        except OSError as error:
-            raise InputError(f"cannot write {path}: {reason(error)}") from error
-    return path
+        place = script.parent if folder is None else folder
+        with replaced(place, [built.name], force=force) as unfinished:
+            shutil.copyfile(built, unfinished / built.name)
+    return place / built.name
 
 
 def _names(name: str) -> tuple[str, str]:

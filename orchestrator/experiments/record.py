@@ -14,13 +14,15 @@ from typing import Any
 
 from orchestrator.experiments.bill_of_materials import digest_of
 from orchestrator.experiments.bundle import NATIVE, PYTHON
-from orchestrator.experiments.folder import RECORD
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observer import Ending, Header, Occurrence
-from orchestrator.system.atomic import whole
+from orchestrator.system.ledger import RECORD
 from orchestrator.system.names import port_name
 from orchestrator.system.unpacking import runs_python, unpacked
+
+#: The indices of a run.
+METRICS = "metrics.json"
 
 #: Packages whose versions a result depends on.
 PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy", "matplotlib")
@@ -40,6 +42,11 @@ class Clock:
             "started": self._started.isoformat(timespec="seconds"),
             "seconds": round(monotonic() - self._tick, 3),
         }
+
+
+def write_metrics(folder: Path, values: Mapping[str, Any]) -> None:
+    """Write metrics.json into a folder."""
+    (folder / METRICS).write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
 
 
 def write_record(
@@ -105,19 +112,6 @@ def write_files(folder: Path, content: dict[str, Any]) -> None:
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     text = json.dumps({**content, "files": sorted(files | {RECORD})}, indent=2)
     (folder / RECORD).write_text(text + "\n", encoding="utf-8")
-
-
-def add_to_record(file: Path) -> None:
-    """Name a file that was made from a result in its record, so that it goes with the result."""
-    path = file.parent / RECORD
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        record["files"] = sorted({*record["files"], file.name})
-    except (OSError, ValueError, KeyError, TypeError):
-        # Beside a table that no run of ours has left.
-        return
-    with whole(path) as partial:
-        partial.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
 
 
 def read_ending(record: dict[str, Any]) -> Ending:

@@ -26,8 +26,8 @@ from orchestrator.experiments.preparation import (
     prepare,
     warned,
 )
-from orchestrator.experiments.record import Clock, write_record
-from orchestrator.experiments.run import metrics_json, write_metrics
+from orchestrator.experiments.record import METRICS, Clock, write_metrics, write_record
+from orchestrator.experiments.run import metrics_json
 from orchestrator.experiments.scenario import Scenario
 from orchestrator.master.checkpoint import Checkpoints
 from orchestrator.master.experiment import Order, written_order
@@ -38,6 +38,7 @@ from orchestrator.master.observer import Observer, Occurrence
 from orchestrator.master.progress import Progress
 from orchestrator.master.simulation import simulate as run
 from orchestrator.master.table import Table
+from orchestrator.system.ledger import RECORD
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 
@@ -151,12 +152,20 @@ class Result(Table):
         """
         return plot([(self._prepared.scenario.name, self)], patterns)
 
-    def save(self, folder: str | Path, format: str = "csv") -> Path:  # noqa: A002
+    def save(
+        self,
+        folder: str | Path,
+        format: str = "csv",  # noqa: A002
+        *,
+        force: bool = False,
+    ) -> Path:
         """Write the table, metrics.json and run.json; `auv-fmu plot` and `view` take the folder.
 
         Args:
             folder: made if it does not exist; an earlier result in it is replaced.
             format: of the table, `csv` or `parquet`.
+            force: move aside files of yours that have names of its files; otherwise they stay, and
+                nothing is written.
 
         Returns:
             The folder.
@@ -168,7 +177,8 @@ class Result(Table):
         if format not in FORMATS:
             raise InputError(f"format {format!r}: use one of {', '.join(FORMATS)}")
         folder = Path(folder)
-        with replaced(folder) as unfinished:
+        names = (*(f"result.{ending}" for ending in FORMATS), METRICS, RECORD)
+        with replaced(folder, names, force=force) as unfinished:
             table = FORMATS[format](unfinished / f"result.{format}")
             table.begin(self.header)
             table.take(self.rows)
@@ -304,10 +314,10 @@ def _checkpoints(
         return
     if folder is None or (every is None and not resume):
         raise InputError("checkpoints need checkpoint=, and checkpoint_every= or resume=")
-    place = Path(folder)
+    place = Path(folder).resolve()
     try:
         place.mkdir(parents=True, exist_ok=True)
         with locked(place):
-            yield checkpoints_of([prepared], place, every, resume)
+            yield checkpoints_of([prepared], [place], every, resume)
     except OSError as error:
         raise InputError(f"cannot write into {place}: {reason(error)}") from error

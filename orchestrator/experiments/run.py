@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
 from shutil import rmtree
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from orchestrator.analysis.cautions import cautions, cautions_after
 from orchestrator.analysis.certificates import CertificatesFile
-from orchestrator.analysis.figures import Drawn, draw
+from orchestrator.analysis.figures import Drawn, draw, figure_files
 from orchestrator.analysis.metrics import Metrics
 from orchestrator.analysis.sensors import velocities_reaching
 from orchestrator.analysis.signals import CONTROLLER, THETA_HAT
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError, reason
 from orchestrator.experiments.checkpoints import FOLDER, checkpoints_of, leave
-from orchestrator.experiments.folder import place_of, publish, replaced
+from orchestrator.experiments.folder import INCOMPLETE, place_of, publish, replaced
 from orchestrator.experiments.preparation import Prepared
-from orchestrator.experiments.record import Clock, write_record
+from orchestrator.experiments.record import METRICS, Clock, write_metrics, write_record
 from orchestrator.experiments.scenario import Scenario
 from orchestrator.master.attendant import Attendant
 from orchestrator.master.checkpoint import Checkpoints
@@ -37,8 +35,16 @@ from orchestrator.master.real_time import RealTime
 from orchestrator.master.selection import Selection, check_interval, matches, matching
 from orchestrator.master.simulation import simulate
 from orchestrator.master.transfer import KINDS
+from orchestrator.system.ledger import LEDGER, RECORD, Ledger
 from orchestrator.system.leftovers import process_folder
+from orchestrator.system.names import file_name
 from orchestrator.system.structure import System
+
+#: The table of the certificates.
+_CERTIFICATES = "certificates.csv"
+
+#: The files of a run, but for its figures.
+_NAMES = (*(f"result.{ending}" for ending in FORMATS), _CERTIFICATES, METRICS, RECORD)
 
 #: A file that keeps room for what is written last, so that a full disk does not cost the record.
 _SPARE, _SPARE_BYTES = ".spare", 65536
@@ -59,6 +65,7 @@ class Files:
         figures: whether to draw them.
         checkpoint_every: a checkpoint for so many simulated seconds [s]; None: none.
         resume: go on from the one that an earlier process has left.
+        force: move aside files of the user's that have names of these.
 
     """
 
@@ -68,6 +75,7 @@ class Files:
     figures: bool = True
     checkpoint_every: float | None = None
     resume: bool = False
+    force: bool = False
 
 
 @dataclass(frozen=True)
@@ -147,19 +155,29 @@ def run_into(
     np.linalg.inv(np.eye(1))
     clock = Clock()
     done: list[_Done] = []
+    figures = figure_files(runs[0].scenario.figure, runs[0].scenario.stem)
+    folders = _folders(runs, figures)
+    names = [*figures, *(Path(below, name).as_posix() for below in folders for name in _NAMES)]
     with (
         held_interrupts() as interrupts,
-        replaced(folder, keep=lambda: bool(done)) as unfinished,
+        replaced(folder, names, force=files.force, keep=lambda: bool(done)) as unfinished,
     ):
-        kept = checkpoints_of(runs, folder / FOLDER, files.checkpoint_every, files.resume, say)
+        kept = checkpoints_of(
+            runs,
+            [folder / FOLDER / below for below in folders],
+            files.checkpoint_every,
+            files.resume,
+            files.force,
+            say,
+        )
         spare = unfinished / _SPARE
         # No zeros: some file systems need no room for them.
         spare.write_bytes(os.urandom(_SPARE_BYTES))
         try:
-            for prepared, columns, checkpoints in zip_longest(runs, tables, kept):
+            for prepared, below, columns, checkpoints in zip_longest(runs, folders, tables, kept):
                 for caution in cautions(prepared.system, prepared.experiment):
                     say(f"warning: {prepared.scenario.name}: {caution}")
-                target = unfinished / prepared.scenario.name if done else unfinished
+                target = unfinished / below
                 target.mkdir(exist_ok=True)
                 run = _Running(target, prepared, files, columns, checkpoints)
 
@@ -226,7 +244,7 @@ class _Running:
         self._table = FORMATS[files.format](folder / f"result.{files.format}")
         self.observers: list[Observer] = [
             Selection(self._table, files.interval, columns),
-            CertificatesFile(folder / "certificates.csv", files.interval),
+            CertificatesFile(folder / _CERTIFICATES, files.interval),
             self._metrics,
             self._seen,
             Progress(prepared.scenario.name),
@@ -279,7 +297,7 @@ def _give_up(
     try:
         (unfinished / _SPARE).unlink()
         _write_ends([*done, last := run.given_up()], command, clock)
-        place = publish(unfinished, folder)
+        place = publish(Ledger(folder))
         say(f"{last.prepared.scenario.name} {last.ending.failure}; its rows are in {place}")
         rmtree(process_folder(), ignore_errors=True)
     finally:
@@ -299,18 +317,25 @@ def _draw(
 ) -> list[str]:
     """Draw all figures or, where one of them cannot be written, none; notes on what is left out."""
     drawn = [Drawn(run.prepared.scenario.legend, run.seen) for run in done]
-    with TemporaryDirectory(dir=folder) as temporary:
-        notes = draw(
+    try:
+        return draw(
             scenario.figure,
             scenario.title,
             drawn,
-            Path(temporary),
-            scenario.name,
+            folder,
+            scenario.stem,
             stop=lambda: interrupts.urgent,
         )
-        for figure in Path(temporary).iterdir():
-            figure.rename(folder / figure.name)
-    return notes
+    except BaseException:
+        for name in figure_files(scenario.figure, scenario.stem):
+            (folder / name).unlink(missing_ok=True)
+        raise
+
+
+def _folders(runs: Sequence[Prepared], figures: Sequence[str]) -> list[str]:
+    """The folder of each run, from the first one's on."""
+    taken = [*_NAMES, *figures, FOLDER, INCOMPLETE, LEDGER]
+    return ["", *(file_name(prepared.scenario.name, taken) for prepared in runs[1:])]
 
 
 def metrics_json(metrics: Metrics, prepared: Prepared) -> dict[str, Any]:
@@ -319,11 +344,6 @@ def metrics_json(metrics: Metrics, prepared: Prepared) -> dict[str, Any]:
     if CONTROLLER in prepared.system.components:
         values["velocities_reaching_controller"] = velocities_reaching(prepared.system)
     return values
-
-
-def write_metrics(folder: Path, values: dict[str, Any]) -> None:
-    """Write metrics.json into a folder."""
-    (folder / "metrics.json").write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
 
 
 def selected_columns(system: System, wanted: str, is_companion: bool = False) -> list[str] | None:

@@ -28,7 +28,7 @@ from orchestrator.experiments.waypoints import PLANNER, path_parameters
 from orchestrator.findings import Findings
 from orchestrator.master.experiment import Order
 from orchestrator.reading import explained, text_of
-from orchestrator.system.names import PortName, port_name
+from orchestrator.system.names import PortName, file_name, port_name
 
 #: What a file is not that cannot be read.
 _WHAT = "not a scenario"
@@ -64,6 +64,11 @@ class Scenario:
     events: Sequence[Mapping[str, Any]] = ()
     inputs: Inputs | None = None
     digest: str = ""
+
+    @property
+    def stem(self) -> str:
+        """Name of its files and folders."""
+        return file_name(self.name)
 
     @property
     def legend(self) -> str:

@@ -12,13 +12,13 @@ import numpy as np
 
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
-from orchestrator.experiments.folder import RECORD, settle
 from orchestrator.experiments.record import read_ending, read_header
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.files import FORMATS, read_columns, read_rows
 from orchestrator.master.observer import Header
 from orchestrator.master.table import Table
 from orchestrator.reading import explained, text_of
+from orchestrator.system.ledger import RECORD, is_changed, located
 
 #: What a file is not that cannot be read.
 _WHAT = "not the record of a run"
@@ -42,8 +42,9 @@ def read_result(path: Path, watched: Choice | None = None) -> tuple[str, Table]:
     file = table_in(path)
     record = read_record(file)
     texts = record.get("texts", [])
-    columns = tuple(name for name in read_columns(file) if name not in texts)
-    blocks = read_rows(file, texts)
+    place = located(file)
+    columns = tuple(name for name in read_columns(place) if name not in texts)
+    blocks = read_rows(place, texts)
     first = next(blocks, None)
     if first is None:
         raise InputError(f"{file}: has no rows")
@@ -64,11 +65,15 @@ def table_in(path: Path) -> Path:
 
     """
     with explained(path, "not the name of a result"):
-        settle(path if path.is_dir() else path.parent)
         for file in (path, *(path / f"result.{ending}" for ending in FORMATS)):
-            if file.is_file():
+            if located(file).is_file():
                 return file
     raise InputError(f"{path}: holds no result.csv or result.parquet")
+
+
+def changed_files(table: Path) -> list[Path]:
+    """The table of a result and its record, as far as they are not what the run wrote."""
+    return [file for file in (table, table.with_name(RECORD)) if is_changed(file)]
 
 
 def read_record(table: Path) -> dict[str, Any]:
@@ -78,7 +83,7 @@ def read_record(table: Path) -> dict[str, Any]:
         InputError: it is broken.
 
     """
-    file = table.with_name(RECORD)
+    file = located(table.with_name(RECORD))
     if not file.exists():
         return {}
     with explained(file, _WHAT):

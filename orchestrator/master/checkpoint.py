@@ -1,9 +1,10 @@
 """What a run needs to go on in another process, written from time to time.
 
 A folder holds two files. All rows so far are in the one that grows. The other is replaced as a
-whole, once the rows are on the disk: it says how many of them count, and holds the states of the
-FMUs and whatever else a run knows. A process may be killed at any time: what it leaves is its last
-checkpoint.
+whole, once the rows are on the disk: it says how many of them count, with their digest, and holds
+the states of the FMUs and whatever else a run knows, with a checksum over all. A process may be
+killed at any time: what it leaves is its last checkpoint. A random identity in both files tells
+them from files of the user's.
 
 Observers have no state there. A run that is resumed tells them all rows again, from the first on,
 so whoever can observe a run can observe one that was resumed.
@@ -11,13 +12,15 @@ so whoever can observe a run can observe one that was resumed.
 
 from __future__ import annotations
 
-import json
+import os
 from base64 import b64decode, b64encode
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from math import isfinite
 from pathlib import Path
-from shutil import rmtree
+from stat import S_ISREG
 from typing import Any, NamedTuple
+from uuid import uuid4
 
 import numpy as np
 
@@ -25,8 +28,10 @@ from orchestrator.errors import InputError, reason
 from orchestrator.master.attendant import Lasting, Run
 from orchestrator.master.log import Log
 from orchestrator.master.observer import Ending, Header, NotKept
-from orchestrator.master.spool import Spool
-from orchestrator.system.atomic import whole
+from orchestrator.master.spool import Spool, begins
+from orchestrator.system.atomic import to_disk
+from orchestrator.system.ledger import moved_aside
+from orchestrator.system.sealed import sealed, unsealed
 from orchestrator.system.structure import System
 
 #: The file that grows, and the one that is replaced.
@@ -40,22 +45,26 @@ class _Stored(NamedTuple):
     """What the file that is replaced holds.
 
     Attributes:
-        time, made: how far the run had come [s], and in how many steps.
+        identity: random, of both files.
         every: for how many seconds a checkpoint was written [s].
         of: the run.
+        time, made: how far the run had come [s], and in how many steps; None: no row counts yet.
+        rows: digest of all rows.
         row: all values, hidden ones too.
         states: of the FMUs, as base64.
         lasting: what else there was to remember.
 
     """
 
-    time: float
-    made: int
+    identity: str
     every: float
     of: dict[str, str]
-    row: list[float]
-    states: dict[str, str]
-    lasting: list[Any]
+    time: float | None = None
+    made: int = 0
+    rows: str = ""
+    row: Sequence[float] = ()
+    states: Mapping[str, str] = {}
+    lasting: Sequence[Any] = ()
 
 
 def check_gives_states(system: System) -> None:
@@ -90,6 +99,7 @@ class Checkpoints:
         identity: Identity,
         every: float,
         resume: bool,
+        force: bool = False,
     ) -> None:
         """Look for a checkpoint; nothing is written before the run begins.
 
@@ -98,6 +108,7 @@ class Checkpoints:
             identity: of the run.
             every: a checkpoint for so many simulated seconds [s].
             resume: begin with the one that is there, if there is one.
+            force: move aside what is there otherwise.
 
         Raises:
             InputError: what is there is not wanted, or not what is wanted.
@@ -105,28 +116,60 @@ class Checkpoints:
         """
         if not (isfinite(every) and every > 0.0):
             raise InputError(f"a checkpoint every {every:g} s: must be positive and finite")
-        self.folder, self._identity, self._every = folder, identity, every
-        self._found = _read(folder)
-        if self._found is not None:
-            if not resume:
-                raise InputError(
-                    f"{folder} holds a run as it was at t = {self._found.time:g} s: --resume goes "
-                    "on with it; delete the folder to begin anew"
-                )
-            if different := sorted(dict(self._found.of.items() ^ identity.items())):
-                raise InputError(
-                    f"{folder} is of another run: {', '.join(different)} differ; run what it was "
-                    "made by, or delete it to begin anew"
-                )
+        self.folder, self._run, self._every = folder, identity, every
+        if folder.is_symlink():
+            raise InputError(f"{folder}: is a link; remove it, or choose another folder")
+        self._found = self._look(resume, force)
+        self._identity = uuid4().hex if self._found is None else self._found.identity
         self._log: Log | None = None
         self.time: float | None = None if self._found is None else self._found.time
 
+    def _look(self, resume: bool, force: bool) -> _Stored | None:
+        """The checkpoint that is there, which the run goes on with."""
+        try:
+            found = _read(self.folder)
+            rows = self.folder / _ROWS
+            if os.path.lexists(rows) and not (found and begins(rows, found.identity)):
+                raise InputError(
+                    f"{rows} is not a file of a checkpoint; move it, choose another folder, or let "
+                    "--force move it aside"
+                )
+            if found is None or found.time is None:
+                return found
+            if not resume:
+                raise InputError(
+                    f"{self.folder} holds a run as it was at t = {found.time:g} s: --resume goes "
+                    "on with it; --force moves it aside and begins anew"
+                )
+            if different := sorted(dict(found.of.items() ^ self._run.items())):
+                raise InputError(
+                    f"{self.folder} is of another run: {', '.join(different)} differ; run what it "
+                    "was made by, or let --force move it aside and begin anew"
+                )
+        except InputError:
+            if not force:
+                raise
+            for path in (self.folder / _STATE, self.folder / _ROWS):
+                if os.path.lexists(path):
+                    moved_aside(path)
+            return None
+        return found
+
     def begin(self, header: Header) -> None:
         """Open the file of rows."""
-        self.folder.mkdir(parents=True, exist_ok=True)
         self._columns = ("time", *header.columns)
-        self._known = 0 if self._found is None else self._found.made + 1
-        self._spool = Spool(self.folder / _ROWS, 1 + len(header.columns), self._known)
+        found = self._found
+        if found is None or found.time is None:
+            self._known = 0
+            # First the proof that the file of rows is ours.
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._store(_Stored(self._identity, self._every, dict(self._run)))
+            (self.folder / _ROWS).unlink(missing_ok=True)
+        else:
+            self._known = found.made + 1
+        digest = "" if found is None else found.rows
+        rows = self.folder / _ROWS
+        self._spool = Spool(rows, self._identity, len(self._columns), self._known, digest)
 
     def take(self, rows: np.ndarray) -> None:
         """Write some rows, but for those that are told again."""
@@ -147,9 +190,10 @@ class Checkpoints:
     def attend(self, run: Run) -> int:
         """Write a checkpoint, or begin with one."""
         self._log = run.log
-        if self._found is not None:
-            self._resume(run, self._found)
-            self._found = None
+        found, self._found = self._found, None
+        if found is not None and found.time is not None:
+            with _explained(self.folder / _STATE):
+                self._resume(run, found)
         elif run.made:
             self._write(run)
         steps = max(round(self._every / run.experiment.step), 1)
@@ -157,29 +201,43 @@ class Checkpoints:
 
     def remove(self) -> None:
         """Remove what a run that has come to its end does not need any more."""
-        rmtree(self.folder)
+        if begins(self.folder / _ROWS, self._identity):
+            (self.folder / _ROWS).unlink()
+        if (found := _read(self.folder)) is not None and found.identity == self._identity:
+            (self.folder / _STATE).unlink()
+        with suppress(OSError):
+            # Fails where there is something in it.
+            self.folder.rmdir()
 
     def _write(self, run: Run) -> None:
-        content = _Stored(
-            run.time,
-            run.made,
-            self._every,
-            dict(self._identity),
-            run.row.values.tolist(),
-            {
-                name: b64encode(instance.state()).decode()
-                for name, instance in run.instances.items()
-            },
-            [one.state() for one in _lasting(run)],
-        )
         run.blocks.hand_over()
         try:
-            self._spool.to_disk()
-            with whole(self.folder / _STATE) as partial:
-                partial.write_text(json.dumps(content._asdict()), encoding="utf-8")
+            content = _Stored(
+                self._identity,
+                self._every,
+                dict(self._run),
+                run.time,
+                run.made,
+                self._spool.to_disk(),
+                run.row.values.tolist(),
+                {
+                    name: b64encode(instance.state()).decode()
+                    for name, instance in run.instances.items()
+                },
+                [one.state() for one in _lasting(run)],
+            )
+            self._store(content)
         except OSError as error:
             raise NotKept(f"stopped at t = {run.time:g} s: {reason(error)}") from error
         self.time = run.time
+
+    def _store(self, content: _Stored) -> None:
+        # Under a name that nobody else has: what a killed process left there is ours.
+        partial = self.folder / f".auv-fmu-{self._identity}.json"
+        partial.write_text(sealed(content._asdict()), encoding="utf-8")
+        to_disk(partial)
+        partial.replace(self.folder / _STATE)
+        to_disk(self.folder)
 
     def _resume(self, run: Run, found: _Stored) -> None:
         # First of all what rows mean, who is told them wants to know.
@@ -215,9 +273,22 @@ def interval_in(folder: Path) -> float | None:
 
 def _read(folder: Path) -> _Stored | None:
     path = folder / _STATE
-    try:
-        return _Stored(**json.loads(path.read_text(encoding="utf-8")))
-    except FileNotFoundError:
+    if not os.path.lexists(path):
         return None
-    except (OSError, ValueError, TypeError) as error:
-        raise InputError(f"{path}: no checkpoint: {reason(error)}") from error
+    with _explained(path):
+        if not S_ISREG(path.lstat().st_mode):
+            raise ValueError("it is no file")
+        return _Stored(**unsealed(path.read_text(encoding="utf-8")))
+
+
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    """Say of a checkpoint that is none, or is damaged, where it is."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (OSError, ValueError, TypeError, LookupError, RecursionError) as error:
+        raise InputError(
+            f"{path}: not a checkpoint: {reason(error)}; move it, or let --force move it aside"
+        ) from error

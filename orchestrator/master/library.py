@@ -20,7 +20,7 @@ from platformdirs import user_cache_path
 
 from orchestrator.errors import InputError, last_line, reason
 from orchestrator.system.children import run_module
-from orchestrator.system.leftovers import claimed, remove_left
+from orchestrator.system.leftovers import claimed
 
 _SOURCE = Path(__file__).with_name("stepper.c")
 
@@ -100,7 +100,6 @@ def _made(compiler: _Compiler) -> CDLL:
     place = _place()
     place.parent.mkdir(parents=True, exist_ok=True)
     with claimed(place.parent, wait=True):
-        remove_left(place.parent, f"{_PARTIAL}*")
         if library := kept():
             # Another process was first.
             return library

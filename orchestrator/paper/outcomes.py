@@ -5,14 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
-import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 
@@ -22,6 +20,7 @@ from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
 from orchestrator.experiments.bill_of_materials import digest_of
 from orchestrator.experiments.bundle import PYTHON
+from orchestrator.experiments.folder import opened
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.experiments.record import PACKAGES
 from orchestrator.experiments.run import metrics_json
@@ -31,7 +30,7 @@ from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
 from orchestrator.paper.runs import Run
 from orchestrator.paper.workers import Workers
-from orchestrator.system.atomic import whole
+from orchestrator.system.ledger import Ledger
 from orchestrator.system.names import port_name
 
 #: Rooms whose code says what is kept of a run.
@@ -60,16 +59,24 @@ class Outcome:
 class Outcomes:
     """Outcomes of runs; equal ones, of whatever name, are made once."""
 
-    def __init__(self, folder: Path, stop_time: float | None = None, kind: str = PYTHON) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        stop_time: float | None = None,
+        kind: str = PYTHON,
+        force: bool = False,
+    ) -> None:
         """Start without any.
 
         Args:
             folder: in which outcomes are kept.
             stop_time: of all runs [s]; None: their own.
             kind: of the bundle's FMUs in all runs.
+            force: move aside what was changed there.
 
         """
         self._folder, self._stop_time, self._kind = folder, stop_time, kind
+        self._force = force
         self._keys: dict[Run, str] = {}
         self._labels: dict[str, str] = {}
         self._outcomes: dict[str, Outcome] = {}
@@ -91,9 +98,14 @@ class Outcomes:
         """Make what is not kept in the folder, the longest first.
 
         Raises:
+            InputError: what is kept was changed.
             KeyboardInterrupt: the user does not want to wait; runs that are finished are kept.
 
         """
+        with opened(self._folder, self._force) as ledger:
+            self._make(runs, workers, ledger)
+
+    def _make(self, runs: Iterable[Run], workers: Workers, ledger: Ledger) -> None:
         missing: dict[str, tuple[int, Run]] = {}
         for run in runs:
             wanted = replace(run, stop_time=self._stop_time or run.stop_time, kind=self._kind)
@@ -106,23 +118,28 @@ class Outcomes:
             self._keys[run] = key = key_of(prepared)
             label = wanted.label
             self._labels[key] = min(label, self._labels.get(key, label), key=len)
-            kept = _read(self._file(key))
-            if kept is None:
-                missing.setdefault(key, (prepared.experiment.rows, wanted))
+            ledger.check([_file(key)])
+            if ledger.owns(_file(key)):
+                self._outcomes[key] = _read(self._folder / _file(key))
             else:
-                self._outcomes[key] = kept
+                missing.setdefault(key, (prepared.experiment.rows, wanted))
         longest_first = sorted(missing.items(), key=lambda item: -item[1][0])
-        tasks = {key: partial(_make, run, self._file(key)) for key, (_, run) in longest_first}
-        self._outcomes |= dict(workers.results(tasks, "run"))
+        tasks = {key: partial(_make, run) for key, (_, run) in longest_first}
+        for key, outcome in workers.results(tasks, "run"):
+            self._outcomes[key] = outcome
+            if outcome.failure is None:
+                with ledger.changing() as unfinished:
+                    _write(unfinished / _file(key), outcome)
 
     def forget_others(self) -> None:
         """Remove from the folder what belongs to no run of this report."""
-        known = {self._file(key) for key in self._keys.values()}
-        for file in set(self._folder.glob("*.npz")) - known:
-            file.unlink()
+        with opened(self._folder) as ledger:
+            ledger.remove(set(ledger.files) - set(map(_file, self._keys.values())))
 
-    def _file(self, key: str) -> Path:
-        return self._folder / f"{key}.npz"
+
+def _file(key: str) -> str:
+    """The name of the file of an outcome."""
+    return f"{key}.npz"
 
 
 def key_of(prepared: Prepared) -> str:
@@ -157,8 +174,8 @@ def _code() -> str:
     return digest.hexdigest()
 
 
-def _make(run: Run, file: Path) -> Outcome:
-    """Make a run and keep its outcome; a task for a worker."""
+def _make(run: Run) -> Outcome:
+    """Make a run; a task for a worker."""
     try:
         prepared = run.prepared()
         metrics, seen = Metrics(), VisibleRows()
@@ -171,12 +188,7 @@ def _make(run: Run, file: Path) -> Outcome:
         )
     except InputError as error:
         return Outcome({"failure": str(error)}, Table())
-    outcome = Outcome(
-        metrics_json(metrics, prepared), Table.of(seen.header, seen.rows, seen.ending)
-    )
-    if outcome.failure is None:
-        _write(file, outcome)
-    return outcome
+    return Outcome(metrics_json(metrics, prepared), Table.of(seen.header, seen.rows, seen.ending))
 
 
 def _write(file: Path, outcome: Outcome) -> None:
@@ -189,24 +201,18 @@ def _write(file: Path, outcome: Outcome) -> None:
         "messages": outcome.table.ending.messages,
         "events": outcome.table.ending.events,
     }
-    file.parent.mkdir(parents=True, exist_ok=True)
-    with whole(file) as partial:
-        # A column together: one that is constant then takes no room.
-        np.savez_compressed(partial, text=json.dumps(text), columns=outcome.table.rows.T)
+    # A column together: one that is constant then takes no room.
+    np.savez_compressed(file, text=json.dumps(text), columns=outcome.table.rows.T)
 
 
-def _read(file: Path) -> Outcome | None:
-    try:
-        with np.load(file) as content:
-            text, rows = json.loads(str(content["text"])), content["columns"].T
-        header = Header(
-            tuple(text["columns"]),
-            Experiment(**text["experiment"]),
-            {port_name(name): value for name, value in text["parameters"].items()},
-        )
-    except (OSError, EOFError, ValueError, KeyError, BadZipFile, zlib.error):
-        # Not there, or not whole.
-        return None
+def _read(file: Path) -> Outcome:
+    with np.load(file) as content:
+        text, rows = json.loads(str(content["text"])), content["columns"].T
+    header = Header(
+        tuple(text["columns"]),
+        Experiment(**text["experiment"]),
+        {port_name(name): value for name, value in text["parameters"].items()},
+    )
     events = tuple(Occurrence(*event) for event in text["events"])
     ending = Ending(messages=tuple(text["messages"]), events=events)
     return Outcome(text["metrics"], Table.of(header, rows, ending))

@@ -24,9 +24,13 @@ from orchestrator.paper.page import contents, html
 from orchestrator.paper.sections import Section, draw_section, sections, written
 from orchestrator.paper.variants import all_variants
 from orchestrator.paper.workers import Workers, workers
+from orchestrator.system.ledger import RECORD
 
 #: Folders within the report's: figures, and outcomes that the next report can use again.
 _FIGURES, _RUNS, _STUDIES = "figures", "runs", "studies"
+
+#: The files.
+_NAMES = _PAGE, _MARKDOWN = "report.html", "report.md"
 
 _TITLE = "# The paper's section 4, run again"
 
@@ -59,6 +63,7 @@ def write_report(
     kind: str = PYTHON,
     ready: Sequence[str] = (),
     variants: bool = False,
+    force: bool = False,
 ) -> tuple[Path, Path]:
     """Run what was not run before, and write `report.html`, `report.md` and their figures.
 
@@ -70,6 +75,7 @@ def write_report(
         kind: of the bundle's FMUs in all runs.
         ready: studies that have a section: names, or paths of files.
         variants: hold the printed table against all that the paper leaves open.
+        force: move aside files of the user's that have names of these.
 
     Returns:
         The two files.
@@ -83,9 +89,9 @@ def write_report(
     # Built before there are processes that would each build them.
     fmus = current_fmus(kind)
     chapters = sections(scenarios, kind)
-    outcomes = Outcomes(folder / _RUNS, stop_time, kind)
-    made = studies.make_studies(ready, folder / _STUDIES, kind, command)
-    with replaced(folder) as unfinished:
+    outcomes = Outcomes(folder / _RUNS, stop_time, kind, force)
+    made = studies.make_studies(ready, folder / _STUDIES, kind, command, force)
+    with replaced(folder, (*_NAMES, RECORD), force=force) as unfinished:
         with workers() as crew:
             outcomes.make(
                 [
@@ -102,11 +108,11 @@ def write_report(
         body = "\n\n".join(parts)
         body = readings.linked(body)
         text = f"{_TITLE}\n\n{readings.linked(_INTRODUCTION)}\n\n{contents(body)}\n\n{body}\n"
-        (unfinished / "report.md").write_text(text, encoding="utf-8")
-        (unfinished / "report.html").write_text(html(text, unfinished), encoding="utf-8")
+        (unfinished / _MARKDOWN).write_text(text, encoding="utf-8")
+        (unfinished / _PAGE).write_text(html(text, unfinished), encoding="utf-8")
         write_files(unfinished, _record(command, clock, outcomes))
     outcomes.forget_others()
-    return folder / "report.html", folder / "report.md"
+    return folder / _PAGE, folder / _MARKDOWN
 
 
 def _draw(

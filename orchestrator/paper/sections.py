@@ -68,7 +68,7 @@ def sections(references: Sequence[str], kind: str = PYTHON) -> list[Section]:
     for reference in references:
         scenario = read_scenario(reference)
         taken = {section.name for section in found}
-        name = next(name for name in _numbered(scenario.name) if name not in taken)
+        name = next(name for name in _numbered(scenario.stem) if name not in taken)
         found.append(Section(name, scenario, _runs(reference, scenario, kind)))
     return found
 

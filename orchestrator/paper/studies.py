@@ -9,6 +9,7 @@ from pathlib import Path
 from orchestrator.paper.formatting import picture, plain
 from orchestrator.studies.study import Study, read_study, ready_studies
 from orchestrator.studies.sweep import Means, swept
+from orchestrator.system.names import file_name
 
 _WITHOUT = (
     f"Not in this report: {', '.join(ready_studies())}, each 10,000 runs or more. "
@@ -17,7 +18,7 @@ _WITHOUT = (
 
 
 def make_studies(
-    names: Sequence[str], folder: Path, kind: str, command: Sequence[str]
+    names: Sequence[str], folder: Path, kind: str, command: Sequence[str], force: bool = False
 ) -> list[Study]:
     """Make what is missing of some studies.
 
@@ -26,6 +27,7 @@ def make_studies(
         folder: in which each has a folder, from one report to the next.
         kind: of the bundle's FMUs.
         command: for the record.
+        force: move aside files of the user's that are in the way.
 
     Raises:
         InputError: something about a study is not usable, or cannot be written.
@@ -34,7 +36,7 @@ def make_studies(
     """
     studies = [read_study(name) for name in names]
     for study in studies:
-        swept(study, Means(kind=kind), folder / study.name, command, progress=True)
+        swept(study, Means(kind=kind, force=force), folder / study.stem, command, progress=True)
     return studies
 
 
@@ -52,10 +54,10 @@ def sections(studies: Sequence[Study], kept: Path, folder: Path) -> Iterator[str
     for study in studies:
         title = plain(study.title or study.name)
         yield f"### {title}"
-        figures = Path("figures", "studies", study.name)
+        figures = Path("figures", "studies", study.stem)
         (folder / figures).mkdir(parents=True)
         for figure in study.figures:
-            file = kept / study.name / f"{figure}.png"
+            file = kept / study.stem / f"{file_name(figure)}.png"
             if file.is_file():
                 shutil.copy(file, folder / figures)
                 yield picture(f"{title}: {figure}", (figures / file.name).as_posix())

@@ -16,14 +16,19 @@ from orchestrator.paper.printed_table import NUMBERS, section
 from orchestrator.paper.sensitivity import PUBLISHED, Sensitivity
 from orchestrator.paper.variants import all_variants
 from orchestrator.paper.workers import workers
+from orchestrator.system.ledger import RECORD
+
+#: The files.
+_NAMES = _TEXT, _VARIANTS = "table.md", "variants.csv"
 
 
-def write_table(folder: Path, command: Sequence[str]) -> tuple[Path, Path]:
+def write_table(folder: Path, command: Sequence[str], force: bool = False) -> tuple[Path, Path]:
     """Make all variants, and write `table.md` and `variants.csv`.
 
     Args:
         folder: to write into.
         command: for the record.
+        force: move aside files of the user's that have names of these.
 
     Returns:
         The two files.
@@ -34,14 +39,14 @@ def write_table(folder: Path, command: Sequence[str]) -> tuple[Path, Path]:
 
     """
     clock = Clock()
-    with replaced(folder) as unfinished:
+    with replaced(folder, (*_NAMES, RECORD), force=force) as unfinished:
         with workers() as crew:
             found = all_variants(crew)
         text = f"# The printed table of section 4.2\n\n{section(found)}\n"
-        (unfinished / "table.md").write_text(text, encoding="utf-8")
-        write_variants(unfinished / "variants.csv", found)
+        (unfinished / _TEXT).write_text(text, encoding="utf-8")
+        write_variants(unfinished / _VARIANTS, found)
         write_files(unfinished, _record(command, clock))
-    return folder / "table.md", folder / "variants.csv"
+    return folder / _TEXT, folder / _VARIANTS
 
 
 def _record(command: Sequence[str], clock: Clock) -> dict[str, object]:

@@ -1,17 +1,20 @@
 """What has come out of a study: kept as it comes, and written whole at the end.
 
 Outcomes go into a database beside the study's record, a transaction a block: whatever happens to
-this process, it holds blocks whole and each run once. When all runs are there they are written to
-one table in their order, and the database goes.
+this process, it holds blocks whole and each run once. Each row has a checksum, in which the random
+identity of the database is: so it is told from others and from what was changed. When all runs are
+there they are written to one table in their order, and the database goes.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import closing, contextmanager
 from functools import cached_property
+from hashlib import sha256
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import islice, pairwise
@@ -21,10 +24,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orchestrator.errors import InputError, did_you_mean, reason
-from orchestrator.experiments.folder import locked
+from orchestrator.experiments.folder import opened
 from orchestrator.studies.engine import INDICES, Outcome
 from orchestrator.studies.space import Space
-from orchestrator.system.atomic import whole
+from orchestrator.system.ledger import Ledger, is_changed, located, moved_aside
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,41 +41,64 @@ RUN, SCENARIO, FAILURE = "run", "scenario", "failure"
 #: Rows that are written at once.
 _ROWS = 65_536
 
+#: What the names of SQLite's files end with, and where the identity lies in the first [bytes].
+_ENDS, _PAGES = ("", "-wal", "-shm", "-journal"), 16_384
+
 #: Only this process has the file open, so it needs no shared memory, which network file systems do
 #: not have; a block that is written outlasts the process at once, and a power cut a moment later.
 _SETTINGS = ("locking_mode = EXCLUSIVE", "journal_mode = WAL", "synchronous = NORMAL")
 
 
 class Store:
-    """The outcomes of a study that is under way."""
+    """The outcomes of a study that is under way, or done.
 
-    def __init__(self, folder: Path, database: sqlite3.Connection) -> None:
-        """Use a database in the folder of the study."""
-        self._folder, self._database = folder, database
+    Attributes:
+        ledger: of its folder.
+        is_done: whether the table of all runs is there.
+
+    """
+
+    def __init__(self, ledger: Ledger, record: Mapping[str, Any]) -> None:
+        """Look for a study that was begun in a folder, or begin it.
+
+        Raises:
+            InputError: the folder holds another study, or what is there was changed.
+
+        """
+        self.ledger, self._folder = ledger, ledger.folder
+        self._path = self._folder / _DATABASE
+        _check_same(ledger, record)
+        if not (self._folder / RECORD).exists():
+            self.write_record(record)
+        self.is_done = (self._folder / TABLE).exists()
+        if self.is_done:
+            self._remove_database()
+            return
+        if not self._path.exists():
+            with ledger.writing() as unfinished:
+                _make_database(unfinished / _DATABASE, ledger.identity)
+                (unfinished / _DATABASE).replace(self._path)
+        self._database = sqlite3.connect(self._path)
         for setting in _SETTINGS:
-            database.execute(f"PRAGMA {setting}")
-        # Indices as bytes: what is read is what was written, bit for bit.
-        database.execute(
-            "CREATE TABLE IF NOT EXISTS outcomes "
-            "(number INTEGER PRIMARY KEY, indices BLOB, failure TEXT)"
-        )
+            self._database.execute(f"PRAGMA {setting}")
+        # All that was done is looked at before more is done.
+        self._done = [number for number, _, _ in self._rows()]
+
+    def close(self) -> None:
+        """Let go of the database."""
+        if not self.is_done:
+            self._database.close()
 
     def missing(self, n: int) -> Iterator[int]:
-        """The numbers, of those below n, of runs that are not done.
-
-        Blocks that are added meanwhile change nothing.
-        """
-        found = self._database.execute("SELECT number FROM outcomes ORDER BY number")
-        done = np.fromiter((number for (number,) in found), dtype=np.int64)
-        for before, after in pairwise(np.concatenate(([-1], done, [n])).tolist()):
+        """The numbers, of those below n, of runs that were not done when the store was opened."""
+        for before, after in pairwise([-1, *self._done, n]):
             yield from range(before + 1, after)
 
     def add(self, outcomes: Sequence[Outcome]) -> None:
         """Keep a block of outcomes: all of them, or none."""
+        rows = ((*row, self._checksum(*row)) for row in map(_row, outcomes))
         with written(self._folder), self._database:
-            self._database.executemany(
-                "INSERT OR IGNORE INTO outcomes VALUES (?, ?, ?)", map(_row, outcomes)
-            )
+            self._database.executemany("INSERT OR IGNORE INTO outcomes VALUES (?, ?, ?, ?)", rows)
 
     def __len__(self) -> int:
         """How many runs are done."""
@@ -82,45 +108,101 @@ class Store:
     def publish(self, space: Space) -> None:
         """Write the table of all runs, in their order; the database goes."""
         arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
-        rows = self._database.execute("SELECT * FROM outcomes ORDER BY number")
+        if len(self) != len(space):
+            raise InputError(f"{self._path}: damaged: it holds {len(self)} of {len(space)} runs")
+        rows = self._rows()
         schema = _schema(arrow, space)
+        with (
+            written(self._folder),
+            self.ledger.changing() as unfinished,
+            parquet.ParquetWriter(unfinished / TABLE, schema) as writer,
+        ):
+            while block := list(islice(rows, _ROWS)):
+                writer.write_batch(_batch(arrow, schema, space, block))
+        self.close()
+        self.is_done = True
+        self._remove_database()
+
+    def write_record(self, record: Mapping[str, Any]) -> None:
+        """Write the record of the study, if it is another than before."""
+        path, text = self._folder / RECORD, _json(record) + "\n"
+        if path.exists() and path.read_text(encoding="utf-8") == text:
+            return
+        with self.ledger.changing() as unfinished:
+            (unfinished / RECORD).write_text(text, encoding="utf-8")
+
+    def _rows(self) -> Iterator[tuple[int, bytes, str | None]]:
+        """All outcomes, by their numbers.
+
+        Raises:
+            InputError: one is not as it was written.
+
+        """
         with written(self._folder):
-            with (
-                whole(self._folder / TABLE) as partial,
-                parquet.ParquetWriter(partial, schema) as writer,
-            ):
-                while block := list(islice(rows, _ROWS)):
-                    writer.write_batch(_batch(arrow, schema, space, block))
-            self._database.close()
-            _remove_database(self._folder)
+            for *row, checksum in self._database.execute("SELECT * FROM outcomes ORDER BY number"):
+                if checksum != self._checksum(*row):
+                    raise InputError(
+                        f"{self._path}: damaged: run {row[0]} is not as it was written; move it, "
+                        "or let --force move the study aside and begin anew"
+                    )
+                yield row[0], row[1], row[2]
+
+    def _checksum(self, number: int, indices: bytes, failure: str | None) -> bytes:
+        return sha256(f"{self.ledger.identity} {number} {failure!r} {indices!r}".encode()).digest()
+
+    def _remove_database(self) -> None:
+        if self._path.exists():
+            for end in _ENDS:
+                self._path.with_name(f"{_DATABASE}{end}").unlink(missing_ok=True)
+
+
+def _make_database(path: Path, identity: str) -> None:
+    """Make an empty database that bears an identity, where nobody else looks for it."""
+    with closing(sqlite3.connect(path)) as database, database:
+        # First of all, so that the identity is where :func:`_is_ours` looks.
+        database.execute("CREATE TABLE study (identity TEXT)")
+        database.execute("INSERT INTO study VALUES (?)", (identity,))
+        # Indices as bytes: what is read is what was written, bit for bit.
+        database.execute(
+            "CREATE TABLE outcomes "
+            "(number INTEGER PRIMARY KEY, indices BLOB, failure TEXT, checksum BLOB)"
+        )
+
+
+def _is_ours(path: Path, identity: str) -> bool:
+    """Whether a database bears an identity; SQLite could change one that it opens."""
+    if path.is_symlink() or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return identity.encode() in file.read(_PAGES)
 
 
 @contextmanager
-def store(folder: Path, record: Mapping[str, Any]) -> Iterator[Store | None]:
-    """The outcomes of a study in a folder; None: the study is done.
+def store(folder: Path, record: Mapping[str, Any], force: bool = False) -> Iterator[Store]:
+    """The outcomes of a study in a folder.
 
     Args:
         folder: of the study, made if it does not exist.
         record: of the study; what it says under `made_of` must be what was done there before.
+        force: move aside what is there otherwise, and begin anew.
 
     Raises:
         InputError: the folder holds another study, cannot be written, or is being written into.
 
     """
-    with ExitStack() as stack:
+    with opened(folder, force) as ledger:
         with written(folder):
-            folder.mkdir(parents=True, exist_ok=True)
-            stack.enter_context(locked(folder))
-            _check_same(folder, record)
-            if not (folder / RECORD).exists():
-                write_record(folder, record)
-            if (folder / TABLE).exists():
-                _remove_database(folder)
-                yield None
-                return
-            database = stack.enter_context(closing(sqlite3.connect(folder / _DATABASE)))
-            opened = Store(folder, database)
-        yield opened
+            try:
+                found = Store(ledger, record)
+            except (InputError, sqlite3.Error):
+                if not force:
+                    raise
+                for name in (RECORD, TABLE, *(f"{_DATABASE}{end}" for end in _ENDS)):
+                    if os.path.lexists(folder / name):
+                        moved_aside(folder / name)
+                found = Store(ledger, record)
+        with closing(found):
+            yield found
 
 
 @contextmanager
@@ -132,12 +214,6 @@ def written(folder: Path) -> Iterator[None]:
         raise InputError(
             f"cannot write into {folder}: {reason(error)}; choose another folder (--out DIR)"
         ) from error
-
-
-def write_record(folder: Path, record: Mapping[str, Any]) -> None:
-    """Write the record of a study into its folder."""
-    with written(folder), whole(folder / RECORD) as partial:
-        partial.write_text(_json(record) + "\n", encoding="utf-8")
 
 
 def _json(content: Mapping[str, Any]) -> str:
@@ -154,32 +230,29 @@ def read_record(folder: Path) -> dict[str, Any]:
     """
     path = folder / RECORD
     try:
-        return dict(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError) as error:
+        return dict(json.loads(located(path).read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError, RecursionError) as error:
         raise InputError(f"{path}: not the record of a study: {reason(error)}") from error
 
 
-def _check_same(folder: Path, record: Mapping[str, Any]) -> None:
+def _check_same(ledger: Ledger, record: Mapping[str, Any]) -> None:
+    folder = ledger.folder
+    ledger.check((RECORD, TABLE))
+    if not _is_ours(folder / _DATABASE, ledger.identity):
+        ledger.check(f"{_DATABASE}{end}" for end in _ENDS)
     if not (folder / RECORD).exists():
         if (folder / TABLE).exists() or (folder / _DATABASE).exists():
             raise InputError(f"{folder}: has runs, but no {RECORD}; choose another folder")
         return
-    before, now = read_record(folder).get("made_of"), record["made_of"]
-    if not isinstance(before, dict):
-        raise InputError(f"{folder / RECORD}: not the record of a study")
+    before = dict(read_record(folder)["made_of"])
     # As it is read again: JSON knows no tuples.
-    now = json.loads(_json(now))
+    now = json.loads(_json(record["made_of"]))
     different = [key for key in {**now, **before} if now.get(key) != before.get(key)]
     if different:
         raise InputError(
             f"{folder} holds another study, which differs in {', '.join(different)}; choose "
-            "another folder (--out DIR), or remove that one"
+            "another folder (--out DIR), or let --force move that one aside"
         )
-
-
-def _remove_database(folder: Path) -> None:
-    for path in folder.glob(f"{_DATABASE}*"):
-        path.unlink()
 
 
 def _row(outcome: Outcome) -> tuple[int, bytes, str | None]:
@@ -200,7 +273,9 @@ def _schema(arrow: Any, space: Space) -> Any:
     )
 
 
-def _batch(arrow: Any, schema: Any, space: Space, rows: Sequence[tuple[int, bytes, str]]) -> Any:
+def _batch(
+    arrow: Any, schema: Any, space: Space, rows: Sequence[tuple[int, bytes, str | None]]
+) -> Any:
     numbers, indices, failures = zip(*rows, strict=True)
     scenarios, points = zip(*map(space.point, numbers), strict=True)
     values = np.frombuffer(b"".join(indices)).reshape(len(rows), len(INDICES))
@@ -239,12 +314,22 @@ class StudyResult(Mapping[str, np.ndarray]):
 
         """
         self.folder = folder
-        if not (folder / TABLE).is_file():
-            raise InputError(f"{folder}: holds no study that is done: no {TABLE}")
+        for path in (folder / TABLE, folder / RECORD):
+            if not located(path).is_file():
+                raise InputError(f"{folder}: holds no study that is done: no {path.name}")
+            if is_changed(path):
+                raise InputError(f"{path}: damaged, or changed since the study wrote it")
 
     @cached_property
     def _table(self) -> Any:
-        return import_module("pyarrow.parquet").read_table(self.folder / TABLE)
+        path = self.folder / TABLE
+        try:
+            table = import_module("pyarrow.parquet").read_table(located(path))
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path}: not the table of a study: {reason(error)}") from error
+        if table.num_rows != (n := self.record.get("runs")):
+            raise InputError(f"{path}: holds {table.num_rows} runs of {n}")
+        return table
 
     @cached_property
     def record(self) -> dict[str, Any]:

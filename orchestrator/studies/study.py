@@ -24,7 +24,7 @@ from orchestrator.experiments.entries import (
 from orchestrator.experiments.named import names_in, path_of
 from orchestrator.master.experiment import ORDERS
 from orchestrator.reading import explained, text_of
-from orchestrator.system.names import port_name
+from orchestrator.system.names import file_name, port_name
 
 #: Studies that come with the program.
 FOLDER = Path(__file__).parent / "ready"
@@ -115,6 +115,11 @@ class Study:
     vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     sample: Sample | None = None
     figures: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def stem(self) -> str:
+        """Name of its folder."""
+        return file_name(self.name)
 
     @property
     def varied(self) -> tuple[str, ...]:

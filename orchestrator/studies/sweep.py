@@ -10,8 +10,6 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from shutil import rmtree
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from tqdm import tqdm
@@ -24,17 +22,10 @@ from orchestrator.experiments.scenario import Scenario
 from orchestrator.master.loop import LOOPS
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Engine
-from orchestrator.studies.figures import Plan, draw_figures, read_figures
+from orchestrator.studies.figures import draw_figures, figure_files, read_figures
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
-from orchestrator.studies.store import (
-    Store,
-    StudyResult,
-    read_record,
-    store,
-    write_record,
-    written,
-)
+from orchestrator.studies.store import Store, StudyResult, read_record, store
 from orchestrator.studies.study import BATCH, ENGINES, FMU, Study, read_study, study_of
 from orchestrator.system.structure import System
 
@@ -50,9 +41,6 @@ _NEEDED = ("distributed", "numba", "pyarrow", "scipy")
 #: Seconds before a bar appears.
 _PATIENCE = 2.0
 
-#: How the name of a folder begins that figures are drawn into.
-_DRAWN = ".figures-"
-
 #: The name of a study that has no file.
 _NAMELESS = "study"
 
@@ -67,6 +55,7 @@ class Means:
         loop: that makes their steps.
         scheduler: address of a Dask scheduler; None: processes of this machine.
         workers: how many of these; None: one for each core.
+        force: move aside files of the user's that are in the way.
 
     """
 
@@ -75,6 +64,7 @@ class Means:
     loop: str = LOOPS[0]
     scheduler: str | None = None
     workers: int | None = None
+    force: bool = False
 
 
 def sweep(
@@ -87,6 +77,7 @@ def sweep(
     workers: int | None = None,
     out: str | Path | None = None,
     progress: bool = False,
+    force: bool = False,
 ) -> StudyResult:
     """Make the runs of a study, or those of them that are missing.
 
@@ -104,6 +95,7 @@ def sweep(
         out: folder of the study; what was done there before is not done again. None:
             `results/NAME`.
         progress: show a bar on studies that take longer than some seconds.
+        force: move aside files of yours that have names of the study's, and another study.
 
     Raises:
         ValueError: something about the study is not usable; the text says what to change.
@@ -111,13 +103,13 @@ def sweep(
 
     """
     plan = study_of(_NAMELESS, study) if isinstance(study, Mapping) else read_study(str(study))
-    means = Means(engine, kind, loop, scheduler, workers)
+    means = Means(engine, kind, loop, scheduler, workers, force)
     return swept(plan, means, folder_of(plan, out), sys.argv, progress=progress)
 
 
 def folder_of(study: Study, out: str | Path | None) -> Path:
     """Where a study goes."""
-    return Path("results", study.name) if out is None else Path(out)
+    return Path("results", study.stem) if out is None else Path(out)
 
 
 def swept(
@@ -149,28 +141,19 @@ def swept(
     plans = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
     engine = _engine(means.engine or study.engine, systems, means)
     record = _record(study, means, space, engine, [one for one, _ in systems.values()], command)
-    with store(folder, record) as unfinished:
-        if unfinished is not None:
+    with store(folder, record, means.force) as kept:
+        kept.ledger.check(figure_files(plans))
+        if not kept.is_done:
             name = study.name if progress else None
-            _complete(unfinished, engine, space, means, name)
+            _complete(kept, engine, space, means, name)
         result = StudyResult(folder)
-        write_record(folder, {**read_record(folder), "failed": result.failed})
-        for note in _draw(plans, study.title, result):
+        kept.write_record({**read_record(folder), "failed": result.failed})
+        # All figures or, where one of them cannot be written, none.
+        with kept.ledger.changing() as unfinished:
+            notes = list(draw_figures(plans, study.title, result, unfinished))
+        for note in notes:
             say(note)
     return result
-
-
-def _draw(plans: Sequence[Plan], title: str, result: StudyResult) -> list[str]:
-    """Draw all figures or, where one of them cannot be written, none; notes on what is left out."""
-    folder = result.folder
-    with written(folder):
-        for left in folder.glob(f"{_DRAWN}*"):
-            rmtree(left)
-        with TemporaryDirectory(dir=folder, prefix=_DRAWN) as temporary:
-            notes = list(draw_figures(plans, title, result, Path(temporary)))
-            for file in Path(temporary).iterdir():
-                file.replace(folder / file.name)
-    return notes
 
 
 def check_installed() -> None:

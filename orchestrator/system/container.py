@@ -12,6 +12,7 @@ from typing import Any
 from orchestrator.errors import InputError, last_line
 from orchestrator.system.children import run_module
 from orchestrator.system.leftovers import process_folder
+from orchestrator.system.names import file_name
 from orchestrator.system.structure import System
 
 _TOOLBOX = "fmu_manipulation_toolbox"
@@ -31,11 +32,12 @@ def write_container(system: System, folder: Path) -> list[Path]:
         raise InputError(
             "a container needs the FMU manipulation toolbox: pip install 'auv-fmu[hosts]'"
         )
+    fmu = f"{file_name(system.name)}.fmu"
     fmus = {component.name: component.fmu.name for component in system.components.values()}
     if len(set(fmus.values())) < len(fmus):
         raise InputError("a container takes each FMU once; this system has one twice")
     content: dict[str, Any] = {
-        "name": f"{system.name}.fmu",
+        "name": fmu,
         "step_size": system.step,
         "auto_link": False,
         "auto_input": False,
@@ -66,7 +68,7 @@ def write_container(system: System, folder: Path) -> list[Path]:
         fmi = max(versions).partition(".")[0]
         options = ["-container", "system.json", "-fmu-directory", work, "-fmi", fmi]
         process = run_module(f"{_TOOLBOX}.cli.fmucontainer", *options, folder=Path(work))
-        built = Path(work, f"{system.name}.fmu")
+        built = Path(work, fmu)
         if process.returncode != 0 or not built.is_file():
             raise InputError(
                 f"the container was not built: {last_line(process.stderr + process.stdout)}"

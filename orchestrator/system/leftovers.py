@@ -1,18 +1,21 @@
-"""What only one process may have, and what it leaves behind when it is killed.
+"""What only one process may have, and what it leaves when it is killed.
 
-Who works on a file or folder holds a lock on it, which ends with the process, however that ends:
-what bears a name of ours and is not locked, nobody needs any more.
+A process that works on a folder holds a lock on it, which ends with the process, however that ends.
+Its temporary folder holds a marker, too: one with a marker and without a lock nobody needs.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from shutil import rmtree
 from tempfile import TemporaryDirectory, gettempdir
+from uuid import uuid4
+
+from orchestrator.system.sealed import sealed, unsealed
 
 try:
     import fcntl
@@ -20,8 +23,8 @@ except ImportError:  # pragma: no cover
     # Not a POSIX system: nobody is kept out there, and nothing is removed.
     fcntl = None  # type: ignore[assignment]
 
-#: How the name of a process's temporary folder begins.
-_PREFIX = "auvfmu-"
+#: How the name of a process's temporary folder begins, and the file that proves it to be one.
+_PREFIX, _MARKER = "auvfmu-", ".auv-fmu.json"
 
 
 @contextmanager
@@ -48,25 +51,6 @@ def claimed(path: Path, wait: bool = False) -> Iterator[None]:
         os.close(descriptor)
 
 
-@contextmanager
-def created(path: Path) -> Iterator[None]:
-    """Make an empty file under a name that nobody else has, and keep other processes from it.
-
-    Raises:
-        OSError: it cannot be made.
-
-    """
-    with ExitStack() as stack:
-        is_there = False
-        while not is_there:
-            path.touch()
-            # Another process may take it for left before it is locked.
-            with suppress(FileNotFoundError):
-                stack.enter_context(claimed(path, wait=True))
-                is_there = path.exists()
-        yield
-
-
 def _lock(descriptor: int, wait: bool = False) -> bool:
     """Lock a file; whether that can be known, which not every file system can tell.
 
@@ -83,19 +67,6 @@ def _lock(descriptor: int, wait: bool = False) -> bool:
     return True
 
 
-def remove_left(folder: Path, pattern: str) -> None:
-    """Remove the files and folders of a pattern that no process has claimed."""
-    for path in folder.glob(pattern) if fcntl is not None else ():
-        # Of another user, or gone meanwhile.
-        with suppress(OSError):
-            descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
-            try:
-                if _lock(descriptor):
-                    rmtree(path) if path.is_dir() else path.unlink()
-            finally:
-                os.close(descriptor)
-
-
 def process_folder() -> Path:
     """The folder for what nobody needs after this process; it goes when the process ends."""
     return Path(_process_folder().name)
@@ -103,17 +74,43 @@ def process_folder() -> Path:
 
 @cache
 def _process_folder() -> TemporaryDirectory[str]:
-    remove_left(Path(gettempdir()), f"{_PREFIX}*")
-    while True:
-        folder = TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
-        if fcntl is None:
-            return folder
-        # Another process may take it for left before it is locked.
-        with suppress(FileNotFoundError):
-            # Held until the process ends: nothing closes it.
-            descriptor = os.open(folder.name, os.O_RDONLY)
-            with suppress(OSError):
-                _lock(descriptor)
-                if os.path.samestat(os.fstat(descriptor), Path(folder.name).stat()):
-                    return folder
-            os.close(descriptor)
+    _remove_left()
+    folder = TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
+    if fcntl is not None:
+        # Held until the process ends: nothing closes it.
+        descriptor = os.open(folder.name, os.O_RDONLY)
+        with suppress(OSError):
+            _lock(descriptor)
+            marker = sealed({"folder": Path(folder.name).name, "identity": uuid4().hex})
+            Path(folder.name, _MARKER).write_text(marker, encoding="utf-8")
+    return folder
+
+
+def _remove_left() -> None:
+    """Remove the temporary folders of processes that were killed."""
+    for folder in Path(gettempdir()).glob(f"{_PREFIX}*") if fcntl is not None else ():
+        # Of another user, or gone meanwhile.
+        with suppress(OSError):
+            descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+            try:
+                if _is_ours(folder) and _lock(descriptor):
+                    for path in folder.iterdir():
+                        if path.is_dir() and not path.is_symlink():
+                            rmtree(path)
+                        # The proof comes last: this process may be killed, too.
+                        elif path.name != _MARKER:
+                            path.unlink()
+                    rmtree(folder)
+            finally:
+                os.close(descriptor)
+
+
+def _is_ours(folder: Path) -> bool:
+    """Whether a folder says itself that a process of this user has made it."""
+    marker = folder / _MARKER
+    try:
+        if folder.stat().st_uid != os.geteuid() or marker.is_symlink():
+            return False
+        return unsealed(marker.read_text(encoding="utf-8")).get("folder") == folder.name
+    except ValueError:
+        return False

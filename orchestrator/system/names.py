@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from hashlib import sha256
 
 from orchestrator.errors import InputError
+
+#: What may be in the name of a file on every system, words that Windows keeps for itself, and how
+#: long a name may be [bytes] to leave room for what follows it.
+_ODD, _KEPT = (
+    re.compile(r"[^\w .()+=,@~-]"),
+    re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.I),
+)
+_LONGEST = 120
 
 
 @dataclass(frozen=True)
@@ -42,3 +52,23 @@ def splits(text: str) -> Iterator[tuple[str, str]]:
     while dot >= 0:
         yield text[:dot], text[dot + 1 :]
         dot = text.rfind(".", 0, dot)
+
+
+def file_name(name: str, taken: Collection[str] = ()) -> str:
+    """A name as that of a file or folder, which every system takes and no other name becomes.
+
+    Args:
+        name: of anything.
+        taken: names of files that there are beside it.
+
+    """
+    plain = _ODD.sub("_", name).strip(" ").rstrip(".")
+    plain = plain.encode()[:_LONGEST].decode(errors="ignore")
+    if plain.startswith(".") or _KEPT.match(plain):
+        plain = f"_{plain}"
+    if plain != name:
+        plain += f"-{sha256(name.encode(errors='surrogatepass')).hexdigest()[:8]}"
+    others = {other.casefold() for other in taken}
+    while plain.casefold() in others:
+        plain += "_"
+    return plain

@@ -15,7 +15,7 @@ module                  what it holds
 """
 
 from orchestrator.analysis.figures.comparison import overlay
-from orchestrator.analysis.figures.drawing import FIGURES, check_figure, draw
+from orchestrator.analysis.figures.drawing import FIGURES, check_figure, draw, figure_files
 from orchestrator.analysis.figures.panels import draw_commands, draw_errors
 from orchestrator.analysis.figures.style import COLOURS, SETTINGS, STYLES, Drawn, save
 
@@ -29,6 +29,7 @@ __all__ = [
     "draw",
     "draw_commands",
     "draw_errors",
+    "figure_files",
     "overlay",
     "save",
 ]

@@ -42,6 +42,17 @@ def check_figure(kind: str) -> None:
         raise InputError(f"no figure {kind!r}{hint}")
 
 
+def figure_files(kind: str, stem: str) -> list[str]:
+    """The files that :func:`draw` may write.
+
+    Args:
+        kind: key of :data:`FIGURES`.
+        stem: of their names.
+
+    """
+    return [f"{stem}{suffix}.{ending}" for suffix in FIGURES[kind] for ending in _FORMATS]
+
+
 def draw(
     kind: str,
     title: str,

@@ -15,8 +15,8 @@ module                what it holds
 ====================  ================================================================
 """
 
-from orchestrator.studies.figures.drawing import draw_figures
+from orchestrator.studies.figures.drawing import draw_figures, figure_files
 from orchestrator.studies.figures.entries import Plan, read_figures
 from orchestrator.studies.figures.values import Columns
 
-__all__ = ["Columns", "Plan", "draw_figures", "read_figures"]
+__all__ = ["Columns", "Plan", "draw_figures", "figure_files", "read_figures"]

@@ -15,6 +15,7 @@ from orchestrator.studies.figures.fronts import front
 from orchestrator.studies.figures.influence import influence
 from orchestrator.studies.figures.maps import maps
 from orchestrator.studies.figures.values import Columns, Values
+from orchestrator.system.names import file_name
 
 _DRAW: Mapping[str, Callable[[Plan, str, Values], Figure]] = {
     BANDS: bands,
@@ -27,6 +28,11 @@ _FORMATS = ("png", "svg")
 
 #: More lines or panels than this show nothing.
 _MOST_PARTS = 12
+
+
+def figure_files(plans: Sequence[Plan]) -> list[str]:
+    """The files that :func:`draw_figures` may write."""
+    return [f"{file_name(plan.name)}.{ending}" for plan in plans for ending in _FORMATS]
 
 
 def draw_figures(
@@ -56,4 +62,4 @@ def draw_figures(
             continue
         with styled():
             figure = _DRAW[plan.kind](plan, title, runs)
-        save(figure, *(folder / f"{plan.name}.{ending}" for ending in _FORMATS))
+        save(figure, *(folder / f"{file_name(plan.name)}.{ending}" for ending in _FORMATS))

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 from zipfile import ZipFile, ZipInfo
 
 from orchestrator.system.component import Component
+from orchestrator.system.names import file_name
 from orchestrator.system.ssp import OSP, SSC, SSD, SSV, STRUCTURE
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.transformation import Linear, Mapped
@@ -28,7 +29,7 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 def write_ssp(system: System, folder: Path) -> list[Path]:
     """Write `NAME.ssp`; the step is part of the system."""
-    path = folder / f"{system.name}.ssp"
+    path = folder / f"{file_name(system.name)}.ssp"
     path.write_bytes(ssp_bytes(system))
     return [path]
 
