@@ -26,6 +26,7 @@ def checkpoints_of(
     every: float | None,
     resume: bool,
     force: bool = False,
+    token: str = "",
     say: Callable[[str], None] = lambda _: None,
 ) -> list[Checkpoints]:
     """The checkpoints of some runs, one after the other.
@@ -36,6 +37,7 @@ def checkpoints_of(
         every: one for so many simulated seconds [s]; None: as often as before, if runs are resumed.
         resume: begin with those that are there.
         force: move aside what is there otherwise.
+        token: random, for new ones; empty: one is drawn.
         say: takes notes for the user.
 
     Returns:
@@ -57,7 +59,7 @@ def checkpoints_of(
     for prepared in runs:
         check_gives_states(prepared.system)
     found = [
-        Checkpoints(folder, _identity(prepared), every, resume, force)
+        Checkpoints(folder, _identity(prepared), every, resume, force, token)
         for folder, prepared in zip(folders, runs, strict=True)
     ]
     times = [checkpoints.time for checkpoints in found]

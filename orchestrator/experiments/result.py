@@ -314,7 +314,7 @@ def _checkpoints(
         return
     if folder is None or (every is None and not resume):
         raise InputError("checkpoints need checkpoint=, and checkpoint_every= or resume=")
-    place = Path(folder).resolve()
+    place = Path(folder)
     try:
         place.mkdir(parents=True, exist_ok=True)
         with locked(place):

@@ -162,12 +162,17 @@ def run_into(
         held_interrupts() as interrupts,
         replaced(folder, names, force=files.force, keep=lambda: bool(done)) as unfinished,
     ):
+        places = [folder / FOLDER / below for below in folders]
+        for place in places:
+            if place.is_symlink():
+                raise InputError(f"{place}: is a link; remove it, or choose another folder (--out)")
         kept = checkpoints_of(
             runs,
-            [folder / FOLDER / below for below in folders],
+            places,
             files.checkpoint_every,
             files.resume,
             files.force,
+            Ledger(folder).identity,
             say,
         )
         spare = unfinished / _SPARE

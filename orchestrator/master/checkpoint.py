@@ -100,6 +100,7 @@ class Checkpoints:
         every: float,
         resume: bool,
         force: bool = False,
+        token: str = "",
     ) -> None:
         """Look for a checkpoint; nothing is written before the run begins.
 
@@ -109,6 +110,7 @@ class Checkpoints:
             every: a checkpoint for so many simulated seconds [s].
             resume: begin with the one that is there, if there is one.
             force: move aside what is there otherwise.
+            token: random, for a new checkpoint; empty: one is drawn.
 
         Raises:
             InputError: what is there is not wanted, or not what is wanted.
@@ -117,10 +119,8 @@ class Checkpoints:
         if not (isfinite(every) and every > 0.0):
             raise InputError(f"a checkpoint every {every:g} s: must be positive and finite")
         self.folder, self._run, self._every = folder, identity, every
-        if folder.is_symlink():
-            raise InputError(f"{folder}: is a link; remove it, or choose another folder")
         self._found = self._look(resume, force)
-        self._identity = uuid4().hex if self._found is None else self._found.identity
+        self._identity = self._found.identity if self._found else token or uuid4().hex
         self._log: Log | None = None
         self.time: float | None = None if self._found is None else self._found.time
 
@@ -205,6 +205,7 @@ class Checkpoints:
             (self.folder / _ROWS).unlink()
         if (found := _read(self.folder)) is not None and found.identity == self._identity:
             (self.folder / _STATE).unlink()
+        self._partial.unlink(missing_ok=True)
         with suppress(OSError):
             # Fails where there is something in it.
             self.folder.rmdir()
@@ -231,9 +232,13 @@ class Checkpoints:
             raise NotKept(f"stopped at t = {run.time:g} s: {reason(error)}") from error
         self.time = run.time
 
+    @property
+    def _partial(self) -> Path:
+        return self.folder / f".auv-fmu-{self._identity}.json"
+
     def _store(self, content: _Stored) -> None:
         # Under a name that nobody else has: what a killed process left there is ours.
-        partial = self.folder / f".auv-fmu-{self._identity}.json"
+        partial = self._partial
         partial.write_text(sealed(content._asdict()), encoding="utf-8")
         to_disk(partial)
         partial.replace(self.folder / _STATE)

@@ -76,6 +76,7 @@ class Ledger:
         self.identity, self._files = found.identity, found.files
         self._moving, self._leaving = found.moving, found.leaving
         self.unfinished = folder / f"{_UNFINISHED}{self.identity}"
+        self._partial = folder / f"{_UNFINISHED}{self.identity}.json"
         if self._moving:
             self._take_places()
 
@@ -224,8 +225,7 @@ class Ledger:
         return found
 
     def _write(self) -> None:
-        # Under a name that nobody else has: what a killed process left there is ours.
-        partial = self.folder / f"{_UNFINISHED}{self.identity}.json"
+        partial = self._partial
         content = _Content(self.identity, self._files, self._moving, self._leaving)
         partial.write_text(sealed(content._asdict()), encoding="utf-8")
         to_disk(partial)
@@ -238,8 +238,10 @@ class Ledger:
         self._is_there = False
 
     def _discard(self) -> None:
-        """Remove what is not to take its place."""
+        """Remove what is not to take its place: under names that nobody else has."""
         rmtree(self.unfinished, ignore_errors=True)
+        with suppress(OSError):
+            self._partial.unlink()
 
 
 class _Content(NamedTuple):

@@ -15,6 +15,8 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.system.ledger import LEDGER
+
 #: Numbers from <linux/prctl.h> and <linux/capability.h>: what lets root write where it may not,
 #: and exceed limits.
 _PR_CAPBSET_DROP = 24
@@ -177,9 +179,9 @@ def killed_at(n: int, work: Callable[[], object], calls: Sequence[str] = _CALLS)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """All files below a folder, hidden ones too."""
+    """All files below a folder, hidden ones too, but for ledgers, each of which is another."""
     return {
         path.relative_to(folder).as_posix(): path.read_bytes()
         for path in sorted(folder.rglob("*"))
-        if path.is_file()
+        if path.is_file() and path.name != LEDGER
     }

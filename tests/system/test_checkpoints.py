@@ -61,6 +61,12 @@ def killed_after(checkpoints: int, *arguments: str, out: str) -> None:
     assert ended(forked(doomed)) == -signal.SIGKILL
 
 
+def states(out: str) -> dict[str, object]:
+    """What a checkpoint holds; nothing, if there is none yet."""
+    path = Path(out, "checkpoint/state.json")
+    return json.loads(path.read_text()) if path.exists() else {}
+
+
 CHECKPOINTS = ["--checkpoint-every", "0.3"]
 
 
@@ -199,7 +205,7 @@ def test_killed_at_any_time_by_the_kernel():
     arguments = ["fig4", "--stop-time", "5", "--no-figures", *CHECKPOINTS]
     assert run(*arguments, out="whole") == 0
     process = start("run", *arguments, "--isolate", "--out", "killed")
-    assert eventually(Path("killed/checkpoint/state.json").exists)
+    assert eventually(lambda: states("killed").get("row"))
     process.kill()
     process.communicate()
     assert run(*arguments, "--resume", "--loop", "compiled", out="killed") == 0
@@ -211,7 +217,7 @@ def test_a_signal_leaves_the_rows_and_the_checkpoint(loop, capsys):
     arguments = ["fig4", "--no-figures", "--stop-time", "3", *CHECKPOINTS, "--loop", loop]
     assert run(*arguments, out="whole") == 0
     process = start("run", *arguments, "--real-time", "1", "--out", "stopped")
-    assert eventually(Path("stopped/checkpoint/state.json").exists)
+    assert eventually(lambda: states("stopped").get("row"))
     process.send_signal(signal.SIGINT)
     said = process.communicate()[1].splitlines()
     assert process.returncode == 1
@@ -250,7 +256,7 @@ def test_what_would_be_lost_or_was_damaged_is_refused(left, capsys):
     assert "r/checkpoint/rows.bin: holds fewer than 16 rows" in capsys.readouterr().err
     Path("r/checkpoint/state.json").write_text("{}")
     assert run(*LEFT, "--resume", out="r") == 2
-    assert "r/checkpoint/state.json: no checkpoint" in capsys.readouterr().err
+    assert "r/checkpoint/state.json: not a checkpoint" in capsys.readouterr().err
 
 
 WITH_STATES = (

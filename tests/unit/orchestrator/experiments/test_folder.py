@@ -15,8 +15,8 @@ from shutil import rmtree
 import pytest
 
 from orchestrator.errors import InputError
-from orchestrator.experiments.folder import RECORD, replaced, settle
-from orchestrator.system.atomic import whole
+from orchestrator.experiments.folder import opened, replaced
+from orchestrator.system.ledger import LEDGER, RECORD, located
 from support.machine import contents, ended, forked, killed_at
 
 
@@ -27,7 +27,7 @@ def write(
     failure: str | None = None,
     keep: Callable[[], bool] = lambda: False,
 ) -> None:
-    with replaced(folder, keep) as unfinished:
+    with replaced(folder, keep=keep) as unfinished:
         for name in names:
             (unfinished / name).parent.mkdir(parents=True, exist_ok=True)
             (unfinished / name).write_text(text)
@@ -39,19 +39,26 @@ def write(
 def write_half(
     folder: Path, error: BaseException, keep: Callable[[], bool] = lambda: False
 ) -> None:
-    with replaced(folder, keep) as unfinished:
+    with replaced(folder, keep=keep) as unfinished:
         (unfinished / "a.csv").write_text("rows so far")
         raise error
 
 
-def write_half_a_file(path: Path) -> None:
-    with whole(path) as partial:
-        partial.write_text("half")
-        raise RuntimeError
+def settle(folder: Path) -> None:
+    """Go on with what a killed process has begun, as the next command does."""
+    with opened(folder):
+        pass
 
 
 def files(folder: Path) -> set[str]:
-    return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    return contents(folder).keys()
+
+
+def seen(folder: Path) -> dict[str, bytes]:
+    """The result as the commands see it that only read; empty, where there is no record."""
+    record = located(folder / RECORD)
+    names = json.loads(record.read_text())["files"] if record.is_file() else []
+    return {name: located(folder / name).read_bytes() for name in names}
 
 
 def test_earlier_files_go_and_those_of_others_stay(tmp_path: Path):
@@ -78,12 +85,16 @@ def test_a_folder_that_was_made_for_nothing_goes(tmp_path: Path):
 
 
 def test_what_a_killed_run_has_left_goes_with_the_next(tmp_path: Path):
-    left = tmp_path / "r" / ".unfinished-abc"
-    left.mkdir(parents=True)
-    (left / "result.csv").write_text("half")
+    def killed() -> None:
+        with replaced(tmp_path / "r") as unfinished:
+            (unfinished / "result.csv").write_text("half")
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    assert ended(forked(killed)) == -signal.SIGKILL
+    [left] = files(tmp_path / "r")
+    assert left.endswith("/result.csv")
     write(tmp_path / "r", "a.csv")
     assert files(tmp_path / "r") == {"a.csv", RECORD}
-    assert not left.exists()
 
 
 def test_second_run_into_the_same_folder_is_refused(tmp_path: Path):
@@ -121,7 +132,7 @@ def test_a_failing_disk_keeps_what_was_there_and_what_is_worth_it(tmp_path: Path
         assert contents(tmp_path) == before
 
 
-@pytest.mark.parametrize("call", ["fsync", "rename"])
+@pytest.mark.parametrize("call", ["fsync", "replace"])
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO, errno.EXDEV, errno.EDQUOT])
 def test_a_disk_that_fails_at_the_last_moment(tmp_path: Path, monkeypatch, call, number):
     """As a server does that takes everything and says only then that it cannot keep it."""
@@ -151,23 +162,26 @@ def test_a_file_system_without_fsync_is_written_all_the_same(tmp_path: Path, mon
 def test_everything_is_on_the_disk_before_it_counts(tmp_path: Path, monkeypatch):
     """After a power cut a name may lead to an empty file, if the contents were not there first."""
     calls: list[tuple[str, str]] = []
-    fsync, rename = os.fsync, os.rename
+    fsync, replace = os.fsync, os.replace
 
     def recorded_fsync(descriptor: int) -> None:
         calls.append(("fsync", str(Path(f"/proc/self/fd/{descriptor}").readlink())))
         fsync(descriptor)
 
-    def recorded_rename(source: Path, target: Path) -> None:
-        calls.append(("rename", str(target)))
-        rename(source, target)
+    def recorded_replace(source: Path, target: Path) -> None:
+        calls.append(("replace", Path(target).name))
+        replace(source, target)
 
     monkeypatch.setattr(os, "fsync", recorded_fsync)
-    monkeypatch.setattr(os, "rename", recorded_rename)
+    monkeypatch.setattr(os, "replace", recorded_replace)
     write(tmp_path / "r", "a.csv", "below/b.csv")
-    names = [call if call == "rename" else Path(path).name for call, path in calls]
-    before = names[: names.index("rename")]
-    assert {"a.csv", "b.csv", "below", RECORD} < set(before)
-    assert names[names.index("rename") + 1] == "r"
+    names = [(call, Path(path).name) for call, path in calls]
+    # The second ledger is the one that says that the files take their places.
+    said = [i for i, name in enumerate(names) if name == ("replace", LEDGER)][1]
+    assert {("fsync", name) for name in ("a.csv", "b.csv", "below", RECORD)} < set(names[:said])
+    assert names[said + 1] == ("fsync", "r")
+    moved = [name for call, name in names[said + 1 :] if call == "replace"]
+    assert moved == ["a.csv", "b.csv", RECORD, LEDGER]
 
 
 def test_killed_at_any_moment_the_folder_holds_the_old_result_or_the_new_one(tmp_path: Path):
@@ -187,10 +201,8 @@ def test_killed_at_any_moment_the_folder_holds_the_old_result_or_the_new_one(tmp
         write_old(folder)
         if not killed_at(n, lambda: write_new(folder)):
             break
-        # What looks like a result now is one, unless the next command will look after it first.
-        if not (folder / ".whole").is_dir():
-            visible = {k: v for k, v in contents(folder).items() if not k.startswith(".")}
-            assert visible in (contents(old), contents(new)), n
+        # A record says that all that it names is there, also while files take their places.
+        assert seen(folder) in (contents(old), contents(new)), n
         settle(folder)
         visible = {k: v for k, v in contents(folder).items() if not k.startswith(".")}
         assert visible in (contents(old), contents(new)), n
@@ -209,7 +221,8 @@ def test_killed_again_while_the_next_command_goes_on_with_it(tmp_path: Path):
         write(folder, "a.csv", "old.png", text="old")
         # Just before the first file is moved.
         assert killed_at(1, lambda: write(folder, "a.csv", "new.png"), ["replace"])
-        assert (folder / ".whole").is_dir()
+        assert (folder / "a.csv").read_text() == "old"
+        assert located(folder / "a.csv").read_text() == "new"
 
     n = 0
     while True:
@@ -222,31 +235,16 @@ def test_killed_again_while_the_next_command_goes_on_with_it(tmp_path: Path):
     assert n > 4
 
 
-def test_a_killed_writer_of_a_file_leaves_nothing_for_ever(tmp_path: Path):
-    path = tmp_path / "view.html"
-    with whole(path) as partial:
-        partial.write_text("old")
-
-    def half() -> None:
-        with whole(path) as partial:
-            partial.write_text("half")
-            os.kill(os.getpid(), signal.SIGKILL)
-
-    assert ended(forked(half)) == -signal.SIGKILL
-    assert len(contents(tmp_path)) == 2
-    with whole(path) as partial, whole(tmp_path / "other.html") as other:
-        partial.write_text("new")
-        other.write_text("of one who writes at the same time")
-    assert contents(tmp_path).keys() == {"view.html", "other.html"}
-    assert path.read_text() == "new"
-
-
-def test_an_edited_record_does_not_lead_out_of_the_folder(tmp_path: Path):
+@pytest.mark.parametrize("name", ["../precious", "/etc/hostname", "notes.txt"])
+def test_somebody_elses_record_proves_nothing(tmp_path: Path, name):
     (tmp_path / "precious").write_text("mine")
     (tmp_path / "r").mkdir()
-    (tmp_path / "r" / RECORD).write_text(json.dumps({"files": ["../precious", "/etc/hostname"]}))
-    write(tmp_path / "r", "a.csv")
-    assert (tmp_path / "precious").is_file()
+    (tmp_path / "r" / "notes.txt").write_text("mine")
+    (tmp_path / "r" / RECORD).write_text(json.dumps({"files": [name]}))
+    before = contents(tmp_path)
+    with pytest.raises(InputError, match=r"run\.json is not a file that auv-fmu wrote"):
+        write(tmp_path / "r", "a.csv")
+    assert contents(tmp_path) == before
 
 
 def test_a_run_that_came_to_no_end_stands_beside_a_whole_one_until_the_next(tmp_path: Path):
@@ -268,7 +266,7 @@ def test_a_run_that_came_to_no_end_takes_the_place_of_another_such(tmp_path: Pat
 def test_a_folder_in_the_way_changes_nothing(tmp_path: Path):
     write(tmp_path / "r", "a.csv", text="old")
     (tmp_path / "r" / "z.csv").mkdir()
-    with pytest.raises(InputError, match=r"z\.csv is a folder"):
+    with pytest.raises(InputError, match=r"z\.csv is not a file that auv-fmu wrote"):
         write(tmp_path / "r", "a.csv", "z.csv")
     assert (tmp_path / "r" / "a.csv").read_text() == "old"
     assert (tmp_path / "r" / RECORD).is_file()
@@ -280,13 +278,3 @@ def test_what_is_no_result_takes_the_place_of_none(tmp_path: Path):
     with replaced(tmp_path / "r") as unfinished:
         (unfinished / "fig4.ssp").write_text("exported")
     assert files(tmp_path / "r") == {"a.csv", RECORD, "fig4.ssp"}
-
-
-def test_a_file_changes_whole_or_not_at_all(tmp_path: Path):
-    path = tmp_path / "view.html"
-    with whole(path) as partial:
-        partial.write_text("old")
-    with pytest.raises(RuntimeError):
-        write_half_a_file(path)
-    assert path.read_text() == "old"
-    assert files(tmp_path) == {"view.html"}

@@ -13,19 +13,23 @@ import pytest
 from orchestrator.errors import InputError
 from orchestrator.studies.engine import INDICES, Outcome
 from orchestrator.studies.store import StudyResult, read_record, store
-from support.machine import eventually
+from support.machine import contents, eventually
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow: the extra `studies`")
 
-RECORD = {"study": "mine", "made_of": {"points": "1234", "scenario": ("fig4",)}}
+RECORD = {"study": "mine", "runs": 4, "made_of": {"points": "1234", "scenario": ("fig4",)}}
 
 
 class Toys:
     """A space of one value, the number of the run times a tenth."""
 
-    def __init__(self):
+    def __init__(self, runs: int):
+        self.runs = runs
         self.columns = {"toy.x": float, "toy.name": str}
         self.has_scenarios = True
+
+    def __len__(self):
+        return self.runs
 
     def point(self, number: int):
         return f"scenario {number % 2}", {"toy.x": 0.1 * number, "toy.name": str(number)}
@@ -57,8 +61,8 @@ def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
     with store(tmp_path, RECORD) as unfinished:
         unfinished.add(outcomes)
         unfinished.add([Outcome(0, odd)])
-        unfinished.publish(Toys())
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["runs.parquet", "study.json"]
+        unfinished.publish(Toys(4))
+    assert contents(tmp_path).keys() == {"runs.parquet", "study.json"}
     table = parquet.read_table(tmp_path / "runs.parquet")
     names = ["run", "scenario", "toy.x", "toy.name", *INDICES, "failure"]
     assert table.column_names == names
@@ -66,7 +70,7 @@ def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
     assert [row["run"] for row in rows] == [0, 1, 2, 3]
     assert [row["failure"] for row in rows] == [None, "stopped at t = 1 s: it would", None, None]
     for number, row in enumerate(rows):
-        assert (row["scenario"], {k: row[k] for k in Toys().columns}) == Toys().point(number)
+        assert (row["scenario"], {k: row[k] for k in Toys(4).columns}) == Toys(4).point(number)
     assert rows[2] | outcome(2).indices == rows[2]
     assert all(rows[1][name] is None for name in INDICES)
     assert rows[0]["time_to_reach"] is None
@@ -75,9 +79,9 @@ def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
 
 
 def test_result_gives_columns_and_suggests_names(tmp_path):
-    with store(tmp_path, RECORD) as unfinished:
+    with store(tmp_path, RECORD | {"runs": 2}) as unfinished:
         unfinished.add([outcome(1), Outcome(0, {}, "it would not")])
-        unfinished.publish(Toys())
+        unfinished.publish(Toys(2))
     result = StudyResult(tmp_path)
     assert (result.runs, result.failed) == (2, 1)
     assert np.isnan(result["late_error"][0])
@@ -93,13 +97,12 @@ def test_result_gives_columns_and_suggests_names(tmp_path):
 
 
 def test_study_that_is_done_is_not_opened_again(tmp_path):
-    with store(tmp_path, RECORD) as unfinished:
+    with store(tmp_path, RECORD | {"runs": 1}) as unfinished:
         unfinished.add([outcome(0)])
-        unfinished.publish(Toys())
+        unfinished.publish(Toys(1))
     # As if it had been killed before its database was gone.
-    (tmp_path / "unfinished.sqlite").touch()
     with store(tmp_path, RECORD) as unfinished:
-        assert unfinished is None
+        assert unfinished.is_done
     assert not (tmp_path / "unfinished.sqlite").exists()
 
 
@@ -127,11 +130,11 @@ def test_folder_is_for_one_process(tmp_path):
 @pytest.mark.parametrize(
     ("file", "content", "words"),
     [
-        ("study.json", "[", "not the record of a study"),
-        ("study.json", "{}", "not the record of a study"),
-        ("study.json", "[1]", "not the record of a study"),
-        ("runs.parquet", "", "has runs, but no study.json"),
-        ("unfinished.sqlite", "no database" * 100, "has runs, but no study.json"),
+        ("study.json", "[", "is not a file that auv-fmu wrote"),
+        ("study.json", "{}", "is not a file that auv-fmu wrote"),
+        ("runs.parquet", "", "is not a file that auv-fmu wrote"),
+        ("unfinished.sqlite", "no database" * 100, "is not a file that auv-fmu wrote"),
+        ("unfinished.sqlite-wal", "mine", "is not a file that auv-fmu wrote"),
     ],
 )
 def test_what_is_not_ours_is_refused(tmp_path, file, content, words):
@@ -146,7 +149,7 @@ def test_damaged_database_and_place_that_is_no_folder_are_one_line(tmp_path):
         pass
     (tmp_path / "study" / "unfinished.sqlite").write_bytes(b"no database" * 1000)
     with (
-        pytest.raises(InputError, match=r"cannot write into .*: file is not a database"),
+        pytest.raises(InputError, match=r"unfinished\.sqlite is not a file that auv-fmu wrote"),
         store(tmp_path / "study", RECORD),
     ):
         raise AssertionError
