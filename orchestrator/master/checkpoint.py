@@ -201,9 +201,11 @@ class Checkpoints:
 
     def remove(self) -> None:
         """Remove what a run that has come to its end does not need any more."""
-        if begins(self.folder / _ROWS, self._identity):
-            (self.folder / _ROWS).unlink()
         if (found := _read(self.folder)) is not None and found.identity == self._identity:
+            # While there are rows, there is the proof that they are ours.
+            self._store(_Stored(self._identity, self._every, dict(self._run)))
+            if begins(self.folder / _ROWS, self._identity):
+                (self.folder / _ROWS).unlink()
             (self.folder / _STATE).unlink()
         self._partial.unlink(missing_ok=True)
         with suppress(OSError):

@@ -64,7 +64,7 @@ def file_name(name: str, taken: Collection[str] = ()) -> str:
     """
     plain = _ODD.sub("_", name).strip(" ").rstrip(".")
     plain = plain.encode()[:_LONGEST].decode(errors="ignore")
-    if plain.startswith(".") or _KEPT.match(plain):
+    if not plain or plain.startswith(".") or _KEPT.match(plain):
         plain = f"_{plain}"
     if plain != name:
         plain += f"-{sha256(name.encode(errors='surrogatepass')).hexdigest()[:8]}"

@@ -217,7 +217,7 @@ def test_no_home_and_no_temporary_folder(workplace):
 
 def under_way(folder: Path) -> bool:
     """Whether rows are on their way into a folder."""
-    return any(path.stat().st_size > 1e5 for path in folder.glob(".unfinished-*/result.csv"))
+    return any(path.stat().st_size > 1e5 for path in folder.glob(".auv-fmu-*/result.csv"))
 
 
 def running(loop: str = "auto") -> subprocess.Popen[str]:
@@ -257,7 +257,7 @@ def test_a_killed_run_leaves_the_earlier_result_as_it_was(workplace):
     process.kill()
     process.communicate()
     after = contents(workplace)
-    assert {name: after[name] for name in after if ".unfinished-" not in name} == before
+    assert {name: after[name] for name in after if ".auv-fmu-" not in name} == before
     assert len(after) > len(before)
     assert main([*RUN, "0.1"]) == 0
     assert contents(workplace).keys() == before.keys()
@@ -333,7 +333,7 @@ def test_children_end_with_their_parent(workplace, temporary, command, number):
     """And what was good stays good, byte for byte; nothing stays but what the next one removes."""
     out = workplace / "out"
     out.mkdir()
-    for name in ("auv.ssp", "report.html", "run.json"):
+    for name in ("mine.ssp", "mine.html", "mine.json"):
         (out / name).write_text("{}")
     before = contents(out)
     process = start(command, "--out", str(out))
@@ -358,7 +358,7 @@ def test_a_folder_that_is_moved_away_ends_the_run_early(workplace):
     Path("results/fig4").rename("moved")
     [line] = process.communicate(timeout=60)[1].splitlines()
     assert process.returncode == 2
-    [left] = Path("moved").glob(".unfinished-*")
+    [left] = Path("moved").glob(".auv-fmu-*")
     assert line == (
         "auv-fmu: results/fig4 was moved or deleted while it was written, and what was computed "
         f"went with it, in {left.name}"

@@ -146,7 +146,7 @@ def test_runs_are_kept_for_the_next_report(folder):
     runs = {run.label for each in (*CLAIMS, *EFFECTS) for run in each.runs}
     # Fig. 4 with 1 mm of noise is Fig. 4 itself; Fig. 3(a) and the stranger are further runs.
     assert len(list((folder / "runs").glob("*.npz"))) == len(runs) + 2
-    assert not list(folder.glob(".unfinished*"))
+    assert not list(folder.glob(".auv-fmu-*"))
 
 
 def test_studies_are_in_the_report_and_kept_for_the_next(folder, tmp_path):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from orchestrator.errors import InputError
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
 from orchestrator.paper.outcomes import Outcomes, key_of
@@ -94,22 +95,31 @@ def test_equal_runs_are_made_once_and_used_again(tmp_path):
     np.testing.assert_array_equal(read.table.rows, made.table.rows)
 
 
-def test_a_broken_file_is_made_again(tmp_path):
+def test_a_file_that_was_changed_is_refused(tmp_path):
     Outcomes(tmp_path, 0.1).make([QUIET], InThisProcess())
     [file] = tmp_path.glob("*.npz")
-    file.write_bytes(file.read_bytes()[:100])
-    outcomes, crew = Outcomes(tmp_path, 0.1), InThisProcess()
+    before = file.read_bytes()
+    file.write_bytes(before[:100])
+    crew = InThisProcess()
+    with pytest.raises(InputError, match=rf"{file.name} is not a file that auv-fmu wrote"):
+        Outcomes(tmp_path, 0.1).make([QUIET], crew)
+    assert file.read_bytes() == before[:100]
+    outcomes = Outcomes(tmp_path, 0.1, force=True)
     outcomes.make([QUIET], crew)
     assert len(crew.done) == 1
     assert outcomes[QUIET].failure is None
+    assert file.with_name(f"{file.name}.~1~").read_bytes() == before[:100]
 
 
 def test_what_no_run_needs_is_forgotten(tmp_path):
-    outcomes = Outcomes(tmp_path, 0.1)
+    Outcomes(tmp_path, 0.1).make([QUIET], InThisProcess())
+    (tmp_path / "0123.npz").write_bytes(b"mine")
+    outcomes = Outcomes(tmp_path, 0.2)
     outcomes.make([QUIET], InThisProcess())
-    (tmp_path / "0123.npz").write_bytes(b"old")
+    assert len(list(tmp_path.glob("*.npz"))) == 3
     outcomes.forget_others()
-    assert len(list(tmp_path.glob("*.npz"))) == 1
+    assert len(list(tmp_path.glob("*.npz"))) == 2
+    assert (tmp_path / "0123.npz").read_bytes() == b"mine"
 
 
 def test_a_run_that_cannot_be_made_says_why(tmp_path):
