@@ -22,6 +22,8 @@ settings.register_profile(
     derandomize=True,
     phases=[Phase.explicit, Phase.generate],
 )
+# For tests/fuzz/test_keeping.py: thousands of folders, and of files with a changed bit.
+settings.register_profile("attack", settings.get_profile("patient"), max_examples=8000)
 
 # Where a shell has started the tests in the background, or nohup has, they ignore signals, and so
 # does all that they start.

@@ -1,0 +1,395 @@
+"""What is the user's stays the user's, whatever it is called and whatever is written beside it.
+
+Folders full of files with names that the program itself uses go through every command that writes:
+each byte of the user's must be there afterwards, in its place or, with `--force`, moved aside. And
+what the program reads back is damaged, a bit at a time: it is refused or said, or nothing differs.
+
+    pytest tests/fuzz/test_keeping.py --hypothesis-profile=attack
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from importlib import import_module
+from importlib.util import find_spec
+from io import StringIO
+from math import modf
+from pathlib import Path
+from shutil import copytree, rmtree
+from typing import NamedTuple
+from unittest.mock import patch
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from orchestrator.analysis.figures import figure_files
+from orchestrator.commands import paper
+from orchestrator.commands.main import main
+from orchestrator.experiments import bundle, own_controller, run
+from orchestrator.experiments.bundle import MANIFEST, current_fmus
+from orchestrator.master.checkpoint import Checkpoints
+from orchestrator.paper import report
+from orchestrator.paper.sections import Section
+from orchestrator.paper.workers import Workers
+from orchestrator.studies.engine import Engine, Outcome, Run
+from orchestrator.studies.store import Store
+from orchestrator.system.ledger import LEDGER
+from support.machine import contents, ended, forked
+
+#: Examples of each command; with the profile `attack` some hundred times as many.
+EXAMPLES = max(settings.default.max_examples // 10, 8)
+
+STUDIES = all(map(find_spec, ("distributed", "numba", "pyarrow", "scipy")))
+
+RUN = ["run", "fig3a", "--stop-time", "0.1", "--no-figures"]
+STUDY = """
+scenario = "fig3a"
+stop_time = 0.1
+[vary]
+plant.eta0.z = [1.0, 2.0, 3.0]
+"""
+
+
+#: Commands that write into `{out}`, and read what is `{here}`.
+COMMANDS = {
+    "run": [*RUN, "--out", "{out}"],
+    "compare": ["run", "{here}/both.toml", "--no-figures", "--out", "{out}"],
+    "checkpoint": [*RUN, "--checkpoint-every", "0.04", "--out", "{out}"],
+    "figures": [*RUN[:-1], "--out", "{out}"],
+    "plot": ["plot", "{here}/result", "plant.eta.*", "--out", "{out}/plot.png"],
+    "view": ["view", "{here}/result", "--out", "{out}/view.html"],
+    "view-beside": ["view", "{out}"],
+    "ssp": ["export", "fig3a", "--out", "{out}"],
+    "osp": ["export", "fig3a", "--format", "osp", "--out", "{out}"],
+    "build": ["build", "--out", "{out}"],
+    "new": ["new", "controller", "Own", "{out}"],
+    "script": ["build", "{here}/own.py", "--out", "{out}"],
+    "report": ["report", "--out", "{out}"],
+}
+if STUDIES:
+    COMMANDS["sweep"] = ["sweep", "{here}/study.toml", "--out", "{out}"]
+
+#: Names of files that the program writes, or has written once, and some that only look like them.
+NAMES = [
+    LEDGER, f"{LEDGER}.~1~", ".auv-fmu-" + "0" * 32, ".auv-fmu-mine/a", ".unfinished-novel/a",
+    ".partial-backup/a", ".partial-1.png", ".whole/run.json", ".whole/a", ".earlier.json", ".spare",
+    "result.csv", "result.parquet", "result.csv.~1~", "certificates.csv", "metrics.json",
+    "run.json", "view.html", "plot.png", "fig3a.png", "fig3a.svg", "both.png",
+    "checkpoint/rows.bin", "checkpoint/state.json", "checkpoint/notes", "checkpoint/fig3a/rows.bin",
+    "checkpoint", "incomplete/result.csv", "incomplete/run.json", "incomplete", "incomplete-2/a",
+    "fig3b/result.csv", "fig3b", "fig3b/thesis/a", "study.json", "runs.parquet",
+    "unfinished.sqlite", "unfinished.sqlite-wal", "unfinished.sqlite-journal", ".figures-mine/a",
+    "report.html", "report.md", "figures", "figures/fig3a/fig3a.png", "runs/0123.npz", "runs",
+    "auv.ssp", "AuvPlant.fmu", "build.json", "SHA256SUMS", "bom.cdx.json", "fig3a.ssp",
+    "OspSystemStructure.xml", "own.py", "Own.fmu", "OwnController.fmu", "scenario.toml",
+    "README.md", ".git/HEAD", "thesis/chapter.tex", "notes.md", "a b", "Größe", "-rf", "a\nb",
+]  # fmt: skip
+
+#: Names of scenarios that a run is compared with.
+COMPANIONS = ["..", ".", "result.csv", "checkpoint", "incomplete"]
+
+contents_of_files = st.one_of(
+    st.binary(max_size=20),
+    st.sampled_from(
+        [
+            b'{"files": ["notes.md", "thesis/chapter.tex", "../outside/a"], "failure": null}',
+            json.dumps({"identity": "0" * 32, "files": {"notes.md": "0"}}).encode(),
+            b"time,plant.eta.x\n0.0,1.0\n0.1,2.0\n",
+            b"SQLite format 3\0" + bytes(84),
+        ]
+    ),
+)
+
+
+class Folder(NamedTuple):
+    """What is in a folder before a command.
+
+    Attributes:
+        ran: whether a run of ours has written into it before.
+        changed: whether the user has changed what that wrote.
+        files: of the user's, by their names.
+        links: to a file or a folder elsewhere.
+        force: whether the command is to move them aside.
+
+    """
+
+    ran: bool
+    changed: bool
+    files: dict[str, bytes]
+    links: dict[str, str]
+    force: bool
+
+
+folders = st.builds(
+    Folder,
+    st.booleans(),
+    st.booleans(),
+    st.dictionaries(
+        st.sampled_from(NAMES) | st.from_regex(r"[\w .~-]{1,30}", fullmatch=True),
+        contents_of_files,
+        max_size=12,
+    ),
+    st.dictionaries(st.sampled_from(NAMES), st.sampled_from(["a", ".", "no"]), max_size=2),
+    st.booleans(),
+)
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What commands read: a result, a study, a script, and scenarios of odd names."""
+    folder = tmp_path_factory.mktemp("here")
+    current_fmus()
+    assert main([*RUN, "--out", str(folder / "result")]) == 0
+    (folder / "study.toml").write_text(STUDY)
+    for name in COMPANIONS:
+        (folder / f"{name}.toml").write_text("stop_time = 0.06\n")
+    assert main(["new", "controller", "Own", str(folder / "own")]) == 0
+    shutil.copy(folder / "own" / "own.py", folder)
+    return folder
+
+
+@contextmanager
+def quick(here: Path) -> Iterator[None]:
+    """Without what takes seconds and writes elsewhere: compilers, processes, most of a report."""
+
+    def copied(module: str, folder: Path, *options: str) -> list[Path]:
+        source = current_fmus() if module == "packaging.build" else here / "own"
+        found = [*source.glob("*.fmu"), *source.glob(MANIFEST)]
+        return [Path(shutil.copy(path, folder)) for path in found]
+
+    class Alone(Workers):
+        def results(self, tasks, unit):
+            return ((key, task()) for key, task in tasks.items())
+
+    @contextmanager
+    def alone() -> Iterator[Workers]:
+        yield Alone(None, 1, None)
+
+    def drawn(
+        kind: str, title: str, runs: object, folder: Path, stem: str, **_: object
+    ) -> list[str]:
+        for name in figure_files(kind, stem):
+            (folder / name).write_bytes(b"drawn")
+        return []
+
+    def shown(section: Section, made: object, folder: Path) -> list[str]:
+        folder.mkdir(parents=True)
+        return drawn(section.scenario.figure, "", made, folder, section.name)
+
+    @contextmanager
+    def making(engine: Engine, runs: Iterable[Run], **_: object) -> Iterator[list[list[Outcome]]]:
+        yield [list(engine.outcomes([run])) for run in runs]
+
+    with ExitStack() as stack:
+        for what, name, instead in (
+            (bundle, "run_fmus", copied),
+            (own_controller, "run_fmus", copied),
+            (run, "draw", drawn),
+            (report, "draw_section", shown),
+            (report, "workers", alone),
+            (report, "CLAIMS", ()),
+            (report, "EFFECTS", ()),
+            (paper, "names", lambda: ["fig3a"]),
+            *([(import_module("orchestrator.studies.cluster"), "making", making)] * STUDIES),
+        ):
+            stack.enter_context(patch.object(what, name, instead))
+        yield
+
+
+def snapshot(folder: Path) -> dict[str, bytes | str]:
+    """All that is below a folder: bytes of files, ends of links; of folders, that they are there."""
+    found: dict[str, bytes | str] = {}
+    for place, folders, names in os.walk(folder):
+        for name in (*folders, *names):
+            path = Path(place, name)
+            key = path.relative_to(folder).as_posix()
+            if path.is_symlink():
+                found[key] = os.readlink(path)  # noqa: PTH115  # not what it leads to
+            elif path.is_file():
+                found[key] = path.read_bytes()
+    return found
+
+
+def fill(folder: Path, outside: Path, what: Folder) -> None:
+    """Put files and links of the user's where nothing else is."""
+    for name, content in what.files.items():
+        path = folder / name
+        if not os.path.lexists(path) and not path.name.startswith("/"):
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                if not any(parent.is_symlink() for parent in path.parents):
+                    path.write_bytes(content)
+            except (NotADirectoryError, FileExistsError):
+                # There is a file where a folder would have to be.
+                pass
+    for name, end in what.links.items():
+        path = folder / name
+        if not os.path.lexists(path) and path.parent.is_dir():
+            path.symlink_to(outside / end)
+
+
+def call(arguments: list[str]) -> tuple[int, str]:
+    """Exit status of a command, and what it says."""
+    said = StringIO()
+    with redirect_stderr(said), redirect_stdout(StringIO()):
+        status = main(arguments)
+    return status, said.getvalue()
+
+
+def is_kept(name: str, content: bytes | str, after: dict[str, bytes | str]) -> bool:
+    """Whether a file of the user's is there, or was moved aside, it or a folder that it is in."""
+    if after.get(name) == content:
+        return True
+    parts = Path(name).parts
+    for i, part in enumerate(parts):
+        for n in range(1, 4):
+            aside = Path(*parts[:i], f"{part}.~{n}~", *parts[i + 1 :]).as_posix()
+            if after.get(aside) == content:
+                return True
+    return False
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_file_of_the_users_stays(here: Path, name: str):
+    @settings(max_examples=EXAMPLES, suppress_health_check=list(HealthCheck))
+    @given(what=folders, companion=st.sampled_from(COMPANIONS))
+    def check(what: Folder, companion: str) -> None:
+        with tempfile.TemporaryDirectory() as place:
+            out, outside = Path(place, "out"), Path(place, "outside")
+            out.mkdir()
+            outside.mkdir()
+            (outside / "a").write_text("elsewhere")
+            (here / "both.toml").write_text(
+                f'figure = "comparison"\ncompare = "{companion}.toml"\nstop_time = 0.1\n'
+            )
+            if what.ran:
+                assert call([*RUN, "--out", str(out)])[0] == 0
+            ours = snapshot(out)
+            if what.ran and what.changed:
+                with (out / "metrics.json").open("a") as file:
+                    file.write("mine")
+            fill(out, outside, what)
+            before = {k: v for k, v in snapshot(out).items() if ours.get(k) != v}
+            elsewhere = snapshot(outside) | snapshot(here)
+            arguments = [part.format(out=out, here=here) for part in COMMANDS[name]]
+            if what.force and name != "new":
+                arguments.append("--force")
+            with quick(here):
+                status, said = call(arguments)
+            after = snapshot(out)
+            assert status in (0, 1, 2), said
+            assert not [k for k, v in before.items() if not is_kept(k, v, after)], said
+            assert snapshot(outside) | snapshot(here) == elsewhere
+            if status == 2:
+                assert len(said.splitlines()) - said.count("warning: ") == 1, said
+                assert what.force or {k: after.get(k) for k in before} == before
+
+    check()
+
+
+def flipped(folder: Path, place: float, bit: int) -> str:
+    """Change a bit of the files below a folder; the name of the file."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and path.stat().st_size)
+    # Each file as often as any other, however long it is.
+    share, file = modf(place * len(files))
+    path = files[int(file)]
+    content = bytearray(path.read_bytes())
+    content[int(share * len(content))] ^= 1 << bit
+    path.write_bytes(content)
+    return path.relative_to(folder).as_posix()
+
+
+def stop_after(n: int, what: type, method: str) -> Callable[[], None]:
+    """Have this process killed when a method has been called so often."""
+
+    def prepare() -> None:
+        called, left = getattr(what, method), [n]
+
+        def counted(*arguments: object) -> object:
+            answer = called(*arguments)
+            left[0] -= 1
+            if not left[0]:
+                os.kill(os.getpid(), signal.SIGKILL)
+            return answer
+
+        setattr(what, method, counted)
+
+    return prepare
+
+
+#: By name: what leaves something to read, what ends it early, and what reads it then.
+READERS = {
+    "checkpoint": (
+        [*RUN, "--checkpoint-every", "0.04", "--out", "{out}"],
+        stop_after(1, Checkpoints, "_write"),
+        [*RUN, "--resume", "--out", "{out}"],
+    ),
+    "result": ([*RUN, "--out", "{out}"], None, ["view", "{out}"]),
+    "report": (COMMANDS["report"], None, COMMANDS["report"]),
+}
+if STUDIES:
+    READERS["study"] = (COMMANDS["sweep"], None, COMMANDS["sweep"])
+    READERS["unfinished-study"] = (
+        COMMANDS["sweep"],
+        stop_after(2, Store, "add"),
+        COMMANDS["sweep"],
+    )
+
+#: What says when something was made, or how long that took.
+TIMES = re.compile(rb'"(started|seconds|command|resumed_at)": .*|Written by .*')
+
+
+def made(folder: Path) -> dict[str, bytes]:
+    """The files of a folder without times, and without ledgers, each of which is another."""
+    found = {name: TIMES.sub(b"", content) for name, content in contents(folder).items()}
+    return {name: found[name] for name in found if not name.endswith(".npz")}
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_no_changed_bit_is_taken_in_silence(here: Path, tmp_path: Path, name: str):
+    begin, prepare, read = READERS[name]
+    left, whole = tmp_path / "left", tmp_path / "out"
+
+    def work() -> int:
+        if prepare is not None:
+            prepare()
+        with quick(here):
+            return call([part.format(out=left, here=here) for part in begin])[0]
+
+    assert ended(forked(work)) == (0 if prepare is None else -signal.SIGKILL)
+    arguments = [part.format(out=whole, here=here) for part in read]
+
+    def reading() -> tuple[int, str]:
+        with quick(here):
+            return call(arguments)
+
+    copytree(left, whole)
+    assert reading()[0] == 0
+    right = made(whole)
+
+    @settings(max_examples=EXAMPLES * 4, suppress_health_check=list(HealthCheck))
+    @given(st.floats(0.0, 1.0, exclude_max=True), st.integers(0, 7))
+    def check(place: float, bit: int) -> None:
+        rmtree(whole)
+        copytree(left, whole)
+        file = flipped(whole, place, bit)
+        before = made(whole)
+        status, said = reading()
+        if status == 0 and "was changed since" not in said:
+            assert {**made(whole), file: b""} == {**right, file: b""}, said
+            assert file not in right or made(whole)[file] in (right[file], before[file])
+        elif status != 0:
+            assert status == 2, said
+            [line] = [text for text in said.splitlines() if "warning: " not in text]
+            assert line.startswith("auv-fmu: ")
+            assert made(whole) == before
+
+    check()
