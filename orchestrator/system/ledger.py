@@ -192,15 +192,16 @@ class Ledger:
 
     def _take_places(self) -> None:
         """Move what was written to where it belongs; begun again, it goes on."""
-        self.check(name for name in self._moving if (self.unfinished / name).is_file())
-        if (self.unfinished / RECORD).is_file():
+        below = self.unfinished.name
+        waiting = [name for name in self._moving if _is_plain(self.folder, f"{below}/{name}")]
+        self.check(waiting)
+        if RECORD in waiting:
             (self.folder / RECORD).unlink(missing_ok=True)
-        for name in sorted(self._moving, key=lambda name: (name == RECORD, name)):
+        for name in sorted(waiting, key=lambda name: (name == RECORD, name)):
             if name == RECORD:
                 to_disk(self.folder)
-            if (self.unfinished / name).is_file():
-                (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
-                (self.unfinished / name).replace(self.folder / name)
+            (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (self.unfinished / name).replace(self.folder / name)
         leaving, self._leaving = self._leaving, []
         self._files |= self._moving
         self._moving = {}
@@ -311,12 +312,17 @@ def digest_of(path: Path) -> str:
 
 def _digest_in(folder: Path, name: str) -> str | None:
     """The digest of a file in a folder; None: there is none, or a link leads to it."""
+    return digest_of(folder / name) if _is_plain(folder, name) else None
+
+
+def _is_plain(folder: Path, name: str) -> bool:
+    """Whether there is a file in a folder to which no link leads."""
     path = folder
     for part in Path(name).parts:
         path /= part
         if path.is_symlink():
-            return None
-    return digest_of(path) if path.is_file() else None
+            return False
+    return path.is_file()
 
 
 def moved_aside(path: Path) -> Path:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+from contextlib import suppress
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -84,6 +86,31 @@ def test_a_forged_ledger_does_not_lead_out_of_the_folder(tmp_path: Path, name, e
     (tmp_path / "r" / LEDGER).write_text(sealed(content))
     with pytest.raises(Taken, match="damaged, or not by auv-fmu"):
         Ledger(tmp_path / "r")
+
+
+@pytest.mark.parametrize("link", ["unfinished", "below", "file"])
+def test_a_forged_ledger_moves_nothing_from_elsewhere(tmp_path: Path, link):
+    """Somebody's folder may come with a ledger, and with links to files of the user's."""
+    folder, elsewhere = tmp_path / "r", tmp_path / "elsewhere"
+    unfinished = folder / (".auv-fmu-" + "0" * 32)
+    for place in (folder, elsewhere / "below"):
+        place.mkdir(parents=True)
+    (elsewhere / "below" / "key").write_text("mine")
+    if link == "unfinished":
+        unfinished.symlink_to(elsewhere)
+    elif link == "below":
+        unfinished.mkdir()
+        (unfinished / "below").symlink_to(elsewhere / "below")
+    else:
+        (unfinished / "below").mkdir(parents=True)
+        (unfinished / "below" / "key").symlink_to(elsewhere / "below" / "key")
+    moving = {"below/key": sha256(b"mine").hexdigest()}
+    content = {"identity": "0" * 32, "files": {}, "moving": moving, "leaving": []}
+    (folder / LEDGER).write_text(sealed(content))
+    with suppress(OSError):
+        write(folder, "ours", "a")
+    assert (elsewhere / "below" / "key").read_text() == "mine"
+    assert not (folder / "below" / "key").exists()
 
 
 def test_no_bit_of_a_ledger_is_changed_unseen(tmp_path: Path):
