@@ -1,0 +1,147 @@
+"""Files of the user's beside those of the program, by name."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator import simulate
+from orchestrator.commands.main import main
+from orchestrator.master.files import read_rows
+from support.machine import contents
+
+pytestmark = pytest.mark.usefixtures("workplace")
+
+RUN = ["run", "fig3a", "--stop-time", "0.2", "--no-figures", "--out", "r"]
+
+
+def put(*names: str) -> dict[str, bytes]:
+    """Files of the user's."""
+    for name in names:
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).write_text(f"mine: {name}")
+    return {name: f"mine: {name}".encode() for name in names}
+
+
+def rows(path: str | Path) -> np.ndarray:
+    return np.vstack(list(read_rows(Path(path))))
+
+
+def test_a_folder_called_checkpoint_stays():
+    mine = put("r/checkpoint/thesis.tex", "r/checkpoint/data/a.csv", "home/letter.txt", "note")
+    assert main([*RUN, "--checkpoint-every", "0.1"]) == 0
+    simulate("fig3a", stop_time=0.2, checkpoint="home", checkpoint_every=0.1)
+    simulate("fig3a", stop_time=0.2, checkpoint=".", checkpoint_every=0.1)
+    assert {name: content for name, content in contents(Path()).items() if name in mine} == mine
+    assert {path.name for path in Path("r/checkpoint").iterdir()} == {"thesis.tex", "data"}
+
+
+@pytest.mark.parametrize("name", ["rows.bin", "state.json"])
+def test_a_file_with_the_name_of_a_checkpoints_is_refused_before_the_first_step(name, capsys):
+    mine = put(f"r/checkpoint/{name}")
+    assert main([*RUN, "--checkpoint-every", "0.1"]) == 2
+    assert f"r/checkpoint/{name}" in capsys.readouterr().err
+    assert contents(Path()) == mine
+    assert main([*RUN, "--checkpoint-every", "0.1", "--force"]) == 0
+    assert Path(f"r/checkpoint/{name}.~1~").read_bytes() == mine[f"r/checkpoint/{name}"]
+
+
+@pytest.mark.parametrize("stem", ["..", ".", "incomplete", ".whole", "checkpoint", "result.csv"])
+def test_a_companion_of_any_name_has_a_folder_of_its_own(stem):
+    mine = put("r/data.csv", "r/thesis/a.tex", "r/.git/HEAD", "letter")
+    Path(f"{stem}.toml").write_text("[parameters]\nplant.m11 = 26.0\n")
+    Path("both.toml").write_text(f'compare = "{stem}.toml"\nstop_time = 0.2\n')
+    options = ["--set", "plant.noise.std=0", "--checkpoint-every", "0.1"]
+    assert main(["run", "both.toml", "--no-figures", "--out", "r", *options]) == 0
+    found = contents(Path())
+    assert {name: found.get(name) for name in mine} == mine
+    [record] = Path("r").glob("*/run.json")
+    assert json.loads(record.read_text())["scenario"] == stem
+    for path, mass in (("r/result.csv", {}), (record.with_name("result.csv"), {"plant.m11": 26.0})):
+        made = simulate("fig4", {"plant.noise.std": 0.0, **mass}, stop_time=0.2)
+        assert np.array_equal(rows(path), made.rows)
+
+
+def test_somebody_elses_result_is_read_and_no_more(capsys):
+    """It brings hidden folders, links, and a record that names the user's files."""
+    pytest.importorskip("plotly")
+    assert main(RUN) == 0
+    for path in Path("r").glob(".*"):
+        path.unlink()
+    mine = put("home/.ssh/authorized_keys", "home/thesis.tex")
+    record = json.loads(Path("r/run.json").read_text())
+    record["files"] += ["home/thesis.tex", "link/thesis.tex", "link/.ssh/authorized_keys"]
+    Path("r/.whole/link/.ssh").mkdir(parents=True)
+    Path("r/.whole/link/.ssh/authorized_keys").write_text("theirs")
+    Path("r/.whole/run.json").write_text(json.dumps(record))
+    Path("r/link").symlink_to("../home")
+    Path("r/run.json").write_text(json.dumps(record))
+    before = contents(Path())
+    assert main(["plot", "r", "--out", "plot.png"]) == 0
+    assert main(["view", "r"]) == 0
+    after = contents(Path())
+    assert {name: after.get(name) for name in before} == before
+    assert after.keys() - before.keys() == {"plot.png", "r/view.html"}
+    assert mine.items() <= after.items()
+    assert main(["run", "fig3a", "--stop-time", "0.2", "--no-figures", "--out", "r"]) == 2
+    assert "r/result.csv is not a file that auv-fmu wrote" in capsys.readouterr().err
+
+
+def test_names_that_look_like_ours_prove_nothing():
+    mine = put(
+        "r/.unfinished-novel/1.txt", "r/.partial-backup/a", "r/.whole-", ".partial-backup/a",
+        "r/.auv-fmu-mine/a", "r/.earlier.json", ".partial-1.png", "r/notes.md", "r/sub/a.txt",
+    )  # fmt: skip
+    assert main(RUN) == 0
+    assert main(RUN) == 0
+    assert main(["plot", "r", "--out", "plot.png"]) == 0
+    assert main(["export", "fig3a", "--out", "r"]) == 0
+    assert mine.items() <= contents(Path()).items()
+
+
+@pytest.mark.parametrize("name", ["result.csv", "result.parquet", "metrics.json", "run.json"])
+def test_a_file_that_no_run_wrote_is_refused_before_the_first_step(name, capsys):
+    mine = put(f"r/{name}")
+    os.chmod(f"r/{name}", 0o444)  # noqa: PTH101  # as the next line reads it
+    assert main(RUN) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert line == (
+        f"auv-fmu: r/{name} is not a file that auv-fmu wrote, or was changed since: move it, "
+        "choose another place (--out), or let --force move it aside"
+    )
+    assert contents(Path()) == mine
+    assert main([*RUN, "--force"]) == 0
+    assert Path(f"r/{name}.~1~").read_bytes() == mine[f"r/{name}"]
+
+
+def test_another_programs_record_is_not_obeyed(capsys):
+    mine = put("r/notes.md", "r/sub/a.txt")
+    Path("r/run.json").write_text(json.dumps({"files": ["notes.md", "sub/a.txt"]}))
+    assert main(RUN) == 2
+    assert main([*RUN, "--force"]) == 0
+    assert mine.items() <= contents(Path()).items()
+
+
+def test_a_table_of_inputs_is_not_replaced_by_the_result(capsys):
+    mine = "time,plant.tau.u\n0.0,1.0\n1.0,2.0\n"
+    Path("r").mkdir()
+    Path("r/result.csv").write_text(mine)
+    assert main([*RUN, "--inputs", "r/result.csv"]) == 2
+    assert Path("r/result.csv").read_text() == mine
+
+
+def test_what_the_user_changed_is_the_users(capsys):
+    assert main(RUN) == 0
+    with Path("r/result.csv").open("a") as file:
+        file.write("mine")
+    changed = Path("r/result.csv").read_bytes()
+    assert main(RUN) == 2
+    assert Path("r/result.csv").read_bytes() == changed
+    capsys.readouterr()
+    Path("r/result.csv").write_bytes(changed.removesuffix(b"mine").replace(b"0.02,", b"0.03,", 1))
+    assert main(["plot", "r", "--out", "plot.png"]) == 0
+    assert "warning: r/result.csv was changed since the run wrote it" in capsys.readouterr().err
