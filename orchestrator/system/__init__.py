@@ -11,7 +11,9 @@ module                  what it holds
 :mod:`.units`           units by their definitions, and from one to another
 :mod:`.structure`       components, connections and parameters: a system
 :mod:`.graph`           what depends on what: feedthrough, and what reaches a component
-:mod:`.atomic`          files that appear whole or not at all
+:mod:`.atomic`          files that outlast a power cut
+:mod:`.sealed`          records that carry a checksum over themselves
+:mod:`.ledger`          what was written into a folder: the proof that a file is ours
 :mod:`.leftovers`       what only one process may have, and what it leaves when it is killed
 :mod:`.children`        modules run in processes that do not outlive this one
 :mod:`.unpacking`       archives unpacked, once a process and version

@@ -143,9 +143,12 @@ class Ledger:
             if path.is_file():
                 new[path.relative_to(self.unfinished).as_posix()] = digest_of(path)
         to_disk(self.unfinished)
+        leaving = sorted(set(old) & self._files.keys() - new.keys())
+        if not new and not leaving:
+            return
         # Nothing is lost where the bytes are the same.
         self.check(name for name in new if _digest_in(self.folder, name) != new[name])
-        self._moving, self._leaving = new, sorted(set(old) & self._files.keys() - new.keys())
+        self._moving, self._leaving = new, leaving
         try:
             self._write()
         except OSError:

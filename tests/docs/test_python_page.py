@@ -6,6 +6,7 @@ from importlib.util import find_spec
 
 import pytest
 
+from support.machine import contents
 from support.markdown import DOCS, blocks
 
 NEEDED = ("pandas", "pyarrow")
@@ -25,7 +26,7 @@ def test_examples_run_and_print_what_the_page_says(tmp_path, monkeypatch, capsys
         exec(compile(text, "docs/python.md", "exec"), names)
         printed = capsys.readouterr().out
     assert (tmp_path / "commands.png").is_file()
-    files = {path.name for path in (tmp_path / "results/mine").iterdir()}
+    files = contents(tmp_path / "results/mine").keys()
     assert files == {"result.parquet", "metrics.json", "run.json"}
 
 

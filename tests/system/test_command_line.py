@@ -16,10 +16,11 @@ from orchestrator.commands.main import main
 from orchestrator.experiments import bundle
 from orchestrator.experiments.scenario import FOLDER as SCENARIOS
 from orchestrator.experiments.scenario import names, read_scenario
+from orchestrator.system.ledger import LEDGER
 
 
 def files(folder: Path) -> set[str]:
-    return {path.name for path in folder.iterdir()}
+    return {path.name for path in folder.iterdir() if path.name != LEDGER}
 
 
 def test_build_writes_every_fmu_and_the_bundle_once(workplace, capsys):
@@ -37,7 +38,9 @@ def test_build_replaces_what_is_missing_or_stale(dist, workplace):
     stale = workplace / "bundle/build.json"
     stale.write_text('{"fingerprint": "of other sources"}')
     (workplace / "bundle/AuvPlant.fmu").unlink()
-    assert main(["build", "--out", "bundle"]) == 0
+    assert main(["build", "--out", "bundle"]) == 2
+    assert "other" in stale.read_text()
+    assert main(["build", "--out", "bundle", "--force"]) == 0
     assert (workplace / "bundle/AuvPlant.fmu").is_file()
     assert "other" not in stale.read_text()
 
@@ -47,7 +50,7 @@ def test_build_takes_a_manifest_that_is_none_for_none(dist, workplace):
     manifest = workplace / "bundle/build.json"
     whole = manifest.read_text()
     manifest.write_text("[]")
-    assert main(["build", "--out", "bundle"]) == 0
+    assert main(["build", "--out", "bundle", "--force"]) == 0
     assert manifest.read_text() == whole
 
 
@@ -57,7 +60,8 @@ def test_build_replaces_fmus_that_are_not_what_was_built(dist, workplace):
     cut.write_bytes(cut.read_bytes()[:1000])
     os.utime(cut, ns=(0, 0))
     untouched = other.stat().st_mtime_ns
-    assert main(["build", "--out", "bundle"]) == 0
+    assert main(["build", "--out", "bundle"]) == 2
+    assert main(["build", "--out", "bundle", "--force"]) == 0
     assert cut.read_bytes() == (dist / "AuvPlant.fmu").read_bytes()
     assert other.stat().st_mtime_ns == untouched
 
@@ -106,7 +110,7 @@ def test_same_run_gives_the_same_files(workplace):
         assert main(["run", "fig4", "--stop-time", "1", "--out", name]) == 0
     for path in (workplace / "a").iterdir():
         # The record says when and with which command.
-        if path.name != "run.json":
+        if path.name not in ("run.json", LEDGER):
             assert path.read_bytes() == (workplace / "b" / path.name).read_bytes(), path.name
 
 
@@ -251,7 +255,7 @@ def test_animation_is_written(workplace):
         (["verify", "broken.ssp", "--tolerance", "nan"], "must not be negative"),
         (["run", "fig4", "--columns", "plant.tua.*"], "no column matches"),
         (["run", "unwired.toml"], "no wire 'plant.tua' to remove; did you mean plant.tau"),
-        (["run", "fig4", "--stop-time", "0.1", "--out", "taken"], "cannot write into"),
+        (["run", "fig4", "--stop-time", "0.1", "--out", "taken"], "taken/result.csv is not"),
         (["gains", "--set", "plant.ell=0"], "must be at least"),
         (["gains", "--set", "controller.K1[1]=nan"], "must be finite"),
         (["run", "missing.toml"], "no such file"),

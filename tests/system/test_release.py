@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from orchestrator.experiments import bundle
+from support.machine import contents
 
 ROOT = Path(__file__).parents[2]
 
@@ -47,8 +48,7 @@ def test_wheel_builds_the_bundle_and_runs_fig4_in_an_empty_folder(tmp_path: Path
 
 def test_bundle_built_again_elsewhere_is_the_same_to_the_last_byte(dist: Path, tmp_path: Path):
     bundle.build(tmp_path / "elsewhere")
-    again = {path.name: path.read_bytes() for path in (tmp_path / "elsewhere").iterdir()}
-    assert again == {path.name: path.read_bytes() for path in dist.iterdir()}
+    assert contents(tmp_path / "elsewhere") == contents(dist)
 
 
 def test_checksums_are_those_of_the_files(dist: Path):

@@ -16,6 +16,7 @@ from orchestrator.studies.engine import INDICES
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import read_study
+from support.machine import contents
 
 pytest.importorskip("distributed", reason="needs Dask: the extra `studies`")
 
@@ -37,7 +38,7 @@ def study(workplace: Path) -> Path:
 
 
 def files(folder: Path) -> dict[str, int]:
-    return {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+    return {name: (folder / name).stat().st_mtime_ns for name in contents(folder)}
 
 
 def straight(path: Path) -> list[Any]:
