@@ -74,6 +74,7 @@ class Metrics:
             values["failure"] = self._failure
         return values | self.indices()
 
+    @np.errstate(all="ignore")
     def indices(self) -> dict[str, list[float]]:
         """The indices alone: those of the actuators in the order u, q, r, e_f in x, y, z."""
         found: dict[str, list[float]] = {}

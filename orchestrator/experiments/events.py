@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from math import isfinite
 from typing import Any
 
 from orchestrator.errors import InputError
@@ -33,7 +34,7 @@ from orchestrator.master.events import (
 from orchestrator.system.names import PortName, port_name, splits
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.transformation import Linear, Mapped
-from orchestrator.system.values import literal, real, type_of, typed
+from orchestrator.system.values import INTEGERS, finite, literal, type_of, typed
 
 #: What is between the names of a group and of its members.
 _MEMBER = (".", "[")
@@ -219,9 +220,9 @@ def _condition(text: str, system: System) -> Condition:
     name, comparison, number = match.groups()
     [signal] = _ports(system, name, ("input", "output"), alone=True)
     try:
-        return Condition(signal, comparison, real(number))
-    except ValueError:
-        raise InputError(f"when = {text!r}: {number!r} is not a number") from None
+        return Condition(signal, comparison, finite(number, f"when = {text!r}:"))
+    except ValueError as error:
+        raise InputError(str(error)) from None
 
 
 # What there is in a system
@@ -319,7 +320,9 @@ def _value(system: System, port: PortName, route: Connection | None, value: Any)
     """What an input takes where a signal is overridden."""
     variable = system.component(port.component).variable(port.port)
     number = float(typed(str(port), variable, _text(value)))
-    return route.transformation(number) if route and route.transformation else number
+    if route is None or route.transformation is None:
+        return number
+    return _arrived(port, route, value, route.transformation(number))
 
 
 def _offset(system: System, port: PortName, route: Connection | None, value: Any) -> float:
@@ -327,14 +330,24 @@ def _offset(system: System, port: PortName, route: Connection | None, value: Any
     variable = system.component(port.component).variable(port.port)
     if type_of(variable) not in ("Real", "Integer"):
         raise InputError(f"{port} is of type {type_of(variable)}: nothing can be added to it")
-    if not is_finite(value) or (type_of(variable) == "Integer" and value != int(value)):
+    least, most = INTEGERS
+    if not is_finite(value) or (
+        type_of(variable) == "Integer" and (value != int(value) or abs(value) > most - least)
+    ):
         raise InputError(f"{port}: {value!r} cannot be added to it")
-    match route.transformation if route else None:
-        case Linear(factor, _):
-            return factor * float(value)
-        case Mapped():
+    match route:
+        case Connection(transformation=Linear(factor, _)):
+            return _arrived(port, route, value, factor * float(value))
+        case Connection(transformation=Mapped()):
             raise InputError(f"{port} is mapped on its way: nothing can be added to it")
     return float(value)
+
+
+def _arrived(port: PortName, route: Connection, value: Any, arriving: float) -> float:
+    """What a value of an event is at the end of its way, where it must be a number still."""
+    if not isfinite(arriving):
+        raise InputError(f"{port}: {value!r} is {arriving:g} where it arrives, at {route.target}")
+    return arriving
 
 
 def _text(value: Any) -> Any:

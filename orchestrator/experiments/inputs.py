@@ -19,6 +19,9 @@ from orchestrator.system.values import type_of, typed
 #: How a Real input goes from one row to the next; the first is the default.
 _WAYS = ("linear", "hold")
 
+#: So many seconds are farther apart than two numbers can be, but for rounding [s].
+_MOST = 1e308
+
 #: What `[inputs]` may hold.
 ENTRIES: dict[str, Entry] = {
     "file": Entry(
@@ -97,8 +100,10 @@ def _check(rows: np.ndarray, targets: tuple[PortName, ...]) -> None:
         raise InputError("two columns have the same name")
     if not np.isfinite(rows).all():
         raise InputError("all times and values must be finite")
-    if (np.diff(rows[:, 0]) < 0.0).any():
+    if (rows[1:, 0] < rows[:-1, 0]).any():
         raise InputError("times must not fall")
+    if rows[-1, 0] / 2 - rows[0, 0] / 2 > _MOST / 2:
+        raise InputError(f"times must lie less than {_MOST:g} s apart")
 
 
 def _check_column(system: System, target: PortName, column: np.ndarray) -> None:

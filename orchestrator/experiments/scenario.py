@@ -214,10 +214,9 @@ def _scenario(path: Path, text: str) -> Scenario:
     if _are_tables(events := content.get("events", ())):
         with findings.collecting():
             check_events(path, events)
-    inputs = content.get("inputs", {})
-    if is_table(inputs) and inputs:
+    if "inputs" in content and is_table(content["inputs"]):
         with findings.collecting():
-            content["inputs"] = _inputs(path, inputs)
+            content["inputs"] = _inputs(path, content["inputs"])
     findings.refuse()
     content["parameters"] = {
         port_name(key): value for key, value in flattened(content.get("parameters", {}))

@@ -17,6 +17,7 @@ module                  what it holds
 :mod:`.row`             the row of all values
 :mod:`.texts`           texts, for which numbers stand in the row
 :mod:`.transfer`        the FMI calls that move them
+:mod:`.mode`            the processor's floating-point mode, which FMUs can change
 :mod:`.paces`           which components take longer steps of their own
 :mod:`.schedule`        which components are stepped when, and on whose outputs
 :mod:`.signals`         what is done to values on their way from outputs to inputs

@@ -12,9 +12,11 @@ from threading import Lock
 from typing import Any
 
 import fmpy
-from fmpy.fmi2 import FMU2Slave, fmi2Error
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave, fmi2Error, fmi2Status
 
 from orchestrator.errors import InputError, reason
+from orchestrator.master.mode import put_back
 from orchestrator.system.component import Component
 from orchestrator.system.unpacking import check_place, runs_python
 
@@ -38,6 +40,21 @@ class FMU2OfOthers(FMU2Slave):  # type: ignore[misc]
         self.dll = _Lenient(dll)
         super()._loadFunctions()
         self.dll = dll
+
+    def _call(self, fname: str, *args: Any) -> Any:
+        try:
+            result = super()._call(fname, *args)
+        finally:
+            put_back()
+        # fmpy takes what is below all of FMI's statuses for a good one.
+        if self._functions[fname].restype is fmi2Status and result < 0:
+            raise FMICallException(fname, result)
+        return result
+
+    def freeLibrary(self) -> None:
+        """Unload the library."""
+        super().freeLibrary()
+        put_back()
 
 
 class _Lenient:
@@ -88,6 +105,8 @@ class Library:
                 )
         except Exception as error:
             raise InputError(f"{named(component)} cannot be loaded: {reason(error)}") from error
+        finally:
+            put_back()
         tool = component.description.generationTool or ""
         self.runs_python = runs_python(folder)
         self.is_akin = tool.startswith(_OWN) or self.runs_python

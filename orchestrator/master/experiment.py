@@ -101,7 +101,9 @@ class Experiment:
 
     def reaching(self, time: float) -> int:
         """After how many steps a time [s] has come: the first t_k that is not before it."""
-        return max(ceil(_rounded((time - self.start_time) / self.step)), 0)
+        # Their number may be more than an integer can hold.
+        steps = min(max((time - self.start_time) / self.step, 0.0), MOST_STEPS + 1.0)
+        return ceil(_rounded(steps))
 
     @property
     def rows(self) -> int:

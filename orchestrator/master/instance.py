@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from ctypes import c_double
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -69,7 +70,7 @@ class Instance(Protocol):
     get_outputs: list[Callable[[], int]]
 
     @property
-    def do_step(self) -> Callable[[float, float, int], int]:
+    def do_step(self) -> Callable[[c_double, c_double, int], int]:
         """FMI's doStep, to be called with time, step size and one."""
 
     def pointers(self) -> layout.Member:

@@ -9,6 +9,7 @@ import socket
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from ctypes import c_double
 from dataclasses import dataclass
 from functools import partial
 from math import isfinite
@@ -208,11 +209,11 @@ class IsolatedInstance:
         """What to raise after a call that has ended with a status; its own calls raise at once."""
         return ComponentFailed(f"{self.name}: {function} ended with status {status}")
 
-    def do_step(self, t: float, h: float, _: int) -> int:
+    def do_step(self, t: c_double, h: c_double, _: int) -> int:
         """Have a step begun, whose end the first of `get_outputs` waits for."""
         outgoing = self._channel.outgoing
-        outgoing[0] = t
-        outgoing[1] = h
+        outgoing[0] = t.value
+        outgoing[1] = h.value
         self._put_inputs()
         self._doing, self._steps = "doStep", True
         self._send({})

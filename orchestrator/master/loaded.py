@@ -28,6 +28,7 @@ from fmpy.fmi2 import (
     fmi2Error,
     fmi2Fatal,
     fmi2LastSuccessfulTime,
+    fmi2OK,
     fmi2Pending,
     fmi2Real,
     fmi2Status,
@@ -42,6 +43,7 @@ from orchestrator.master import layout
 from orchestrator.master.binary import Library, library_of, named
 from orchestrator.master.instance import DO_STEP, ComponentFailed, Ended, Instance, Part
 from orchestrator.master.log import Listener
+from orchestrator.master.mode import put_back
 from orchestrator.master.texts import Texts
 from orchestrator.master.transfer import Block, text_of
 from orchestrator.system.component import Component
@@ -51,7 +53,7 @@ from orchestrator.system.values import Value
 #: FMI's categories of messages about what goes wrong (FMI 2.0.4, section 2.2.4).
 _LOGGED = {f"logStatus{status}" for status in ("Warning", "Discard", "Error", "Fatal")}
 
-_DoStep: TypeAlias = Callable[[float, float, int], int]
+_DoStep: TypeAlias = Callable[[Any, Any, int], int]
 
 #: FMI's doStep, as the compiled loop calls it.
 _DO_STEP = (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean)
@@ -107,21 +109,22 @@ class LoadedInstance:
             tool = "; it needs the tool that it was made with" * needs
             text = f"{named(component)} cannot be instantiated: {why}{tool}"
             raise InputError(text) from error
-        self.do_step = self.function("DoStep", _DO_STEP)
+        self.do_step = self.function("DoStep")
         self._called_back: Any = None
         if component.description.coSimulation.canRunAsynchronuously:
-            self.do_step = do_step = self._awaited(self.do_step)
+            # Called back with numbers of Python, too.
+            self.do_step = do_step = self._awaited(self.function("DoStep", _DO_STEP))
             self._called_back = _CALLBACK(lambda _, *step: do_step(*step))
 
     def _awaited(self, do_step: _DoStep) -> _DoStep:
         """Steps that the FMU may go on with after the call, as calls that end when they do."""
         ask = self.function("GetStatus", (fmi2Component, ctypes.c_int, ctypes.POINTER(fmi2Status)))
 
-        def awaited(t: float, h: float, no_rollback: int) -> int:
+        def awaited(t: Any, h: Any, no_rollback: int) -> int:
             status = fmi2Status(do_step(t, h, no_rollback))
             while status.value == fmi2Pending:
                 sleep(_GLANCE)
-                if ask(fmi2DoStepStatus, ctypes.byref(status)) > fmi2Warning:
+                if ask(fmi2DoStepStatus, ctypes.byref(status)) not in (fmi2OK, fmi2Warning):
                     return int(fmi2Error)
             return int(status.value)
 
@@ -197,8 +200,9 @@ class LoadedInstance:
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
         for call in (*self.set_inputs, *self.get_outputs):
-            if (status := call()) > fmi2Warning:
+            if (status := call()) not in (fmi2OK, fmi2Warning):
                 raise self.failed(status, "exchanging values")
+        put_back()
 
     def read(self, ports: Sequence[str]) -> dict[str, Value]:
         """Values of some variables, as the FMU holds them."""
@@ -285,6 +289,7 @@ class LoadedInstance:
 
     def failed(self, status: int, function: str) -> ComponentFailed | Ended:
         """What to raise after a call that has ended with a status."""
+        put_back()
         if (function, status) == (DO_STEP, fmi2Discard) and not self._library.is_akin:
             with suppress(FMICallException):
                 if self._fmu.getBooleanStatus(fmi2Terminated):

@@ -10,7 +10,7 @@ from math import gcd, isfinite, lcm
 from numbers import Real
 
 from orchestrator.errors import InputError
-from orchestrator.master.experiment import ROUNDING
+from orchestrator.master.experiment import MOST_STEPS, ROUNDING
 from orchestrator.system.component import Component
 from orchestrator.system.structure import System
 from orchestrator.system.values import real
@@ -36,7 +36,7 @@ def paces(system: System, step: float) -> dict[str, int]:
         number = isinstance(own, Real) and not isinstance(own, bool)
         if not (number and isfinite(own) and own > 0.0):
             raise InputError(f"step of {name} {own!r}: must be a positive number of seconds")
-        n = max(round(own / step), 1)
+        n = max(round(min(own / step, MOST_STEPS + 1.0)), 1)
         if abs(own / step - n) > ROUNDING * n:
             raise InputError(
                 f"{name} wants steps of {own:g} s, which are no multiple of the communication "

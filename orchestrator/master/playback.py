@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from hashlib import sha256
 
 import numpy as np
@@ -42,8 +43,18 @@ class Course:
         here, following = self.values[row], self.values[min(row + 1, len(self.values) - 1)]
         length = self.times[min(row + 1, len(self.times) - 1)] - self.times[row]
         passed = min(max(time - self.times[row], 0.0) / length, 1.0) if length else 0.0
-        between: np.ndarray = np.where(self.linear, here + passed * (following - here), here)
+        if self._is_steep:
+            line = (1.0 - passed) * here + passed * following
+        else:
+            line = here + passed * (following - here)
+        between: np.ndarray = np.where(self.linear, line, here)
         return between
+
+    @cached_property
+    def _is_steep(self) -> bool:
+        """Whether two values that follow each other lie farther apart than any number is large."""
+        with np.errstate(over="ignore"):
+            return not np.isfinite(np.diff(self.values, axis=0)).all()
 
 
 class Playback:

@@ -10,7 +10,7 @@ from fmpy.model_description import ModelVariable
 
 from orchestrator.master.instance import Instance, Part
 from orchestrator.master.texts import Texts
-from orchestrator.master.transfer import KINDS
+from orchestrator.master.transfer import KINDS, are_integers
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
@@ -64,7 +64,9 @@ class Row:
         self.columns: dict[PortName, int] = {}
         self.texts, self.text_ports = Texts(), set[PortName]()
         self._hidden: dict[PortName, int] = {}
-        self._outputs: list[PortName] = []
+        self._sources = {c.target: c.source for c in system.connections}
+        self._ports: dict[str, list[tuple[PortName, str, str]]] = {name: [] for name in instances}
+        self._integers: list[int] = []
         firsts: dict[str, int] = {}
         parts: dict[str, list[Part]] = {name: [] for name in instances}
         for component, causality, kind, ports in groups:
@@ -81,7 +83,9 @@ class Row:
             for i, port in enumerate(ports, start=column):
                 name = PortName(component, port.name)
                 self.columns[name] = i
-                self._outputs += [name] * (causality == "output")
+                self._ports[component].append((name, causality, kind))
+                if causality == "input" and kind != "Real":
+                    self._integers.append(i)
                 if kind == "String":
                     self.text_ports.add(name)
                 self.values[i] = self.number(system.components[component].starts.get(port.name, 0))
@@ -100,21 +104,36 @@ class Row:
         """What stands for a value in the row."""
         return self.texts.number(value) if isinstance(value, str) else float(value)
 
-    def not_finite(self, components: Iterable[str]) -> str | None:
-        """The first output that is no number or infinite, in words; None: all are finite.
+    def wrong(self, components: Iterable[str]) -> str | None:
+        """The first value that is no number, infinite, or none of an input's type, in words.
 
         Args:
             components: in the order in which they are stepped: others may have passed it on.
 
+        Returns:
+            What is wrong and where it comes from; None: nothing is.
+
         """
-        if np.isfinite(self.shown).all():
+        if np.isfinite(self.shown).all() and are_integers(self.values[self._integers]):
             return None
-        for component in components:
-            for port in self._outputs:
-                value = self.values[self.columns[port]]
-                if port.component == component and not isfinite(value):
-                    return f"{port} is {value:g}"
-        return None
+        ports = [port for component in components for port in self._ports[component]]
+        passed_on = None
+        for port, causality, kind in ports:
+            value = self.values[self.columns[port]]
+            if not isfinite(value):
+                text = f"{port} is {value:g}"
+            elif causality == "input" and kind != "Real" and not are_integers(value):
+                text = f"{port} is {value:.16g}, which no {kind} of FMI can be"
+            else:
+                continue
+            if causality == "output":
+                return text
+            source = self._sources.get(port)
+            text += f", fed by {source}" if source else ", as a table or an event has it"
+            if source is None or isfinite(self.values[self.columns[source]]):
+                return text
+            passed_on = passed_on or text
+        return passed_on
 
     def moving(self, before: np.ndarray) -> list[PortName]:
         """The ports whose values are not what they were, but for rounding."""

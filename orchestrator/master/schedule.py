@@ -19,13 +19,15 @@ is `jacobi`; all others when the time has come that they belong to.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from ctypes import c_double
 from typing import NamedTuple
 
-from fmpy.fmi2 import fmi2Warning
+from fmpy.fmi2 import fmi2OK, fmi2Warning
 
 from orchestrator.errors import InputError, shortened
 from orchestrator.master.experiment import JACOBI, Experiment, Order
 from orchestrator.master.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
+from orchestrator.master.mode import PRODUCT, A, B, C, put_back
 from orchestrator.master.paces import paces
 from orchestrator.master.row import Row
 from orchestrator.master.signals import Gathering
@@ -39,7 +41,7 @@ class Member(NamedTuple):
     """The calls that step one component."""
 
     set_inputs: list[Callable[[], int]]
-    do_step: Callable[[float, float, int], int]
+    do_step: Callable[[c_double, c_double, int], int]
     get_outputs: list[Callable[[], int]]
     instance: Instance
 
@@ -203,13 +205,20 @@ def member(instance: Instance) -> Member:
 
 def step(members: Sequence[Member], t: float, h: float) -> None:
     """Step the components of a stage, which may run side by side until their outputs are asked."""
+    # Converted once for all of them.
+    time, length = c_double(t), c_double(h)
     for set_inputs, do_step, _, instance in members:
         for call in set_inputs:
-            if (status := call()) > fmi2Warning:
+            if (status := call()) != fmi2OK and status != fmi2Warning:
                 raise instance.failed(status, SET_INPUTS)
-        if (status := do_step(t, h, 1)) > fmi2Warning:
+        if (status := do_step(time, length, 1)) != fmi2OK and status != fmi2Warning:
             raise instance.failed(status, DO_STEP)
+        # To call a function that looks costs more than to look.
+        if A * B * C != PRODUCT:
+            put_back()
     for _, _, get_outputs, instance in members:
         for call in get_outputs:
-            if (status := call()) > fmi2Warning:
+            if (status := call()) != fmi2OK and status != fmi2Warning:
                 raise instance.failed(status, GET_OUTPUTS)
+        if A * B * C != PRODUCT:
+            put_back()

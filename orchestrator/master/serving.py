@@ -9,6 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from orchestrator.errors import InputError, reason
 from orchestrator.master.channel import Channel, sizes
 from orchestrator.master.instance import ComponentFailed, Ended
@@ -22,6 +24,7 @@ from orchestrator.system.description import read_description
 from orchestrator.system.structure import System
 
 
+@np.errstate(all="ignore")
 def serve(name: str, fmu: Path, folder: Path, connection: socket.socket) -> None:
     """Say that it begins, instantiate an FMU, and answer requests until there are no more.
 

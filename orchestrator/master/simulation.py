@@ -18,6 +18,7 @@ from orchestrator.master.interrupts import held_interrupts
 from orchestrator.master.isolated import Isolation
 from orchestrator.master.log import Log
 from orchestrator.master.loop import PYTHON_LOOP, Loop
+from orchestrator.master.mode import default_mode
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.paces import paces
 from orchestrator.master.placing import placed
@@ -32,6 +33,9 @@ from orchestrator.system.values import literal, same
 _MOST_ROUNDS = 1000
 
 
+# What overflows on its way is named as the value of a port.
+@np.errstate(all="ignore")
+@default_mode()
 def simulate(
     system: System,
     experiment: Experiment,
@@ -205,8 +209,8 @@ def _exchange(instances: Mapping[str, Instance], row: Row, experiment: Experimen
     for instance in instances.values():
         instance.exchange()
     row.show()
-    if not_finite := row.not_finite(instances):
-        raise StartError(f"stopped at t = {experiment.start_time:g} s: {not_finite}")
+    if wrong := row.wrong(instances):
+        raise StartError(f"stopped at t = {experiment.start_time:g} s: {wrong}")
 
 
 def _parameters(
@@ -265,8 +269,8 @@ def _advance(
         blocks.hand_over()
         raise Ended(f"ended at t = {run.time:.12g} s: {end}") from None
     # Also where another component has refused it in the same step.
-    if not_finite := run.row.not_finite(order):
-        failure = f"stopped at t = {run.experiment.time(run.made + 1):.12g} s: {not_finite}"
+    if wrong := run.row.wrong(order):
+        failure = f"stopped at t = {run.experiment.time(run.made + 1):.12g} s: {wrong}"
     blocks.hand_over()
     return failure
 

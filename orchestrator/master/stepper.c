@@ -11,11 +11,15 @@
 #include <time.h>
 #define EXPORTED
 #endif
+#ifndef __x86_64__
+#include <fenv.h>
+#endif
+#include <limits.h>
 #include <stddef.h>
 #include <string.h>
 
-/* The worst of FMI's statuses that is no failure. */
-enum { FMI2_WARNING = 1 };
+/* The worst of FMI's statuses that is no failure, and one that is. */
+enum { FMI2_WARNING = 1, FMI2_ERROR = 3 };
 
 /* Partial sums that processors add side by side. */
 enum { LANES = 4 };
@@ -84,6 +88,21 @@ typedef struct {
     int status;
 } failure;
 
+/* Take on the default floating-point mode after calls of an FMU: see mode.py. */
+#ifdef __x86_64__
+static inline void put_back(void) {
+    const unsigned flags = 0x3f, sse = 0x1f80;
+    const unsigned short x87 = 0x37f;
+    unsigned present;
+    __asm__ volatile("stmxcsr %0" : "=m"(present));
+    if ((present & ~flags) != sse) {
+        __asm__ volatile("ldmxcsr %0\n\tfldcw %1" : : "m"(sse), "m"(x87) : "memory");
+    }
+}
+#else
+static inline void put_back(void) { fesetenv(FE_DFL_ENV); }
+#endif
+
 /* Why Python has to look. */
 enum { DUE, FAILED, NOT_FINITE };
 
@@ -103,7 +122,12 @@ static int set(const move *inputs, void *component) {
     if (inputs->integers == NULL) {
         return inputs->call.set_reals(component, inputs->references, inputs->n, inputs->values);
     }
-    for (i = 0; i < inputs->n; i++) inputs->integers[i] = (int)inputs->values[i];
+    for (i = 0; i < inputs->n; i++) {
+        const double value = inputs->values[i];
+        /* What is none of FMI's Integers is named by whoever looks at the row. */
+        if (!(value >= INT_MIN && value <= INT_MAX && value == (int)value)) return FMI2_ERROR;
+        inputs->integers[i] = (int)value;
+    }
     return inputs->call.set_integers(component, inputs->references, inputs->n, inputs->integers);
 }
 
@@ -119,6 +143,9 @@ static int get(const move *outputs, void *component) {
     return status;
 }
 
+/* Whether a status is worse than a warning, or none of FMI's. */
+static int is_bad(int status) { return (unsigned)status > FMI2_WARNING; }
+
 /* Step the components of a stage; whether one of them failed. */
 static int stage_failed(const stage *this, double t, double h, failure *why) {
     size_t i, j;
@@ -127,18 +154,20 @@ static int stage_failed(const stage *this, double t, double h, failure *why) {
         why->member = i;
         why->call = SET_INPUTS;
         for (j = 0; j < it->n_inputs; j++) {
-            if ((why->status = set(&it->inputs[j], it->component)) > FMI2_WARNING) return 1;
+            if (is_bad(why->status = set(&it->inputs[j], it->component))) return 1;
         }
         why->call = DO_STEP;
-        if ((why->status = it->do_step(it->component, t, h, 1)) > FMI2_WARNING) return 1;
+        if (is_bad(why->status = it->do_step(it->component, t, h, 1))) return 1;
+        if (this->n_members > 1) put_back();
     }
     why->call = GET_OUTPUTS;
     for (i = 0; i < this->n_members; i++) {
         const member *it = &this->members[i];
         why->member = i;
         for (j = 0; j < it->n_outputs; j++) {
-            if ((why->status = get(&it->outputs[j], it->component)) > FMI2_WARNING) return 1;
+            if (is_bad(why->status = get(&it->outputs[j], it->component))) return 1;
         }
+        put_back();
     }
     return 0;
 }
@@ -213,7 +242,10 @@ EXPORTED int advance(const run *this, size_t k, size_t until, double patience, b
     const double due = now() + patience;
     for (; k < until && rows->n < rows->most; k++) {
         double *row = rows->rows + rows->n * (1 + this->n_shown);
-        if (step_failed(this, k, why)) return FAILED;
+        if (step_failed(this, k, why)) {
+            put_back();
+            return FAILED;
+        }
         if (!all_finite(this->values, this->n_shown)) return NOT_FINITE;
         row[0] = time_after(this, k + 1);
         memcpy(row + 1, this->values, this->n_shown * sizeof *row);

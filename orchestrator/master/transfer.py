@@ -10,6 +10,7 @@ import numpy as np
 from fmpy.fmi2 import (
     fmi2Boolean,
     fmi2Component,
+    fmi2Error,
     fmi2Integer,
     fmi2Real,
     fmi2Status,
@@ -79,9 +80,12 @@ class Block:
         if self._kind == "Real":
             return call
 
+        row, integers = self._row, self._integers
+
         def set_converted() -> int:
-            self._integers[:] = self._row
-            return call()
+            integers[:] = row
+            # Lists are compared in a third of the time. The row says which value it is.
+            return call() if integers.tolist() == row.tolist() else int(fmi2Error)
 
         return set_converted
 
@@ -133,6 +137,11 @@ class Block:
         for i, text in enumerate(texts):
             self._values[i] = self._texts.number(text_of(text))
         return status
+
+
+def are_integers(values: np.ndarray) -> bool:
+    """Whether FMI's Integers can hold all of some values."""
+    return bool((values.astype(np.intc) == values).all())
 
 
 def text_of(string: bytes | None) -> str:

@@ -12,10 +12,21 @@ from xml.etree import ElementTree
 import fmpy
 from fmpy.model_description import ModelDescription, ValidationError
 
-from orchestrator.errors import InputError, reason
+from orchestrator.errors import InputError, reason, shortened
 from orchestrator.system.unpacking import Version, unpacked
+from orchestrator.system.values import integer, real
 
 _CAUSALITIES = {"parameter", "calculatedParameter", "input", "output", "local", "independent"}
+
+#: Attributes that fmpy reads as Python reads numbers, which takes 1_000, and digits of any script.
+_INTEGERS = {
+    "kg", "m", "s", "A", "K", "mol", "cd", "rad", "valueReference", "value", "index",
+    "dependencies", "derivative", "previous",
+}  # fmt: skip
+_REALS = {"factor", "offset", "min", "max"}
+
+#: Elements in which the same words may stand for something else.
+_OTHERS = {"VendorAnnotations", "Annotations", "Start"}
 
 
 class Described(NamedTuple):
@@ -81,8 +92,11 @@ def described(fmu: Path, _: Version, versions: Sequence[str]) -> Described:
         raise InputError(
             f"{fmu}: its model identifier {implementation.modelIdentifier!r} names no library"
         )
-    if found.flaw is not None and any(_contradictions(found.description)):
-        raise InputError(f"{fmu}: not a readable FMU: {reason(found.flaw)}")
+    if found.flaw is not None:
+        if any(_contradictions(found.description)):
+            raise InputError(f"{fmu}: not a readable FMU: {reason(found.flaw)}")
+        for text in _misread(folder / "modelDescription.xml"):
+            raise InputError(f"{fmu}: not a readable FMU: {text}")
     return found
 
 
@@ -100,3 +114,25 @@ def _contradictions(description: ModelDescription) -> Iterator[str]:
         if variable.causality not in _CAUSALITIES or variable.name in names:
             yield variable.name
         names.add(variable.name)
+
+
+def _misread(file: Path) -> Iterator[str]:
+    """Numbers of a description that Python takes for others, or that are none."""
+    for element in _elements(ElementTree.parse(file).getroot()):
+        for kind, names in ((integer, _INTEGERS), (real, _REALS)):
+            for name in names.intersection(element.attrib):
+                text = element.attrib[name]
+                try:
+                    for one in text.split() if name == "dependencies" else [text]:
+                        kind(one)
+                except ValueError:
+                    shown = shortened(repr(text))
+                    yield f"{name} of <{element.tag}> is {shown}, which is no number"
+
+
+def _elements(parent: ElementTree.Element) -> Iterator[ElementTree.Element]:
+    """All elements in another one, but for some."""
+    for element in parent:
+        if element.tag not in _OTHERS:
+            yield element
+            yield from _elements(element)

@@ -75,7 +75,7 @@ def _dangling(fmu: Path) -> Iterator[str]:
     known = range(1, 1 + len(root.findall("ModelVariables/ScalarVariable")))
     for unknown in root.iterfind("ModelStructure//Unknown"):
         for index in (unknown.get("index", ""), *unknown.get("dependencies", "").split()):
-            if not index.isdecimal() or int(index) not in known:
+            if not (index.isascii() and index.isdecimal()) or int(index) not in known:
                 yield f"its model structure names variable {index!r}; there are {len(known)}"
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from sys import float_info
 
 from orchestrator.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, splits
-from orchestrator.system.transformation import Linear, Transformation
+from orchestrator.system.transformation import Linear, Mapped, Transformation
 from orchestrator.system.units import conversion, unit_of_port
-from orchestrator.system.values import Value, type_of, typed, unit_of
+from orchestrator.system.values import INTEGERS, Value, type_of, typed, unit_of
 
 #: What can be fed from another type, besides from its own: no value is lost on the way.
 _FED_FROM = {"Real": ("Integer",), "Integer": ("Enumeration",), "Enumeration": ("Integer",)}
@@ -221,3 +222,13 @@ def _check_transformed(connection: Connection, kind: str) -> None:
         raise InputError(
             f"{connection.source} -> {connection.target}: a value of type {kind} cannot be {how}"
         )
+    if isinstance(connection.transformation, Mapped):
+        least, most = {"Real": (-float_info.max, float_info.max), "Boolean": (0, 1)}.get(
+            kind, INTEGERS
+        )
+        for _, value in connection.transformation.pairs:
+            if not least <= value <= most or (kind != "Real" and value != int(value)):
+                raise InputError(
+                    f"{connection.source} -> {connection.target}: is mapped to {value:.16g}, which "
+                    f"no {kind} of FMI can be"
+                )

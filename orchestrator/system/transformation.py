@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import TypeAlias
 
 from orchestrator.errors import InputError
@@ -43,7 +44,7 @@ def chained(first: Transformation | None, then: Transformation | None) -> Transf
     """Two transformations, one after the other, as one; None leaves a value as it is.
 
     Raises:
-        InputError: one is linear, and the other a table.
+        InputError: one is linear, and the other a table, or no number holds what they come to.
 
     """
     # One that says that nothing happens is kept where there is no other.
@@ -53,7 +54,14 @@ def chained(first: Transformation | None, then: Transformation | None) -> Transf
         if then == nothing:
             return first
     if isinstance(first, Linear) and isinstance(then, Linear):
-        return Linear(then.factor * first.factor, then(first.offset))
+        both = Linear(then.factor * first.factor, then(first.offset))
+        vanishes = not both.factor and first.factor and then.factor
+        if vanishes or not (isfinite(both.factor) and isfinite(both.offset)):
+            raise InputError(
+                f"linear transformations follow each other that come to the factor "
+                f"{both.factor:g} and the offset {both.offset:g}"
+            )
+        return both
     if isinstance(first, Mapped) and isinstance(then, Mapped):
         sources = dict.fromkeys(source for table in (first, then) for source, _ in table.pairs)
         return Mapped(tuple((source, then(first(source))) for source in sources))

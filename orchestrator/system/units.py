@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isfinite
+from sys import float_info
 from typing import Any
 
 from orchestrator.errors import InputError
@@ -93,4 +94,11 @@ def conversion(source: Unit | None, target: Unit | None) -> Linear | None:
         raise InputError(f"units differ, {source.name} and {target.name}")
     if (source.factor, source.offset) == (target.factor, target.offset):
         return None
-    return Linear(source.factor / target.factor, (source.offset - target.offset) / target.factor)
+    factor = source.factor / target.factor
+    offset = (source.offset - target.offset) / target.factor
+    if not (float_info.min <= abs(factor) <= float_info.max and isfinite(offset)):
+        raise InputError(
+            f"units {source.name} and {target.name} are too far apart: a value of one is "
+            f"{factor:g} of the other, plus {offset:g}"
+        )
+    return Linear(factor, offset)

@@ -13,7 +13,7 @@ from orchestrator.errors import InputError, shortened
 Value: TypeAlias = float | int | bool | str
 
 #: What FMI's Integers can hold.
-_INTEGERS = -(2**31), 2**31 - 1
+INTEGERS = -(2**31), 2**31 - 1
 
 #: What FMI 2.0 calls the types of FMI 3.0 that have a name there.
 _NAMES = {"Float64": "Real", "Int32": "Integer"}
@@ -51,7 +51,7 @@ def typed(name: str, variable: ModelVariable, value: object) -> Value:
             return _transferable(text)
         if type_of(variable) == "Enumeration":
             text = items_of(variable).get(text, text)
-        number = real(text) if type_of(variable) == "Real" else int(_plain(text))
+        number = real(text) if type_of(variable) == "Real" else integer(text)
     except (KeyError, ValueError):
         # Python itself refuses to write and to read integers of very many digits.
         items = ", ".join(items_of(variable))
@@ -70,6 +70,11 @@ def typed(name: str, variable: ModelVariable, value: object) -> Value:
 def real(text: str) -> float:
     """A number as every program reads it: Python alone takes 1_000, and digits of any script."""
     return float(_plain(text))
+
+
+def integer(text: str) -> int:
+    """A whole number as every program reads it."""
+    return int(_plain(text))
 
 
 def finite(text: str, where: str) -> float:
@@ -107,12 +112,15 @@ def _transferable(text: str) -> str:
 
 
 def _range(variable: ModelVariable) -> tuple[float | None, float | None]:
-    lower = None if variable.min is None else float(variable.min)
-    upper = None if variable.max is None else float(variable.max)
+    lower = None if variable.min is None else real(variable.min)
+    upper = None if variable.max is None else real(variable.max)
     if type_of(variable) == "Real":
         return lower, upper
-    least, most = _INTEGERS
-    return (least if lower is None else lower), (most if upper is None else upper)
+    least, most = INTEGERS
+    # What a description says beyond them no FMU can be given.
+    return max(least, least if lower is None else lower), min(
+        most, most if upper is None else upper
+    )
 
 
 def type_of(variable: ModelVariable) -> str:

@@ -10,12 +10,16 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "mode.h"
 #include "slave.h"
 
 /* Inputs come first, outputs behind them, and parameters last. */
 enum { PORTS = 64, OUTPUTS = 24, AT = 60, ACT, CALL, MILLISECONDS };
 enum { SET, STEP, GET };
-enum { BEHAVE, WARN, DISCARD, FAIL, FATAL, NOT_A_NUMBER, INFINITE, SAYS, INTERRUPT, HANGS };
+enum {
+    BEHAVE, WARN, DISCARD, FAIL, FATAL, NOT_A_NUMBER, INFINITE, SAYS, INTERRUPT, HANGS,
+    BELOW_ALL, BEYOND_ALL, ROUNDS, FLUSHES,
+};
 
 typedef struct {
     double reals[PORTS];
@@ -56,6 +60,16 @@ static Status act(Instance *it, int call)
         return Discard;
     case INTERRUPT:
         kill(getpid(), SIGINT);
+        break;
+    case BELOW_ALL:
+        return -1;
+    case BEYOND_ALL:
+        return 6;
+    case ROUNDS:
+        fesetround(FE_UPWARD);
+        break;
+    case FLUSHES:
+        flush_to_zero();
         break;
     case HANGS:
         for (;;)

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 from zipfile import ZipFile
 
 from hypothesis import strategies as st
 
+from orchestrator.master.events import Alter, Event
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
+from orchestrator.system.transformation import Linear, Mapped
 from support.compiled import library_of
 
 _SOURCE = Path(__file__).with_name("mixed.c")
@@ -137,6 +140,33 @@ def _port(text: str) -> PortName:
     return PortName(*text.split(".", 1))
 
 
+#: Factors and values up to the largest there are.
+_SIZES = st.sampled_from([-1e308, -1e154, -1.0, 1e-300, 0.5, 1.0, 1e100, 1e250, 1e308])
+_INTEGERS = st.integers(-(2**31), 2**31 - 1)
+
+
+@st.composite
+def altered(draw: st.DrawFn, system: System) -> tuple[System, list[Event]]:
+    """A system with something on the ways of its values, and events that alter them further."""
+    connections, events = [], []
+    for connection in system.connections:
+        target = connection.target
+        kind = system.components[target.component].variables[target.port].type
+        transformation, bias = None, 0
+        if kind == "Real":
+            transformation = draw(st.none() | st.builds(Linear, _SIZES, _SIZES))
+            bias = draw(_SIZES)
+        elif kind == "Integer":
+            pairs = st.dictionaries(_INTEGERS, _INTEGERS, max_size=3)
+            transformation = draw(st.none() | pairs.map(lambda some: Mapped(tuple(some.items()))))
+            bias = draw(_INTEGERS)
+        connections.append(Connection(connection.source, target, transformation))
+        if bias and draw(st.booleans()):
+            action = Alter("bias", ((target, float(bias)),))
+            events.append(Event("bias", action, "bias", at=draw(st.floats(0.0, 10.0))))
+    return replace(system, connections=tuple(connections)), events
+
+
 _COUNTS = st.tuples(*[st.integers(0, _MOST)] * len(KINDS))
 
 
@@ -168,7 +198,7 @@ def systems(draw: st.DrawFn) -> dict[str, dict]:
             if sources and draw(st.booleans()):
                 connections[f"{name}.{port}"] = draw(st.sampled_from(sources))
     bad = draw(st.sampled_from(names))
-    acts = ["BEHAVE", "WARN", "DISCARD", "FAIL", "NOT_A_NUMBER", "INFINITE", "SAYS"]
+    acts = sorted(ACTS.keys() - {"FATAL", "INTERRUPT", "HANGS"})
     parameters = {
         f"{bad}.act": ACTS[draw(st.sampled_from(acts))],
         f"{bad}.call": draw(st.sampled_from(sorted(CALLS.values()))),

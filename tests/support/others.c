@@ -11,7 +11,20 @@
 #define HAS_STRINGS
 #define HAS_STATUS
 #define HAS_STATE
+#include "mode.h"
 #include "slave.h"
+
+/* Called in every function. */
+static void change_mode(void)
+{
+#ifdef CHANGES_MODE
+    fesetround(FE_UPWARD);
+    flush_to_zero();
+#endif
+}
+
+__attribute__((constructor)) static void loaded(void) { change_mode(); }
+__attribute__((destructor)) static void unloaded(void) { change_mode(); }
 
 /* Value references, of variables of any kind. */
 enum { U, Y, GAIN, STUBBORN, DERIVED, VARIABLES };
@@ -32,6 +45,7 @@ typedef struct {
 
 Status fmi2SetDebugLogging(Component c, int on, size_t n, const char *const *categories)
 {
+    change_mode();
     return OK;
 }
 
@@ -49,6 +63,7 @@ Component fmi2Instantiate(const char *name, int type, const char *guid, const ch
     static int before;
     it->reals[GAIN] += before++;
 #endif
+    change_mode();
     strcpy(it->texts[U], "start");
     it->integers[U] = 1;
     it->name = strdup(name);
@@ -56,16 +71,22 @@ Component fmi2Instantiate(const char *name, int type, const char *guid, const ch
     return it;
 }
 
-void fmi2FreeInstance(Component c) { free(c); }
+void fmi2FreeInstance(Component c)
+{
+    change_mode();
+    free(c);
+}
 
 Status fmi2SetupExperiment(Component c, int tolerance, double t, double start, int stop, double end)
 {
+    change_mode();
     ((Instance *)c)->end = stop ? end : HUGE_VAL;
     return OK;
 }
 
 Status fmi2EnterInitializationMode(Component c)
 {
+    change_mode();
 #ifdef RESETS
     memcpy(((Instance *)c)->reals, reals, sizeof reals);
 #endif
@@ -74,6 +95,7 @@ Status fmi2EnterInitializationMode(Component c)
 
 Status fmi2ExitInitializationMode(Component c)
 {
+    change_mode();
 #ifdef CHATTERS
     Instance *it = c;
     for (int i = 0; i < 200; i++)
@@ -83,7 +105,12 @@ Status fmi2ExitInitializationMode(Component c)
     return OK;
 }
 
-Status fmi2Terminate(Component c) { return OK; }
+Status fmi2Terminate(Component c)
+{
+    change_mode();
+    return OK;
+}
+
 Status fmi2Reset(Component c) { return OK; }
 
 #define ACCESS(kind, type, values_of) \
@@ -92,6 +119,7 @@ Status fmi2Reset(Component c) { return OK; }
         for (size_t i = 0; i < n; i++) \
             if (r[i] != STUBBORN) \
                 ((Instance *)c)->values_of[r[i]] = values[i]; \
+        change_mode(); \
         return OK; \
     } \
     Status fmi2Get##kind(Component c, const unsigned *r, size_t n, type *values) \
@@ -101,6 +129,7 @@ Status fmi2Reset(Component c) { return OK; }
         it->reals[Y] = it->reals[GAIN] * it->reals[U]; \
         for (size_t i = 0; i < n; i++) \
             values[i] = it->values_of[r[i]]; \
+        change_mode(); \
         return OK; \
     }
 ACCESS(Real, double, reals)
@@ -145,6 +174,7 @@ Status fmi2DoStep(Component c, double t, double h, int no_rollback)
 #endif
     it->step = h;
     it->steps++;
+    change_mode();
 #ifdef WAITS
     it->asked = 0;
     return PENDING;

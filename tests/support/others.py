@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from zipfile import ZipFile
 
+from orchestrator.master.attendant import Attendant
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.isolated import Isolation
 from orchestrator.master.loop import chosen
@@ -107,9 +109,10 @@ def run(
     loop: str = "python",
     isolation: Isolation | None = None,
     order: str = "jacobi",
+    attendants: Sequence[Attendant] = (),
 ) -> Table:
     """All rows of a run."""
     table, experiment = Table(), Experiment(stop_time, step, order)
     how = chosen(loop, experiment, isolation)
-    simulate(system, experiment, [table], isolation, how)
+    simulate(system, experiment, [table], isolation, how, attendants)
     return table

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import ctypes
+import platform
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -16,6 +18,8 @@ from orchestrator.findings import Findings
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.writing import write_ssp
+from orchestrator.system.structure import Connection, System
+from orchestrator.system.transformation import Linear
 from support.others import WAYS, build, run, system_of
 
 #: Outputs by the inputs that they repeat.
@@ -243,3 +247,84 @@ def test_an_fmu_that_cannot_be_instantiated_says_that_it_needs_a_tool(tmp_path):
 def test_other_versions_and_kinds_are_refused_by_name(tmp_path, old, new, why):
     with pytest.raises(InputError, match=why):
         read_component("a", build(tmp_path, change=(old, new)))
+
+
+@EVERY_WAY
+def test_a_mode_that_an_fmu_takes_on_is_its_own(tmp_path, way):
+    """It rounds upward and flushes to zero from the moment that it is loaded."""
+    changing, plain = build(tmp_path, "CHANGES_MODE"), build(tmp_path)
+    systems = [
+        System(
+            "mode",
+            {"a": read_component("a", fmu), "b": read_component("b", plain)},
+            (Connection(PortName("a", "y"), PortName("b", "u"), Linear(1e-300, 5e-310)),),
+            {PortName("a", "u"): 0.1, PortName("b", "gain"): 1e-10},
+        )
+        for fmu in (changing, plain)
+    ]
+    found, expected = (run(system, 10.0, 0.1, **way) for system in systems)
+    assert found.rows.tobytes() == expected.rows.tobytes()
+    assert 0.0 < found["b.y"][-1] < 1e-309
+    assert np.array_equal(found.time, np.arange(101) * 0.1)
+    assert [0.1 + tiny for tiny in (1e-300, -1e-300)] == [0.1, 0.1]
+
+
+def test_the_mode_of_who_simulates_is_left_as_it_was(tmp_path):
+    c, upward = ctypes.CDLL(None), 0x800
+    if platform.machine() != "x86_64":
+        pytest.skip("knows the number of one processor's mode")
+    system = system_of(build(tmp_path))
+    expected = run(system)
+    c.fesetround(upward)
+    try:
+        found = run(system)
+        assert c.fegetround() == upward
+    finally:
+        c.fesetround(0)
+    assert found.rows.tobytes() == expected.rows.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("text", "instead", "words"),
+    [
+        ('factor="1000"', 'factor="1_000"', "factor of <BaseUnit> is '1_000'"),
+        ('m="1"', 'm="\N{ARABIC-INDIC DIGIT ONE}"', "m of <BaseUnit> is '.'"),
+        ('m="1"', 'm="1_0"', "m of <BaseUnit> is '1_0'"),
+        ('name="storm" value="4"', 'name="storm" value="4_0"', "value of <Item> is '4_0'"),
+        ('<Real start="1"/>', '<Real start="1" max="1_0"/>', "max of <Real> is '1_0'"),
+        ('<Real start="1"/>', '<Real start="1" min="much"/>', "min of <Real> is 'much'"),
+        ('valueReference="4"', 'valueReference="0_4"', "valueReference of <ScalarVariable>"),
+        ('index="11"', 'index="1_1"', "index of <Unknown> is '1_1'"),
+    ],
+)
+def test_numbers_of_descriptions_that_others_do_not_read_are_refused(
+    tmp_path, text, instead, words
+):
+    units = (
+        '<UnitDefinitions><Unit name="km"><BaseUnit m="1" factor="1000"/></Unit></UnitDefinitions>'
+    )
+    rest = "<TypeDefinitions>"
+    change = (rest, units.replace(text, instead) + rest)
+    if text not in units:
+        change = text, instead
+    with pytest.raises(InputError, match=f"not a readable FMU: {words}.*is no number"):
+        read_component("a", build(tmp_path, change=change))
+
+
+def test_words_of_tools_are_no_numbers(tmp_path):
+    """Nor do they matter where the description is wrong in another place."""
+    tool = '<Annotations><Tool name="t"><Item value="1_0" min="low"/></Tool></Annotations>'
+    change = '<Real start="1"/>', f'<Real start="1" odd="1"/>{tool}'
+    assert read_component("a", build(tmp_path, change=change)).variables["gain"].start == "1"
+
+
+def test_no_description_makes_integers_longer(tmp_path):
+    change = (
+        'name="count" valueReference="4" causality="parameter" variability="fixed">\n  <Integer'
+    )
+    wide = build(tmp_path, change=(change, f'{change} min="-1e10" max="1e10"'))
+    with pytest.raises(InputError, match=r"a.count = 2147483648: must be at most 2147483647"):
+        with_values(system_of(wide), {"count": 2**31})
+    with pytest.raises(InputError, match=r"a.count = -2147483649: must be at least"):
+        with_values(system_of(wide), {"count": -(2**31) - 1})
+    assert with_values(system_of(wide), {"count": -(2**31)})

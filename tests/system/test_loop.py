@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import json
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
@@ -13,19 +15,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, StartError
 from orchestrator.experiments.wiring import closed_loop
+from orchestrator.master.events import Alter, Event, Events
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.isolated import Isolation
 from orchestrator.master.loop import chosen
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
+from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+from orchestrator.system.transformation import Linear
 from support.machine import LOOPS
-from support.mixed import ACTS, CALLS, Shape, system_of, systems
+from support.mixed import ACTS, CALLS, Shape, altered, system_of, systems
 
 #: Step [s].
 H = 0.5
+
+WAYS = pytest.mark.parametrize(
+    "way",
+    [{"loop": "python"}, {"loop": "compiled"}, {"loop": "python", "isolation": Isolation(20.0)}],
+    ids=["python", "compiled", "isolated"],
+)
 
 
 @pytest.fixture(scope="module")
@@ -33,16 +44,23 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("mixed")
 
 
-def run(system: System, experiment: Experiment, loop: str) -> Table:
+def run(
+    system: System,
+    experiment: Experiment,
+    loop: str,
+    events: Sequence[Event] = (),
+    isolation: Isolation | None = None,
+) -> Table:
     table = Table()
-    simulate(system, experiment, [table], None, chosen(loop, experiment))
+    steps = chosen(loop, experiment, isolation)
+    simulate(system, experiment, [table], isolation, steps, [Events(events)])
     assert table.header.loop == loop
     return table
 
 
-def same(system: System, experiment: Experiment) -> Table:
+def same(system: System, experiment: Experiment, events: Sequence[Event] = ()) -> Table:
     """What both loops make of a run."""
-    python, compiled = (run(system, experiment, loop) for loop in LOOPS)
+    python, compiled = (run(system, experiment, loop, events) for loop in LOOPS)
     assert compiled.rows.tobytes() == python.rows.tobytes()
     assert compiled.ending == python.ending
     assert compiled.header == python.header
@@ -63,6 +81,22 @@ def test_random_systems_give_the_same_rows_and_the_same_failures(
 ):
     with patch("orchestrator.master.observer._ROWS", rows):
         same(system_of(folder, **arguments), Experiment((n + rest) * step, step, order))
+
+
+@settings(max_examples=100)
+@given(data=st.data(), arguments=systems(), order=st.sampled_from(ORDERS))
+def test_values_of_any_size_on_their_ways_give_the_same_rows_and_the_same_failures(
+    folder, data, arguments, order
+):
+    """However large they get: all rows are finite, and a run that ends early says why."""
+    system, events = data.draw(altered(system_of(folder, **arguments)))
+    experiment = Experiment(10.0, H, order)
+    try:
+        table = same(system, experiment, events)
+    except StartError:
+        return
+    assert np.isfinite(table.rows).all()
+    assert (table.failure is None) == (len(table) == experiment.rows)
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -88,7 +122,7 @@ def pair(folder: Path, act: str, call: str = "STEP", at: int = 7, milliseconds: 
     return system_of(folder, **PAIR, parameters={f"bad.{k}": v for k, v in values.items()})
 
 
-@pytest.mark.parametrize("loop", LOOPS)
+@WAYS
 @pytest.mark.parametrize(
     ("act", "call", "rows", "words"),
     [
@@ -96,6 +130,15 @@ def pair(folder: Path, act: str, call: str = "STEP", at: int = 7, milliseconds: 
         ("DISCARD", "STEP", 7, "3 s: bad: fmi2DoStep failed with status 2 (discard)."),
         ("DISCARD", "GET", 7, "3 s: bad: getting outputs failed with status 2 (discard)."),
         ("FAIL", "STEP", 7, "3 s: bad: fmi2DoStep failed with status 3 (error)."),
+        *(
+            (act, call, rows, f"{name} failed with status {status} (illegal return code).")
+            for act, status in (("BELOW_ALL", -1), ("BEYOND_ALL", 6))
+            for call, rows, name in (
+                ("SET", 8, "3.5 s: bad: setting inputs"),
+                ("STEP", 7, "3 s: bad: fmi2DoStep"),
+                ("GET", 7, "3 s: bad: getting outputs"),
+            )
+        ),
         ("FATAL", "SET", 8, "3.5 s: bad: setting inputs failed with status 4 (fatal)."),
         ("FATAL", "STEP", 7, "3 s: bad: fmi2DoStep failed with status 4 (fatal)."),
         ("FATAL", "GET", 7, "3 s: bad: getting outputs failed with status 4 (fatal)."),
@@ -105,12 +148,70 @@ def pair(folder: Path, act: str, call: str = "STEP", at: int = 7, milliseconds: 
     ],
 )
 def test_a_step_that_fails_is_named_and_the_rows_before_it_kept(
-    folder, loop, act, call, rows, words
+    folder, way, act, call, rows, words
 ):
-    table = run(pair(folder, act, call), Experiment(100.0, H), loop)
+    table = run(pair(folder, act, call), Experiment(100.0, H), **way)
     assert table.failure == f"stopped at t = {words}"
     assert np.array_equal(table.time, np.arange(rows) * H)
     assert table.ending.messages == (("bad: step 7", "bad: tired") if act == "SAYS" else ())
+
+
+#: Of the first an Integer and a Real feed the second, whose outputs are finite whatever it takes.
+FED = {
+    "shapes": {"a": Shape((1, 0, 0, 0), (1, 1, 0, 0)), "b": Shape((1, 1, 0, 0), (0, 1, 0, 0))},
+    "connections": {"b.input.Real0": "a.output.Real0", "b.input.Integer0": "a.output.Integer0"},
+}
+
+
+@WAYS
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize(
+    ("factor", "target", "bias", "words"),
+    [
+        (1e306, None, 0.0, "b.input.Real0 is inf, fed by a.output.Real0"),
+        (1e300, "b.input.Real0", -1.7e308, "b.input.Real0 is -inf, fed by a.output.Real0"),
+        (1.0, "a.input.Real0", 1.7e308, "a.input.Real0 is inf, as a table or an event has it"),
+        (1.0, "b.input.Integer0", 2.0**31, "which no Integer of FMI can be, fed by a."),
+    ],
+)
+def test_an_input_that_its_type_cannot_hold_ends_the_run(
+    folder, way, order, factor, target, bias, words
+):
+    """All outputs are finite; the rows before it are kept."""
+    system = system_of(folder, **FED, parameters={})
+    real, integer = system.connections
+    real = replace(real, transformation=Linear(factor, -1.7e308 if bias < 0.0 else 0.0))
+    system = replace(system, connections=(real, integer)).with_parameters(
+        {PortName("a", "input.Real0"): 1.7e308 if factor == 1.0 else 0.0}
+    )
+    events = []
+    if target is not None:
+        where = PortName(*target.split(".", 1))
+        events = [Event("bias", Alter("bias", ((where, bias),)), "bias", at=3.0)]
+    table = run(system, Experiment(200.0, H, order), **way, events=events)
+    assert words in table.failure
+    assert np.isfinite(table.rows).all()
+    assert table.failure.startswith(f"stopped at t = {len(table) * H:g} s: ")
+    assert len(table) == 7 if target else 7 < len(table) < 400
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("act", ["ROUNDS", "FLUSHES"])
+def test_the_mode_of_an_fmu_changes_no_number_of_the_others(folder, loop, order, act):
+    """It takes it on when its outputs are asked for, which it only copies."""
+    there = replace(pair(folder, act, "GET"), connections=())
+    wires = [
+        replace(connection, transformation=Linear(0.1, 1e-3))
+        for connection in pair(folder, act).connections
+        if connection.target.port == "input.Real0"
+    ]
+    there = replace(there, connections=tuple(wires))
+    behaves = there.with_parameters({PortName("bad", "act"): ACTS["BEHAVE"]})
+    experiment = Experiment(100.0, 0.1, order)
+    found, expected = (run(system, experiment, loop) for system in (there, behaves))
+    assert found.rows.tobytes() == expected.rows.tobytes()
+    assert len(found) == 1001
 
 
 @pytest.mark.parametrize("loop", LOOPS)

@@ -82,8 +82,11 @@ def draw(
             break
         figure, left_out = compose(title, rows, runs)
         if figure is not None:
-            save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in _FORMATS))
-            notes += left_out
+            try:
+                save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in _FORMATS))
+                notes += left_out
+            except InputError as error:
+                notes.append(f"{stem}{suffix} left out: {error}")
         elif not suffix:
             return [f"no figure: the run has no {left_out[0]}"]
         else:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
+from orchestrator.errors import InputError
 from orchestrator.master.table import Table
 
 #: Okabe and Ito's colours, which stay apart for colour-blind eyes, darkest first; every line
@@ -118,11 +119,19 @@ def styled() -> Iterator[None]:
 
 
 def save(figure: Figure, *paths: Path) -> None:
-    """Write a figure without the time and the tool, so that the same run gives the same file."""
+    """Write a figure without the time and the tool, so that the same run gives the same file.
+
+    Raises:
+        InputError: values are too large for its axes.
+
+    """
     with styled(), mpl.rc_context({"figure.constrained_layout.use": False}):
         # Laid out once for all files.
         if (engine := figure.get_layout_engine()) is not None:
-            engine.execute(figure)
+            try:
+                engine.execute(figure)
+            except (ValueError, OverflowError) as error:
+                raise InputError("values lie too far apart to be drawn") from error
         figure.set_layout_engine(None)
         for path in paths:
             figure.savefig(path, metadata=_NO_DATE[path.suffix])

@@ -17,7 +17,7 @@ from orchestrator.system.ssp.validation import violations
 from orchestrator.system.transformation import Linear
 from orchestrator.system.units import UndefinedUnit, Unit, conversion
 from orchestrator.system.unpacking import unpacked
-from orchestrator.system.values import finite
+from orchestrator.system.values import finite, integer
 
 _SUFFIX = Path(STRUCTURE).suffix
 
@@ -161,7 +161,7 @@ class Archive:
         """An attribute that is an integer; zero where it is not stated or, with a problem, none."""
         text = element.get(name, "0")
         try:
-            return int(text)
+            return integer(text)
         except ValueError:
             self.problem(f"{name} {text!r} is no integer")
             return 0

@@ -63,4 +63,6 @@ def _value(table: str, entry: Element, end: str, items: Items) -> float:
         if text not in items:
             raise InputError(f"{end} {text!r} of a mapping is not in its enumeration")
         return float(items[text])
-    return number(end, text)
+    if (value := number(end, text)) != int(value):
+        raise InputError(f"{end} {text!r} of a mapping is no integer")
+    return value

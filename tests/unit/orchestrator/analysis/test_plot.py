@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from orchestrator.analysis.figures.style import save
 from orchestrator.analysis.plot import group_of, plot
 from orchestrator.analysis.signals import unit_of
 from orchestrator.errors import InputError
@@ -54,6 +55,13 @@ def test_what_cannot_be_chosen_is_explained():
         plot(
             [("own", table_of(mine__a__x=np.zeros(3), mine__a__y=np.zeros(3), mine__b=np.ones(3)))]
         )
+
+
+def test_values_that_no_axis_can_show_are_refused(tmp_path):
+    figure = plot([("own", table_of(mine__a=np.linspace(-1.7, 1.7, 10) * 1e308))], ["mine.a"])
+    with pytest.raises(InputError, match="too far apart to be drawn"):
+        save(figure, tmp_path / "plot.png")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

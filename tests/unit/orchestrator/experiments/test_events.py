@@ -67,6 +67,9 @@ def test_what_is_overridden_is_transformed_as_the_signal_is(system):
     assert through(degrees, bias={name: 2.0}) == Alter("bias", ((target, 114.0),))
     # Who listens hears something else, in its own units.
     assert through(degrees, bias={str(target): 2.0}) == Alter("bias", ((target, 2.0),))
+    for kind in ("override", "bias"):
+        with pytest.raises(InputError, match=rf"phi: 1e\+300 is inf where it arrives, at {target}"):
+            through(Linear(1e300), **{kind: {name: 1e300}})
     mapped = Mapped(((0.0, 7.0), (1.0, 5.0)))
     assert through(mapped, override={name: 1.0}) == Alter("override", ((target, 5.0),))
     assert through(mapped, override={name: 2.0}) == Alter("override", ((target, 2.0),))
@@ -104,7 +107,9 @@ def test_what_is_overridden_is_transformed_as_the_signal_is(system):
         ({"at": 1.0, "bias": {"plant.y": "much"}}, "cannot be added"),
         ({"at": 1.0, "reset": "rudder"}, "no component 'rudder'"),
         ({"when": "plant.eta.z", "stop": True}, "write a signal"),
-        ({"when": "plant.eta.z > x", "stop": True}, "'x' is not a number"),
+        ({"when": "plant.eta.z > x", "stop": True}, "'x' is no number"),
+        ({"when": "plant.eta.z > nan", "stop": True}, "'nan' is not finite"),
+        ({"when": "plant.eta.z < inf", "stop": True}, "'inf' is not finite"),
         ({"when": "plant.eta > 1", "stop": True}, "did you mean"),
         ({"when": "plant.d11 > 1", "stop": True}, "of causality parameter"),
     ],

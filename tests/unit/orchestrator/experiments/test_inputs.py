@@ -30,6 +30,16 @@ def test_a_run_begins_with_what_the_table_says_of_its_start(tmp_path):
     assert system.parameters[U] == 8.0
 
 
+def test_a_straight_line_may_be_steeper_than_any_number(tmp_path):
+    """Its ends are finite, and so is all that lies between."""
+    text = "time,plant.tau.u,plant.tau.q\n-1,-1.5e308,2.0\n1,1.5e308,4.0\n"
+    system, course = read(tmp_path, text)
+    assert system.parameters[U] == 0.0
+    for time, expected in ((-1.0, [-1.5e308, 2.0]), (0.5, [0.75e308, 3.5]), (1.0, [1.5e308, 4.0])):
+        row = 1 if time == 1.0 else 0
+        np.testing.assert_allclose(course.at(time, row), expected, rtol=1e-12)
+
+
 def test_other_tables_have_other_digests(tmp_path):
     texts = ["time,plant.tau.u\n0,1\n", "time,plant.tau.u\n0,2\n", "time,plant.tau.q\n0,1\n"]
     assert len({read(tmp_path, text)[1].digest for text in texts}) == len(texts)
@@ -43,6 +53,7 @@ def test_other_tables_have_other_digests(tmp_path):
         ("time,plant.tau.u\n", "holds no inputs"),
         ("time,plant.tau.u\n0,nan\n", "must be finite"),
         ("time,plant.tau.u\n1,1\n0,1\n", "times must not fall"),
+        ("time,plant.tau.u\n-1e308,1\n1e308,1\n", "must lie less than 1e+308 s apart"),
         ("time,plant.tau.u,plant.tau.u\n0,1,1\n", "two columns have the same name"),
         ("time,plant.tau.x\n0,1\n", "did you mean"),
         ("time,plant.eta.x\n0,1\n", "of causality output"),
@@ -86,6 +97,13 @@ def test_an_entry_that_is_none_is_refused(tmp_path, entry, reason):
     file = tmp_path / "mine.toml"
     file.write_text(f"[inputs]\n{entry}\n")
     with pytest.raises(InputError, match=reason):
+        read_scenario(str(file))
+
+
+def test_an_empty_entry_names_no_file(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text("inputs = {}\n")
+    with pytest.raises(InputError, match=r"mine\.toml: inputs: name a file"):
         read_scenario(str(file))
 
 

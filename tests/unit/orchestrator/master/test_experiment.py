@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from math import ceil, floor
 
+import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 from orchestrator.errors import InputError
+from orchestrator.experiments.preparation import load
 from orchestrator.master.experiment import MOST_STEPS, Experiment
+from orchestrator.master.paces import paces
 
 
 @given(step=st.floats(1e-3, 1.0), n=st.integers(1, 200), rest=st.floats(0.0, 0.99))
@@ -52,6 +56,22 @@ def test_the_number_of_steps_is_that_of_exact_arithmetic(stop_time, step):
         assert all(h > 0.0 and t + h > 0.0 for _, t, h, _ in steps)
 
 
+@given(
+    time=st.floats(allow_nan=False) | st.integers(-(10**300), 10**300),
+    start=st.floats(-1e308, 1e307),
+    step=st.floats(5e-324, 1.7e308),
+)
+@example(1e308, -1e308, 1e-3)
+@example(float("inf"), 0.0, 0.02)
+def test_any_time_is_reached_after_some_steps_or_never(time, start, step):
+    """Never is after more steps than any run has."""
+    stop = max(start + step, float(np.nextafter(start, np.inf)))
+    reached = Experiment(stop, stop - start, start_time=start).reaching(time)
+    assert 0 <= reached <= MOST_STEPS + 1
+    if reached == 0:
+        assert time <= start + 1e-3 * (stop - start)
+
+
 def test_a_rest_within_rounding_is_no_step():
     assert Experiment(0.3, 0.1).rows == 4
     assert Experiment(1.0, 0.03).rows == 35
@@ -76,3 +96,9 @@ def test_text_is_no_time():
 def test_an_unknown_order_is_refused():
     with pytest.raises(InputError, match="use one of gauss-seidel, jacobi"):
         Experiment(1.0, 0.1, "random")
+
+
+def test_a_step_of_a_component_may_be_beyond_all_multiples():
+    system = replace(load("fig4", "native"), steps={"plant": 1e308})
+    with pytest.raises(InputError, match=r"steps of 1e\+308 s, which are no multiple"):
+        paces(system, 0.02)

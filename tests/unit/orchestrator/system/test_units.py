@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+from math import isfinite
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -45,6 +48,38 @@ def test_units_of_different_things_are_refused():
         conversion(M, Unit("?"))
 
 
+@pytest.mark.parametrize(
+    ("large", "small"),
+    [
+        (Unit("large", LENGTH, 1e200), Unit("small", LENGTH, 1e-200)),
+        (Unit("large", LENGTH, 1e300), Unit("small", LENGTH, 1e-9)),
+        (Unit("large", LENGTH, 1.0, 1e308), Unit("small", LENGTH, 0.5, -1e308)),
+        (Unit("large", LENGTH, 1.0), Unit("small", LENGTH, 5e-324)),
+    ],
+)
+def test_units_too_far_apart_for_a_number_are_refused_by_name(large, small):
+    """A value would arrive as zero, infinite, or with a few of its digits."""
+    for source, target in ((large, small), (small, large)):
+        with pytest.raises(InputError, match=f"units {source.name} and {target.name} are too far"):
+            conversion(source, target)
+
+
+FACTORS = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@given(*[st.builds(Unit, st.just(name), st.just(LENGTH), FACTORS, FACTORS) for name in "ab"])
+def test_a_conversion_is_refused_or_loses_no_value(source, target):
+    try:
+        converted = conversion(source, target)
+    except InputError:
+        return
+    if converted is not None:
+        assert converted.factor != 0.0
+        exact = Fraction(source.factor) / Fraction(target.factor)
+        assert abs(Fraction(converted.factor) / exact - 1) < Fraction(1, 2**52)
+        assert isfinite(converted.offset)
+
+
 NUMBERS = st.integers(-9, 9).map(float)
 LINEARS = st.builds(Linear, NUMBERS, NUMBERS)
 TABLES = st.dictionaries(NUMBERS, NUMBERS, max_size=5).map(
@@ -70,3 +105,11 @@ def test_what_leaves_a_value_as_it_is_goes_with_everything():
 def test_line_and_table_do_not_follow_each_other():
     with pytest.raises(InputError, match="follow each other"):
         chained(Linear(2.0), Mapped(((1.0, 2.0),)))
+
+
+@pytest.mark.parametrize("size", [1e200, 1e-200])
+def test_transformations_that_no_number_holds_do_not_follow_each_other(size):
+    with pytest.raises(InputError, match="linear transformations follow each other that come to"):
+        chained(Linear(size), Linear(size))
+    # A factor of zero says what it does.
+    assert chained(Linear(size), Linear(0.0, 1.0)) == Linear(0.0, 1.0)

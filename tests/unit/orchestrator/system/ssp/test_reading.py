@@ -412,6 +412,20 @@ def test_parameter_set_inside_an_fmu(files, tmp_path: Path):
         (system(component("a", "m.fmu", binding({"k": 'Real value="1" unit="K"'}))),
          "a.k: units differ, K and m"),
         (system(component("a"), connection("a.y", "a.u", startIndices="1")), "elements of arrays"),
+        *(
+            (system(component("a"), connection(
+                f"a.{kind}.out", f"a.{kind}.in",
+                f'<ssc:IntegerMappingTransformation><ssc:MapEntry source="3" target="{target}"/>'
+                "</ssc:IntegerMappingTransformation>")), why)
+            for kind, target, why in (
+                ("Integer", "1.5", "target '1.5' of a mapping is no integer"),
+                ("Integer", "1_0", "target '1_0' is no number"),
+                ("Integer", "1e400", "target '1e400' is not finite"),
+                ("Integer", "2147483648", "mapped to 2147483648, which no Integer of FMI can be"),
+                ("Enumeration", "-2147483649", "which no Enumeration of FMI can be"),
+                ("Boolean", "2", "is mapped to 2, which no Boolean of FMI can be"),
+            )
+        ),
         (system(component("a"), connection("a.String.out", "a.String.in",
                                            '<ssc:LinearTransformation factor="2"/>')),
          "a value of type String cannot be transformed linearly"),

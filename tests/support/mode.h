@@ -1,0 +1,10 @@
+/* What slaves can do to the floating-point mode of all. */
+
+#include <fenv.h>
+
+#ifdef __SSE__
+#include <xmmintrin.h>
+static void flush_to_zero(void) { _mm_setcsr(_mm_getcsr() | 0x8040); }
+#else
+static void flush_to_zero(void) {}
+#endif
