@@ -162,13 +162,9 @@ def run_into(
         held_interrupts() as interrupts,
         replaced(folder, names, force=files.force, keep=lambda: bool(done)) as unfinished,
     ):
-        places = [folder / FOLDER / below for below in folders]
-        for place in places:
-            if place.is_symlink():
-                raise InputError(f"{place}: is a link; remove it, or choose another folder (--out)")
         kept = checkpoints_of(
             runs,
-            places,
+            _places([folder / FOLDER / below for below in folders]),
             files.checkpoint_every,
             files.resume,
             files.force,
@@ -199,9 +195,9 @@ def run_into(
                         run.attendants,
                     )
                 done.append(run.ended(ending))
-                for event in () if ending.failure else prepared.missed(ending):
-                    say(f"warning: {prepared.scenario.name}: did not happen: {event}")
-                for caution in cautions_after(done[-1].seen):
+                missed = [] if ending.failure else prepared.missed(ending)
+                said = [f"did not happen: {event}" for event in missed]
+                for caution in (*said, *cautions_after(done[-1].seen)):
                     say(f"warning: {prepared.scenario.name}: {caution}")
                 if interrupts:
                     break
@@ -335,6 +331,19 @@ def _draw(
         for name in figure_files(scenario.figure, scenario.stem):
             (folder / name).unlink(missing_ok=True)
         raise
+
+
+def _places(checkpoints: list[Path]) -> list[Path]:
+    """The folders of checkpoints.
+
+    Raises:
+        InputError: one is a link, which could lead anywhere.
+
+    """
+    for place in checkpoints:
+        if place.is_symlink():
+            raise InputError(f"{place}: is a link; remove it, or choose another folder (--out)")
+    return checkpoints
 
 
 def _folders(runs: Sequence[Prepared], figures: Sequence[str]) -> list[str]:

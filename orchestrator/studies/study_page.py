@@ -78,8 +78,8 @@ workers of [a Dask cluster](cluster.md). What comes out goes into `results/NAME/
 $files
 
 Until all runs are done, they are kept in `unfinished.sqlite` beside `study.json`, each with a
-checksum. What was changed is refused in a line that names the file; `--force`, or `force` of `sweep`,
-moves the study aside and begins anew.
+checksum. What was changed is refused in a line that names the file; `--force`, or `force` of
+`sweep`, moves the study aside and begins anew.
 
 - **The same command goes on.** However a study was ended, by Ctrl-C, a crash or `kill -9`: what was
   done is not done again, no run is lost or there twice, and the table is that of a study that was
