@@ -21,6 +21,7 @@ import pytest
 
 from fmus.packaging.loader import compiler
 from fmus.packaging.own import build_own
+from support import states
 from support.kinds import FIXTURES
 from support.raw_fmi import (
     DISCARD,
@@ -467,6 +468,81 @@ def test_size_is_that_of_the_state(fmu: RawFmu, component: int, difference: int)
     content = ctypes.create_string_buffer(size + 1000)
     assert fmu.SerializeFMUstate(component, state, content, size + difference) == ERROR
     assert content.raw == bytes(size + 1000)
+
+
+def restore(fmu: RawFmu, component: int, content: bytes) -> list[str]:
+    """What is said of a state."""
+    state, before = c_void_p(), len(fmu.messages)
+    assert fmu.DeSerializeFMUstate(component, content, len(content), state) == OK
+    assert fmu.SetFMUstate(component, state) == OK
+    assert fmu.FreeFMUstate(component, state) == OK
+    return [message.text for message in fmu.messages[before:]]
+
+
+@pytest.fixture
+def said(fmu: RawFmu, component: int) -> dict[str, Any]:
+    """What a state of it says, with a fault."""
+    state = c_void_p()
+    assert fmu.GetFMUstate(component, state) == OK
+    found = states.read(serialised(fmu, component, state))
+    assert found is not None
+    assert fmu.FreeFMUstate(component, state) == OK
+    found["fault"] = True
+    return found
+
+
+def test_state_holds_all_that_can_be_refused(fmu: RawFmu, component: int, folder: Path):
+    """Each port, each call, and what is neither; with the longest reasons."""
+    variables = fmpy.read_model_description(folder).modelVariables
+    bad = restore(fmu, component, b"nothing")
+    assert bad == ["state refused: the bytes are not those of a state"]
+    assert fmu.SetupExperiment(component, 0, 0.0, 0.0, 0, 0.0) in (OK, DISCARD)
+    assert fmu.EnterInitializationMode(component) in (OK, DISCARD)
+    assert fmu.ExitInitializationMode(component) in (OK, DISCARD)
+    assert fmu.Terminate(component) == OK
+    assert fmu.Terminate(component) in (OK, DISCARD)
+    for variable in variables:
+        kind = variable.type
+        values = STRINGS if kind == "String" else REALS if kind == "Real" else INTEGERS
+        getattr(fmu, f"Set{kind}")(component, (c_uint * 1)(variable.valueReference), 1, values)
+    fmu.SetReal(component, (c_uint * 1)(2**31 + 1), 1, REALS)
+    state = c_void_p()
+    assert fmu.GetFMUstate(component, state) == OK
+    content = serialised(fmu, component, state)
+    found = states.read(content)
+    assert found is not None
+    names = found["refused"].keys()
+    assert names == {variable.name for variable in variables} | {
+        "value reference", "fmi2SetupExperiment", "fmi2EnterInitializationMode",
+        "fmi2ExitInitializationMode", "fmi2Terminate", "fmi2SetFMUstate",
+    }  # fmt: skip
+    found["refused"] = dict.fromkeys((*names, "initialisation"), 500 * "\U0001f30a")
+    for one in (content, states.sealed(found)):
+        assert restore(fmu, component, one) == []
+        assert fmu.FreeFMUstate(component, state) == OK
+        assert fmu.GetFMUstate(component, state) == OK
+        assert serialised(fmu, component, state) == one
+
+
+@pytest.mark.parametrize(
+    ("refused", "why"),
+    [
+        ({"k_q": "x"}, "it refused what cannot be refused"),
+        ({"fmi2DoStep": "x"}, "it refused what cannot be refused"),
+        ({"": "x"}, "it refused what cannot be refused"),
+        ({"k_d": "x\0y"}, "what it refused is no text"),
+        ({"k_d": 2001 * "x"}, "what it refused is no text"),
+        ({str(i): "" for i in range(160_000)}, None),
+    ],
+)
+def test_state_with_what_cannot_be_refused_is_refused(fmu, component, said, refused, why):
+    """However much of it there is."""
+    said["refused"] = refused
+    [message] = restore(fmu, component, states.sealed(said))
+    # What is too long for a state, the FMUs in C do not begin to read.
+    known = [why] if why else ["it refused what cannot be refused", "it has other parts"]
+    assert message in [f"state refused: {one}" for one in known]
+    assert steps(fmu, component) == DISCARD
 
 
 # Calls within calls

@@ -33,7 +33,12 @@ typedef struct {
 } callbacks;
 
 static const names version = {
-    {"Real", "Integer", "Boolean", "String"}, "GUID", "fmi2Terminate"};
+    .kinds = {"Real", "Integer", "Boolean", "String"},
+    .token = "GUID",
+    .terminate = "fmi2Terminate",
+    .refused = {"fmi2SetupExperiment", "fmi2EnterInitializationMode",
+                "fmi2ExitInitializationMode", "fmi2Terminate", "fmi2SetFMUstate"},
+};
 
 /* FMI 2.0 defines a message as a format: a host would take a % for a directive. */
 static void deliver(const logger *host, string instance_name, int status, string category,
