@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import gc
+import math
 import shutil
 import sys
 import threading
@@ -561,6 +562,25 @@ def test_logger_that_calls_back_is_refused(fmu: RawFmu, component: int, capfd):
     assert answers == [ERROR]
     assert "fmi2FreeInstance: called by the logger" in capfd.readouterr().err
     assert fmu.Reset(component) == OK
+
+
+def test_messages_of_a_call_are_told_in_their_order_after_all_is_done(fmu, folder, component):
+    """Also where the logger calls back: the instance is let go, and its values are as they stay."""
+    inputs = [
+        (v.name, v.valueReference)
+        for v in fmpy.read_model_description(folder).modelVariables
+        if v.causality == "input"
+    ][:5]
+    references, values = (c_uint * 5)(*(r for _, r in inputs)), (c_double * 5)(*[math.nan] * 5)
+    answers = []
+    fmu.when_told = lambda: answers.append(steps(fmu, component))
+    assert fmu.SetReal(component, references, 5, values) == OK
+    assert steps(fmu, component) == DISCARD
+    fmu.when_told = lambda: None
+    *refused, blocked = (message.text for message in fmu.messages)
+    assert refused == [f"{name} = nan: must be finite" for name, _ in inputs]
+    assert blocked == f"step refused at t = 0 s: {'; '.join(refused)}"
+    assert answers == [ERROR] * 6
 
 
 def test_threads_on_one_instance_take_turns(fmu: RawFmu, component: int):
