@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import gc
 import math
+import os
 import shutil
 import sys
 import threading
@@ -203,6 +204,31 @@ def test_folder_without_a_slave_is_null_with_one_message(
     made = python_fmu.instantiate()
     assert made, "the sound one still works"
     python_fmu.FreeInstance(made)
+
+
+@pytest.mark.parametrize(
+    "name", ["slavemodule.txt", "guid.txt", "{script}.py", "__pycache__/{script}.{tag}.pyc"]
+)
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
+def test_resource_that_is_no_file_is_not_waited_for(
+    python_fmu, python_folder, tmp_path, name: str, kind: str
+):
+    """A pipe would be read from for ever, and so would the device."""
+    resources = tmp_path / "resources"
+    shutil.copytree(python_folder / "resources", resources)
+    script = (resources / "slavemodule.txt").read_text()
+    path = resources / name.format(script=script, tag=sys.implementation.cache_tag)
+    path.parent.mkdir(exist_ok=True)
+    path.unlink(missing_ok=True)
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    else:
+        path.mkdir()
+    assert python_fmu.instantiate(location=resources.as_uri().encode(), logging=0) is None
+    [message] = python_fmu.messages
+    assert f"{path} is no regular file" in message.text or kind == "folder"
 
 
 def test_library_beside_the_loader_is_found_where_the_loader_was(
