@@ -24,6 +24,9 @@ from orchestrator.system.leftovers import process_folder
 #: An archive that holds more than this is not unpacked, nor one that does so with those in it.
 _MOST_FILES, _MOST_BYTES = 100_000, 2**30
 
+#: Folders in folders that an archive may have: Python enters them one in the other.
+_MOST_FOLDERS = 100
+
 #: No more than this is unpacked in a process [bytes].
 _MOST_OF_A_PROCESS = 2**33
 
@@ -145,6 +148,10 @@ def _check(entries: Sequence[ZipInfo]) -> None:
         path = PurePosixPath(entry.filename.replace("\\", "/"))
         if path.is_absolute() or ".." in path.parts:
             raise ValueError(f"it holds {entry.filename!r}, which leads out of it")
+        if (depth := len(path.parts) - 1) > _MOST_FOLDERS:
+            raise ValueError(
+                f"it holds {path.parts[0]:.40}/…, {depth:,} folders deep, more than {_MOST_FOLDERS}"
+            )
         if path in names:
             raise ValueError(f"it holds {entry.filename!r} twice")
         names.add(path)

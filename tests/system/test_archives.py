@@ -146,6 +146,7 @@ def test_bomb_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         ({"zeros": bytes(1_000_000)}, "unpacks to more than 500,000 bytes"),
         (many, "holds 1,000 files, more than 100"),
         ({DESCRIPTION: bytes(2000)}, "is longer than 1,000 bytes"),
+        ({"d/" * 2000 + "x": b""}, r"holds d/…, 2,000 folders deep, more than 100$"),
     ):
         with pytest.raises(InputError, match=why):
             unpacking.unpacked(zipped(tmp_path / "bomb.fmu", content))
