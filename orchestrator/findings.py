@@ -33,17 +33,20 @@ class Findings:
         self._strict = strict
         self.problems: list[str] = []
         self.notes: list[str] = []
+        self._said: dict[str, set[str]] = {"problem": set(), "note": set()}
 
     def problem(self, text: str) -> None:
         """Take note of what makes a run meaningless, or impossible."""
-        if text not in self.problems:
+        if text not in self._said["problem"]:
+            self._said["problem"].add(text)
             self.problems.append(text)
 
     def note(self, text: str) -> None:
         """Take note of what changes no number."""
         if self._strict:
             self.problem(text)
-        elif text not in self.notes:
+        elif text not in self._said["note"]:
+            self._said["note"].add(text)
             self.notes.append(text)
 
     @contextmanager

@@ -30,11 +30,20 @@ INSTANTIATED, INITIALISING, STEPPING, TERMINATED = MODES = (
 MOST_MESSAGES = 100
 
 #: Characters of a message: some hosts have a buffer of 1 or 2 kB for them.
-_LONGEST_MESSAGE = 500
+LONGEST_MESSAGE = 500
 
 #: What is refused, where it is neither a port nor a call: a reference that belongs to no port, and
 #: the initialisation with the values that there are.
 REFERENCE, INITIALISATION = "value reference", "initialisation"
+
+#: Calls that are refused in the wrong mode, or with arguments that do not fit.
+REFUSED_CALLS = (
+    "fmi2SetupExperiment",
+    "fmi2EnterInitializationMode",
+    "fmi2ExitInitializationMode",
+    "fmi2Terminate",
+    "fmi2SetFMUstate",
+)
 
 
 class Callbacks(Fmi2Slave):  # type: ignore[misc]
@@ -63,7 +72,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
     def _refuse(self, what: str, why: str) -> None:
         """Take no step until what was refused is mended."""
-        self._store.refused[what] = why
+        self._store.refused[what] = why[:LONGEST_MESSAGE]
         self._report(why)
 
     def _report(self, message: str, key: str | None = None) -> None:
@@ -76,14 +85,14 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
         The host adds the name of the instance.
         """
-        said = (key or message)[:_LONGEST_MESSAGE]
+        said = (key or message)[:LONGEST_MESSAGE]
         if said in self._said or len(self._said) >= MOST_MESSAGES:
             return
         self._said.add(said)
         if len(self._said) == MOST_MESSAGES:
             message += "; what comes after this is not logged"
         # FMI defines a log message as a format: a host would take a % for a directive.
-        self.log(message[:_LONGEST_MESSAGE].replace("%", "%%"), status)
+        self.log(message[:LONGEST_MESSAGE].replace("%", "%%"), status)
 
     def _attempt(self, what: str, refused: str, action: Callable[[], None]) -> None:
         """Do something that is refused if it raises, and mended if it does not."""

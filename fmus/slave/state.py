@@ -10,7 +10,14 @@ from math import isclose
 from typing import Any, TypedDict
 
 from fmus.ports.port import Refusal, Value
-from fmus.slave.callbacks import INITIALISATION, INSTANTIATED, MODES
+from fmus.slave.callbacks import (
+    INITIALISATION,
+    INSTANTIATED,
+    LONGEST_MESSAGE,
+    MODES,
+    REFERENCE,
+    REFUSED_CALLS,
+)
 from fmus.slave.shape import frozen, restored
 from fmus.slave.store import Store
 
@@ -117,7 +124,7 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, kind: type) -
         state=None if state is None else restored(kind, state),
         hidden=frozen(saved["hidden"]),
         fault=saved["fault"],
-        refused=_refused(saved),
+        refused=_refused(saved, store),
     )
 
 
@@ -129,15 +136,30 @@ def _values(store: Store, references: Sequence[int], values: Any) -> list[float]
     return [*values]
 
 
-def _refused(saved: Mapping[str, Any]) -> dict[str, str]:
+def _refused(saved: Mapping[str, Any], store: Store) -> dict[str, str]:
     refused = saved["refused"]
-    if not isinstance(refused, dict) or not all(isinstance(v, str) for v in refused.values()):
+    if not isinstance(refused, dict) or not all(map(_is_reason, refused.values())):
         raise Refusal("what it refused is no text")
+    if not refused.keys() <= {
+        REFERENCE,
+        INITIALISATION,
+        *REFUSED_CALLS,
+        *(p.name for p in store.ports),
+    }:
+        raise Refusal("it refused what cannot be refused")
     if refused and not saved["fault"]:
         raise Refusal("it refused something without a fault")
     if saved["state"] is None and saved["mode"] != INSTANTIATED and INITIALISATION not in refused:
         raise Refusal("it is initialised and has no state")
     return dict(refused)
+
+
+def _is_reason(text: Any) -> bool:
+    """Whether it is a text that a message has room for, in UTF-8 and without a zero in it."""
+    try:
+        return "\0" not in text and len(text.encode()) <= 4 * LONGEST_MESSAGE
+    except (AttributeError, TypeError, UnicodeEncodeError):
+        return False
 
 
 def nearly_equal(one: Sequence[float], other: Sequence[float]) -> bool:

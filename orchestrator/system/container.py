@@ -17,6 +17,9 @@ from orchestrator.system.structure import System
 
 _TOOLBOX = "fmu_manipulation_toolbox"
 
+#: The file that says what is in a container.
+_CONTENT = "system.json"
+
 
 def write_container(system: System, folder: Path) -> list[Path]:
     """Write `NAME.fmu`, one FMU that contains the whole system and shows all its outputs.
@@ -32,12 +35,13 @@ def write_container(system: System, folder: Path) -> list[Path]:
         raise InputError(
             "a container needs the FMU manipulation toolbox: pip install 'auv-fmu[hosts]'"
         )
-    fmu = f"{file_name(system.name)}.fmu"
-    fmus = {component.name: component.fmu.name for component in system.components.values()}
-    if len(set(fmus.values())) < len(fmus):
+    container = f"{file_name(system.name)}.fmu"
+    names = system.fmus(container, _CONTENT)
+    fmus = {component.name: names[component.fmu] for component in system.components.values()}
+    if len(names) < len(fmus):
         raise InputError("a container takes each FMU once; this system has one twice")
     content: dict[str, Any] = {
-        "name": fmu,
+        "name": container,
         "step_size": system.step,
         "auto_link": False,
         "auto_input": False,
@@ -49,7 +53,7 @@ def write_container(system: System, folder: Path) -> list[Path]:
             for c in system.connections
         ],
         "output": [
-            [component.fmu.name, variable.name, f"{component.name}.{variable.name}"]
+            [fmus[component.name], variable.name, f"{component.name}.{variable.name}"]
             for component in system.components.values()
             for variable in component.description.modelVariables
             if variable.causality == "output"
@@ -61,14 +65,14 @@ def write_container(system: System, folder: Path) -> list[Path]:
         ],
     }
     with TemporaryDirectory(dir=process_folder()) as work:
-        for component in system.components.values():
-            shutil.copyfile(component.fmu, Path(work, component.fmu.name))
-        Path(work, "system.json").write_text(json.dumps(content), encoding="utf-8")
+        for fmu, name in names.items():
+            shutil.copyfile(fmu, Path(work, name))
+        Path(work, _CONTENT).write_text(json.dumps(content), encoding="utf-8")
         versions = {component.description.fmiVersion for component in system.components.values()}
         fmi = max(versions).partition(".")[0]
-        options = ["-container", "system.json", "-fmu-directory", work, "-fmi", fmi]
+        options = ["-container", _CONTENT, "-fmu-directory", work, "-fmi", fmi]
         process = run_module(f"{_TOOLBOX}.cli.fmucontainer", *options, folder=Path(work))
-        built = Path(work, fmu)
+        built = Path(work, container)
         if process.returncode != 0 or not built.is_file():
             raise InputError(
                 f"the container was not built: {last_line(process.stderr + process.stdout)}"

@@ -1,9 +1,9 @@
-"""Names of ports in a system."""
+"""Names in a system: of ports, and of files."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from hashlib import sha256
 
@@ -72,3 +72,25 @@ def file_name(name: str, taken: Collection[str] = ()) -> str:
     while plain.casefold() in others:
         plain += "_"
     return plain
+
+
+def plain(names: Iterable[str], *taken: str) -> list[str]:
+    """Names of files that need no encoding in a URI, of which some hosts know nothing.
+
+    No two are the same, nor differ in case only: some file systems do not tell them apart.
+
+    Args:
+        names: as they are.
+        taken: names that are not free.
+
+    """
+    found: list[str] = []
+    used = {name.lower() for name in taken}
+    for name in names:
+        base = re.sub(r"[^\w.-]", "_", name, flags=re.ASCII)
+        free, number = base, len(found)
+        while free.lower() in used:
+            free, number = f"{number}_{base}", number + 1
+        found.append(free)
+        used.add(free.lower())
+    return found

@@ -13,6 +13,8 @@ from orchestrator.system.values import literal
 #: The versions of FMI that libcosim knows and we can write.
 _TAKEN = ("2.0",)
 
+_STRUCTURE = "OspSystemStructure.xml"
+
 _OSP = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
 
 
@@ -44,15 +46,15 @@ def write_osp(system: System, folder: Path) -> list[Path]:
         ElementTree.SubElement(root, tag).text = text
     ElementTree.SubElement(root, "Algorithm").text = "fixedStep"
     simulators = ElementTree.SubElement(root, "Simulators")
-    written = []
+    fmus = system.fmus(_STRUCTURE)
+    for fmu, name in fmus.items():
+        shutil.copyfile(fmu, folder / name)
     for component in system.components.values():
-        written.append(folder / component.fmu.name)
-        shutil.copyfile(component.fmu, written[-1])
         simulator = ElementTree.SubElement(
             simulators,
             "Simulator",
             name=component.name,
-            source=component.fmu.name,
+            source=fmus[component.fmu],
             stepSize=str(system.steps.get(component.name, system.step)),
         )
         parameters = system.parameters_of(component.name)
@@ -68,6 +70,6 @@ def write_osp(system: System, folder: Path) -> list[Path]:
         for end in (connection.source, connection.target):
             ElementTree.SubElement(element, "Variable", simulator=end.component, name=end.port)
     ElementTree.indent(root)
-    path = folder / "OspSystemStructure.xml"
+    path = folder / _STRUCTURE
     path.write_bytes(ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True))
-    return [path, *written]
+    return [path, *(folder / name for name in fmus.values())]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from sys import float_info
 
 from orchestrator.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
-from orchestrator.system.names import PortName, splits
+from orchestrator.system.names import PortName, plain, splits
 from orchestrator.system.transformation import Linear, Mapped, Transformation
 from orchestrator.system.units import conversion, unit_of_port
 from orchestrator.system.values import INTEGERS, Value, type_of, typed, unit_of
@@ -103,6 +104,11 @@ class System:
             for target, value in self.parameters.items()
             if target.component == component
         }
+
+    def fmus(self, *taken: str) -> dict[Path, str]:
+        """All FMUs, each with a file name that no other has, nor any file that is taken."""
+        fmus = sorted({component.fmu for component in self.components.values()})
+        return dict(zip(fmus, plain((fmu.name for fmu in fmus), *taken), strict=True))
 
     def open_inputs(self, component: str) -> list[str]:
         """Inputs of one component that nothing feeds, and for which no value is set."""

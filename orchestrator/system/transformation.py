@@ -8,6 +8,9 @@ from typing import TypeAlias
 
 from orchestrator.errors import InputError
 
+#: Values of a mapping that is made of several.
+_MOST_PAIRS = 1000
+
 
 @dataclass(frozen=True)
 class Linear:
@@ -44,7 +47,8 @@ def chained(first: Transformation | None, then: Transformation | None) -> Transf
     """Two transformations, one after the other, as one; None leaves a value as it is.
 
     Raises:
-        InputError: one is linear, and the other a table, or no number holds what they come to.
+        InputError: one is linear, and the other a table; no number holds what they come to; or
+            together they are too long a table.
 
     """
     # One that says that nothing happens is kept where there is no other.
@@ -63,6 +67,10 @@ def chained(first: Transformation | None, then: Transformation | None) -> Transf
             )
         return both
     if isinstance(first, Mapped) and isinstance(then, Mapped):
-        sources = dict.fromkeys(source for table in (first, then) for source, _ in table.pairs)
-        return Mapped(tuple((source, then(first(source))) for source in sources))
+        before, after = dict(first.pairs), dict(then.pairs)
+        sources = {**before, **after}
+        if len(sources) > _MOST_PAIRS:
+            raise InputError(f"mappings of more than {_MOST_PAIRS:,} values follow each other")
+        passed = ((source, before.get(source, source)) for source in sources)
+        return Mapped(tuple((source, after.get(value, value)) for source, value in passed))
     raise InputError("a linear transformation and a mapping of single values follow each other")

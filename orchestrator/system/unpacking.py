@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path, PurePosixPath
 from shutil import rmtree
@@ -20,14 +21,33 @@ from orchestrator.errors import InputError, reason
 from orchestrator.reading import check_file
 from orchestrator.system.leftovers import process_folder
 
-#: An archive that holds more than this is not unpacked.
+#: An archive that holds more than this is not unpacked, nor one that does so with those in it.
 _MOST_FILES, _MOST_BYTES = 100_000, 2**30
+
+#: Folders in folders that an archive may have: Python enters them one in the other.
+_MOST_FOLDERS = 100
+
+#: No more than this is unpacked in a process [bytes].
+_MOST_OF_A_PROCESS = 2**33
 
 #: Files of an archive that are read into memory, and how long they may be [bytes].
 _DESCRIPTIONS, _MOST_OF_A_DESCRIPTION = (".xml", ".ssd", ".ssv", ".ssm"), 100_000_000
 
 #: Runs in several threads share what is unpacked.
 _LOCK = Lock()
+
+
+@dataclass
+class _Whole:
+    """An archive, and how much it and those in it have been unpacked to."""
+
+    archive: Path
+    files: int = 0
+    bytes: int = 0
+
+
+#: By the folders that they are unpacked into.
+_wholes: dict[Path, _Whole] = {}
 
 
 class Version(NamedTuple):
@@ -71,10 +91,16 @@ def unpacked(archive: Path) -> Path:
 
 @cache
 def _unpacked(archive: Version) -> Path:
+    place = process_folder().resolve()
     with ZipFile(archive.path) as content:
-        _check(content.infolist())
+        entries = content.infolist()
+        _check(entries)
+        around = (_wholes.get(folder) for folder in archive.path.parents)
+        whole = next(filter(None, around), None) or _Whole(archive.path)
+        files, size = len(entries), sum(entry.file_size for entry in entries)
+        _check_with(whole, files, size)
         try:
-            folder = Path(mkdtemp(dir=process_folder()))
+            folder = Path(mkdtemp(dir=place))
             try:
                 content.extractall(folder)
             except BaseException:
@@ -85,7 +111,29 @@ def _unpacked(archive: Version) -> Path:
                 f"{archive.path}: cannot be unpacked into {gettempdir()}: {reason(error)}; set "
                 "TMPDIR to another folder"
             ) from error
+    _wholes[folder] = whole
+    whole.files += files
+    whole.bytes += size
     return folder
+
+
+def _check_with(whole: _Whole, files: int, size: int) -> None:
+    """Refuse what fills the disk together with what there is."""
+    within = f"and {whole.archive} with all that is in it to"
+    if (together := whole.files + files) > _MOST_FILES:
+        raise ValueError(
+            f"it unpacks to {files:,} files, {within} {together:,}, more than {_MOST_FILES:,}"
+        )
+    if (together := whole.bytes + size) > _MOST_BYTES:
+        raise ValueError(
+            f"it unpacks to {size:,} bytes, {within} {together:,}, more than {_MOST_BYTES:,}"
+        )
+    others = {id(one): one.bytes for one in _wholes.values()}
+    if (together := sum(others.values()) + size) > _MOST_OF_A_PROCESS:
+        raise ValueError(
+            f"it unpacks to {size:,} bytes, and all archives of this process to {together:,}, more "
+            f"than {_MOST_OF_A_PROCESS:,}: run them in processes of their own"
+        )
 
 
 def _check(entries: Sequence[ZipInfo]) -> None:
@@ -93,12 +141,17 @@ def _check(entries: Sequence[ZipInfo]) -> None:
     if len(entries) > _MOST_FILES:
         raise ValueError(f"it holds {len(entries):,} files, more than {_MOST_FILES:,}")
     if sum(entry.file_size for entry in entries) > _MOST_BYTES:
-        raise ValueError(f"it unpacks to more than {_MOST_BYTES:,} bytes")
+        size = sum(entry.file_size for entry in entries)
+        raise ValueError(f"it unpacks to more than {_MOST_BYTES:,} bytes: {size:,}")
     names = set()
     for entry in entries:
         path = PurePosixPath(entry.filename.replace("\\", "/"))
         if path.is_absolute() or ".." in path.parts:
             raise ValueError(f"it holds {entry.filename!r}, which leads out of it")
+        if (depth := len(path.parts) - 1) > _MOST_FOLDERS:
+            raise ValueError(
+                f"it holds {path.parts[0]:.40}/…, {depth:,} folders deep, more than {_MOST_FOLDERS}"
+            )
         if path in names:
             raise ValueError(f"it holds {entry.filename!r} twice")
         names.add(path)

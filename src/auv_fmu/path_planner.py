@@ -24,7 +24,7 @@ that nobody has chosen.
 
 from __future__ import annotations
 
-from math import atan2, degrees, sqrt
+from math import atan2, degrees, sqrt, tan
 from typing import NamedTuple
 
 from auv_fmu.actuators import Limits
@@ -42,6 +42,17 @@ _UNUSED = (0.0,) * 26
 #: Moments of a rounding at which it is held against the limits, as a share of it: the middle of it,
 #: where a corner of equal speeds asks for most, is among them.
 _BETWEEN = 1 / 32
+
+#: Square of the steepest slope.
+_STEEPEST_SLOPE = tan(STEEPEST) * tan(STEEPEST)
+
+#: What rounding may make of the steepness of two velocities, as a share of their product, and of
+#: their products with the fastest one.
+_OF_BOTH = 1e-9
+_OF_THE_FASTEST = 1e-12
+
+#: Where two moments differ by a smaller share of a rounding, they are one.
+_SHORTEST = 1e-6
 
 _AT_REST: Vector3 = (0.0, 0.0, 0.0)
 
@@ -281,6 +292,7 @@ def check(parameters: Parameters) -> None:
         k = k + 1
     if norm(course(waypoints, first_corner(waypoints, 0.0), _AT_REST)) == 0.0:
         raise ImpossiblePath("all waypoints are the same: there is no way to go")
+    _check_pitch(waypoints)
     corner = first_corner(waypoints, 0.0)
     ahead = corner
     while corner.k < waypoints.n:
@@ -306,8 +318,116 @@ def _check_leg(waypoints: Waypoints, k: int) -> None:
     if climb > STEEPEST:
         raise ImpossiblePath(
             f"the way from waypoint {k:d} to {k + 1:d} climbs or dives at {degrees(climb):.1f} "
-            f"degrees; (1) has a pole at 90, so it must stay within {degrees(STEEPEST):g}"
+            f"degrees, {degrees(climb - STEEPEST):.2g} beyond the limit of {degrees(STEEPEST):g}: "
+            f"(1) has a pole at 90"
         )
+
+
+def _check_pitch(waypoints: Waypoints) -> None:
+    """Refuse a path that is too steep in a rounding, between legs that are not.
+
+    From one moment at which a rounding begins or ends to the next, dy_d is one cubic polynomial.
+    """
+    opening, closing = first_corner(waypoints, 0.0), first_corner(waypoints, 0.0)
+    begin, fastest, k = opening.t - waypoints.rounding / 2, 0.0, 1
+    while k < waypoints.n:
+        speed = norm(velocity(waypoints, k))
+        fastest = speed if speed > fastest else fastest
+        k = k + 1
+    while closing.k < waypoints.n:
+        ahead, end = closing, closing.t + waypoints.rounding / 2
+        if opening.k < waypoints.n and opening.t - waypoints.rounding / 2 < end:
+            end = opening.t - waypoints.rounding / 2
+            opening = next_corner(waypoints, opening)
+        else:
+            closing = next_corner(waypoints, closing)
+        if end > begin:
+            _check_pitch_between(waypoints, ahead, begin, end, fastest)
+        begin = end
+
+
+def _check_pitch_between(
+    waypoints: Waypoints, ahead: Corner, begin: float, end: float, fastest: float
+) -> None:
+    """Refuse what is too steep between two moments [s], of which dy_d is a cubic polynomial.
+
+    Args:
+        waypoints: of the path.
+        ahead: the first corner whose rounding is not over at the beginning.
+        begin: one moment [s].
+        end: the other one [s].
+        fastest: speed of the fastest leg [m/s].
+
+    """
+    duration, done, share = end - begin, 0.0, 1.0
+    early = reference(waypoints, corner_ahead(waypoints, ahead, begin), begin)
+    while done < 1.0:
+        t = begin + duration * (done + share)
+        late = reference(waypoints, corner_ahead(waypoints, ahead, t), t)
+        if _is_never_steep(early, late, duration * share, fastest):
+            early = late
+            done = done + share
+            share = 1.0 - done
+        else:
+            share = share / 2
+            t = begin + duration * (done + share)
+            corner = corner_ahead(waypoints, ahead, t)
+            (x, y, z), dy_d, _ = reference(waypoints, corner, t)
+            climb = atan2(abs(dy_d[2]), sqrt(dy_d[0] * dy_d[0] + dy_d[1] * dy_d[1]))
+            if _steepness(dy_d, dy_d, fastest) > 0.0:
+                raise ImpossiblePath(
+                    f"near waypoint {corner.k + 1:d}, at ({x:.3g}, {y:.3g}, {z:.3g}) m, the path "
+                    f"climbs or dives at {degrees(climb):.1f} degrees, "
+                    f"{degrees(climb - STEEPEST):.2g} beyond the limit of {degrees(STEEPEST):g}: "
+                    f"(1) has a pole at 90; a less steep leg between makes a turn of it"
+                )
+            if share < _SHORTEST:
+                raise ImpossiblePath(
+                    f"the path turns back on the spot at waypoint {corner.k + 1:d}, which no "
+                    f"vehicle does; a waypoint beside it makes a turn of it"
+                )
+
+
+def _is_never_steep(early: Reference, late: Reference, duration: float, fastest: float) -> bool:
+    """Whether the path is nowhere too steep between two moments.
+
+    Its steepness there is a polynomial of the sixth degree, and nowhere larger than the largest of
+    its coefficients in the basis of Bernstein.
+
+    Args:
+        early: the path at one moment.
+        late: at the other one, between which dy_d is a cubic polynomial.
+        duration: from one to the other [s].
+        fastest: speed of the fastest leg [m/s].
+
+    """
+    a, d = early.dy_d, late.dy_d
+    b, c = advance(a, early.ddy_d, duration / 3), advance(d, late.ddy_d, -duration / 3)
+    return (
+        _steepness(a, a, fastest) <= 0.0
+        and _steepness(a, b, fastest) <= 0.0
+        and 2 * _steepness(a, c, fastest) + 3 * _steepness(b, b, fastest) <= 0.0
+        and _steepness(a, d, fastest) + 9 * _steepness(b, c, fastest) <= 0.0
+        and 2 * _steepness(b, d, fastest) + 3 * _steepness(c, c, fastest) <= 0.0
+        and _steepness(c, d, fastest) <= 0.0
+        and _steepness(d, d, fastest) <= 0.0
+    )
+
+
+def _steepness(one: Vector3, other: Vector3, fastest: float) -> float:
+    """A bilinear form: of a velocity and itself positive where it is steeper than STEEPEST.
+
+    What rounding may make of it is taken off.
+
+    Args:
+        one: a velocity [m/s].
+        other: another one [m/s].
+        fastest: speed of the fastest leg [m/s].
+
+    """
+    m, n = norm(one), norm(other)
+    steep = one[2] * other[2] - _STEEPEST_SLOPE * (one[0] * other[0] + one[1] * other[1])
+    return steep - _OF_BOTH * m * n - _OF_THE_FASTEST * fastest * (m + n)
 
 
 def _check_rounding(parameters: Parameters, corner: Corner, ahead: Corner) -> None:
@@ -359,6 +479,6 @@ def _hold(
         limit = least if asked < least else most
         raise ImpossiblePath(
             f"near waypoint {number:d}, at ({y_d[0]:.3g}, {y_d[1]:.3g}, {y_d[2]:.3g}) m, the path "
-            f"asks for {what} of {asked:.3g} {unit}, where {limit:.3g} is the limit; go slower, or "
-            f"round for longer"
+            f"asks for {what} of {asked:.3g} {unit}, {abs(asked - limit):.2g} beyond the limit of "
+            f"{limit:.3g}; go slower, or round for longer"
         )

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import ctypes
 import gc
+import math
+import os
 import shutil
 import sys
 import threading
@@ -21,6 +23,7 @@ import pytest
 
 from fmus.packaging.loader import compiler
 from fmus.packaging.own import build_own
+from support import states
 from support.kinds import FIXTURES
 from support.raw_fmi import (
     DISCARD,
@@ -201,6 +204,31 @@ def test_folder_without_a_slave_is_null_with_one_message(
     made = python_fmu.instantiate()
     assert made, "the sound one still works"
     python_fmu.FreeInstance(made)
+
+
+@pytest.mark.parametrize(
+    "name", ["slavemodule.txt", "guid.txt", "{script}.py", "__pycache__/{script}.{tag}.pyc"]
+)
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
+def test_resource_that_is_no_file_is_not_waited_for(
+    python_fmu, python_folder, tmp_path, name: str, kind: str
+):
+    """A pipe would be read from for ever, and so would the device."""
+    resources = tmp_path / "resources"
+    shutil.copytree(python_folder / "resources", resources)
+    script = (resources / "slavemodule.txt").read_text()
+    path = resources / name.format(script=script, tag=sys.implementation.cache_tag)
+    path.parent.mkdir(exist_ok=True)
+    path.unlink(missing_ok=True)
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    else:
+        path.mkdir()
+    assert python_fmu.instantiate(location=resources.as_uri().encode(), logging=0) is None
+    [message] = python_fmu.messages
+    assert f"{path} is no regular file" in message.text or kind == "folder"
 
 
 def test_library_beside_the_loader_is_found_where_the_loader_was(
@@ -469,6 +497,81 @@ def test_size_is_that_of_the_state(fmu: RawFmu, component: int, difference: int)
     assert content.raw == bytes(size + 1000)
 
 
+def restore(fmu: RawFmu, component: int, content: bytes) -> list[str]:
+    """What is said of a state."""
+    state, before = c_void_p(), len(fmu.messages)
+    assert fmu.DeSerializeFMUstate(component, content, len(content), state) == OK
+    assert fmu.SetFMUstate(component, state) == OK
+    assert fmu.FreeFMUstate(component, state) == OK
+    return [message.text for message in fmu.messages[before:]]
+
+
+@pytest.fixture
+def said(fmu: RawFmu, component: int) -> dict[str, Any]:
+    """What a state of it says, with a fault."""
+    state = c_void_p()
+    assert fmu.GetFMUstate(component, state) == OK
+    found = states.read(serialised(fmu, component, state))
+    assert found is not None
+    assert fmu.FreeFMUstate(component, state) == OK
+    found["fault"] = True
+    return found
+
+
+def test_state_holds_all_that_can_be_refused(fmu: RawFmu, component: int, folder: Path):
+    """Each port, each call, and what is neither; with the longest reasons."""
+    variables = fmpy.read_model_description(folder).modelVariables
+    bad = restore(fmu, component, b"nothing")
+    assert bad == ["state refused: the bytes are not those of a state"]
+    assert fmu.SetupExperiment(component, 0, 0.0, 0.0, 0, 0.0) in (OK, DISCARD)
+    assert fmu.EnterInitializationMode(component) in (OK, DISCARD)
+    assert fmu.ExitInitializationMode(component) in (OK, DISCARD)
+    assert fmu.Terminate(component) == OK
+    assert fmu.Terminate(component) in (OK, DISCARD)
+    for variable in variables:
+        kind = variable.type
+        values = STRINGS if kind == "String" else REALS if kind == "Real" else INTEGERS
+        getattr(fmu, f"Set{kind}")(component, (c_uint * 1)(variable.valueReference), 1, values)
+    fmu.SetReal(component, (c_uint * 1)(2**31 + 1), 1, REALS)
+    state = c_void_p()
+    assert fmu.GetFMUstate(component, state) == OK
+    content = serialised(fmu, component, state)
+    found = states.read(content)
+    assert found is not None
+    names = found["refused"].keys()
+    assert names == {variable.name for variable in variables} | {
+        "value reference", "fmi2SetupExperiment", "fmi2EnterInitializationMode",
+        "fmi2ExitInitializationMode", "fmi2Terminate", "fmi2SetFMUstate",
+    }  # fmt: skip
+    found["refused"] = dict.fromkeys((*names, "initialisation"), 500 * "\U0001f30a")
+    for one in (content, states.sealed(found)):
+        assert restore(fmu, component, one) == []
+        assert fmu.FreeFMUstate(component, state) == OK
+        assert fmu.GetFMUstate(component, state) == OK
+        assert serialised(fmu, component, state) == one
+
+
+@pytest.mark.parametrize(
+    ("refused", "why"),
+    [
+        ({"k_q": "x"}, "it refused what cannot be refused"),
+        ({"fmi2DoStep": "x"}, "it refused what cannot be refused"),
+        ({"": "x"}, "it refused what cannot be refused"),
+        ({"k_d": "x\0y"}, "what it refused is no text"),
+        ({"k_d": 2001 * "x"}, "what it refused is no text"),
+        ({str(i): "" for i in range(160_000)}, None),
+    ],
+)
+def test_state_with_what_cannot_be_refused_is_refused(fmu, component, said, refused, why):
+    """However much of it there is."""
+    said["refused"] = refused
+    [message] = restore(fmu, component, states.sealed(said))
+    # What is too long for a state, the FMUs in C do not begin to read.
+    known = [why] if why else ["it refused what cannot be refused", "it has other parts"]
+    assert message in [f"state refused: {one}" for one in known]
+    assert steps(fmu, component) == DISCARD
+
+
 # Calls within calls
 
 
@@ -485,6 +588,25 @@ def test_logger_that_calls_back_is_refused(fmu: RawFmu, component: int, capfd):
     assert answers == [ERROR]
     assert "fmi2FreeInstance: called by the logger" in capfd.readouterr().err
     assert fmu.Reset(component) == OK
+
+
+def test_messages_of_a_call_are_told_in_their_order_after_all_is_done(fmu, folder, component):
+    """Also where the logger calls back: the instance is let go, and its values are as they stay."""
+    inputs = [
+        (v.name, v.valueReference)
+        for v in fmpy.read_model_description(folder).modelVariables
+        if v.causality == "input"
+    ][:5]
+    references, values = (c_uint * 5)(*(r for _, r in inputs)), (c_double * 5)(*[math.nan] * 5)
+    answers = []
+    fmu.when_told = lambda: answers.append(steps(fmu, component))
+    assert fmu.SetReal(component, references, 5, values) == OK
+    assert steps(fmu, component) == DISCARD
+    fmu.when_told = lambda: None
+    *refused, blocked = (message.text for message in fmu.messages)
+    assert refused == [f"{name} = nan: must be finite" for name, _ in inputs]
+    assert blocked == f"step refused at t = 0 s: {'; '.join(refused)}"
+    assert answers == [ERROR] * 6
 
 
 def test_threads_on_one_instance_take_turns(fmu: RawFmu, component: int):

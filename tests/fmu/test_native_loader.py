@@ -90,6 +90,14 @@ def test_all_fmus_run_side_by_side_in_a_c_host(dist: Path, tmp_path: Path, with_
 
 
 @needs_libpython
+def test_logger_that_does_not_come_back_leaves_the_instance_to_all_threads(dist, tmp_path):
+    """It leaves by longjmp, as an exception of C++ would, past PythonFMU and Python."""
+    host = compiled_host(tmp_path, *FINDS_LIBPYTHON, name="leaving")
+    process = run(host, *unpacked(dist, tmp_path)[:2])
+    assert (process.stdout, process.returncode) == ("left 52 times\n", 0), process.stderr
+
+
+@needs_libpython
 def test_path_with_special_characters_is_no_trap(dist: Path, tmp_path: Path, with_libpython: Path):
     folder = tmp_path / "größe 100% [ü]"
     process = run(with_libpython, *unpacked(dist, folder))

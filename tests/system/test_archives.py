@@ -13,6 +13,7 @@ from orchestrator.system import unpacking
 from orchestrator.system.component import read_component
 from orchestrator.system.leftovers import process_folder
 from orchestrator.system.ssp.reading import read_ssp
+from support.archives import component, described, system
 
 STRUCTURE, DESCRIPTION = "SystemStructure.ssd", "modelDescription.xml"
 
@@ -145,9 +146,38 @@ def test_bomb_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         ({"zeros": bytes(1_000_000)}, "unpacks to more than 500,000 bytes"),
         (many, "holds 1,000 files, more than 100"),
         ({DESCRIPTION: bytes(2000)}, "is longer than 1,000 bytes"),
+        ({"d/" * 2000 + "x": b""}, r"holds d/…, 2,000 folders deep, more than 100$"),
     ):
         with pytest.raises(InputError, match=why):
             unpacking.unpacked(zipped(tmp_path / "bomb.fmu", content))
+
+
+def test_bombs_in_an_archive_are_one_bomb(dist: Path, tmp_path: Path, monkeypatch):
+    """Each FMU is below the bounds by itself."""
+    fmu = entries(dist / "DisturbanceGenerator.fmu")
+    parts = {}
+    for i in range(20):
+        bomb = zipped(tmp_path / "bomb.fmu", {**fmu, "resources/zeros": bytes(900_000)})
+        parts[f"resources/{i}.fmu"] = bomb.read_bytes()
+    components = "".join(component(f"c{i}", f"resources/{i}.fmu") for i in range(20))
+    content = {STRUCTURE: described(system(components)).encode(), **parts}
+    archive = zipped(tmp_path / "bomb.ssp", content)
+    size = sum(len(part) for part in content.values())
+    monkeypatch.setattr(unpacking, "_MOST_BYTES", size + 5_000_000)
+    before = sum(path.stat().st_size for path in process_folder().rglob("*"))
+    with pytest.raises(InputError) as error:
+        read_ssp(archive)
+    assert re.search(r"c\d: resources/\d\.fmu: cannot be opened: it unpacks to ", str(error.value))
+    assert f"and {archive} with all that is in it to " in str(error.value)
+    after = sum(path.stat().st_size for path in process_folder().rglob("*"))
+    assert after - before <= 2 * size + 5_000_000
+    # Another archive has a bound of its own, and all of them have one.
+    unpacking.unpacked(zipped(tmp_path / "alone.fmu", {"zeros": bytes(size + 4_000_000)}))
+    monkeypatch.setattr(unpacking, "_MOST_OF_A_PROCESS", 1000)
+    with pytest.raises(
+        InputError, match=r"all archives of this process to [\d,]+, more than 1,000"
+    ):
+        unpacking.unpacked(zipped(tmp_path / "more.fmu", {"a": b"x"}))
 
 
 def test_archive_that_cannot_be_unpacked_leaves_nothing(dist: Path, tmp_path: Path):

@@ -140,6 +140,7 @@ def test_view_stands_by_itself_and_is_light(results, capsys):
     text = page.read_text(encoding="utf-8")
     assert len(text) < 8e6
     assert not re.search(r"<(script|link|img)[^>]+(src|href)=", text)
+    assert re.search(r'Content-Security-Policy" content="default-src .none.;', text)
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium")

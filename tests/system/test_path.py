@@ -71,3 +71,19 @@ def test_path_that_the_vehicle_cannot_follow_is_refused_in_one_line(request, kin
     with pytest.raises(InputError, match=r"planner: .*at \(14\.9, .*more tightly than") as error:
         run(sharp, 1.0, 0.02)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("kind", ["dist", "native"])
+def test_path_through_the_vertical_is_refused_in_one_line(request, kind: str):
+    """Its legs climb at 80 degrees, on opposite courses."""
+    system = closed_loop(request.getfixturevalue(kind), read_scenario("path"))
+    places = {"x": (0, 10, 0), "y": (0, 0, 0), "z": (0, 56.7, 113.4)}
+    values = {
+        PortName("planner", f"waypoint[{k}].{axis}"): value
+        for axis, column in places.items()
+        for k, value in enumerate(column, start=1)
+    }
+    steep = system.with_parameters({PortName("planner", "count"): 3, **values})
+    with pytest.raises(InputError, match=r"near waypoint 2, .* dives at 90\.0 degrees") as error:
+        run(steep, 1.0, 0.02)
+    assert "\n" not in str(error.value)

@@ -11,8 +11,8 @@
 #include "listener.c"
 
 #include "text.c"
-#include "messages.c"
 #include "handles.c"
+#include "messages.c"
 #include "noise.c"
 #include "store.c"
 #include "run.c"

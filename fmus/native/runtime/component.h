@@ -36,6 +36,7 @@ typedef struct {
     string kinds[STRING + 1]; /* types of values */
     string token;             /* what tells an FMU from others */
     string terminate;         /* the function that ends a run */
+    string refused[6];        /* the functions that may be refused; NULL after them */
 } names;
 
 static const names version;

@@ -33,23 +33,26 @@ typedef struct {
 } callbacks;
 
 static const names version = {
-    {"Real", "Integer", "Boolean", "String"}, "GUID", "fmi2Terminate"};
+    .kinds = {"Real", "Integer", "Boolean", "String"},
+    .token = "GUID",
+    .terminate = "fmi2Terminate",
+    .refused = {"fmi2SetupExperiment", "fmi2EnterInitializationMode",
+                "fmi2ExitInitializationMode", "fmi2Terminate", "fmi2SetFMUstate"},
+};
+
+#include "component.c"
 
 /* FMI 2.0 defines a message as a format: a host would take a % for a directive. */
 static void deliver(const logger *host, string instance_name, int status, string category,
                     string text) {
-    char *format = malloc(2 * strlen(text) + 1), *end = format;
-    if (format == NULL) return;
+    char format[2 * MOST_TEXT + 1], *end = format;
     for (; *text != '\0'; text++) {
         if (*text == '%') *end++ = '%';
         *end++ = *text;
     }
     *end = '\0';
     ((fmi2_logger)host->function)(host->environment, instance_name, status, category, format);
-    free(format);
 }
-
-#include "component.c"
 
 /* A function that does something unless anything is wrong with its arguments. */
 #define ANSWER(name, when, wrong, parameters, action)                                            \

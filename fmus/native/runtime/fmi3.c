@@ -12,6 +12,8 @@ static const names version = {
     .kinds = {"Float64", "Int32", "Boolean", "String"},
     .token = "instantiation token",
     .terminate = "fmi3Terminate",
+    .refused = {"fmi3EnterInitializationMode", "fmi3ExitInitializationMode", "fmi3Terminate",
+                "fmi3SetFMUState"},
 };
 
 #include "component.c"

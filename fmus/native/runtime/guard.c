@@ -32,14 +32,22 @@ static int sound(call *this, string wrong) {
     return 0;
 }
 
+static APART void end_and_tell(call *this) {
+    if (this->instance->no_memory) {
+        this->instance->no_memory = 0;
+        sound(this, "no memory");
+    }
+    let_go_and_tell(this->entry);
+}
+
 static int end(call *this) {
     instance *it = this->instance;
     if (it == NULL) return this->status;
-    if (it->no_memory) {
-        it->no_memory = 0;
-        sound(this, "no memory");
+    if (it->untold != NULL || it->no_memory) {
+        end_and_tell(this);
+    } else {
+        let_go(this->entry);
     }
-    let_go(this->entry);
     return this->status;
 }
 
@@ -81,6 +89,9 @@ static int can_be_made(string wrong, string name, string token, message *why) {
 }
 
 static void release_instance(instance *it) {
+    message text;
+    int status;
+    while (take_untold(it, &status, &text)) continue;
     release_run(&it->run);
     release_listener(&it->host);
     free(it);
@@ -103,10 +114,12 @@ static void *instantiate(string function, string wrong, string name, string toke
         if (handle == NULL) compose(&why, "no memory");
     }
     if (handle == NULL) {
-        message said;
+        /* Last of all: the logger need not come back. */
+        message said, known_as;
         compose(&said, "%s: %s", function, why.text);
-        tell(it, FMI_ERROR, said.text);
+        compose(&known_as, "%s", it->host.name);
         release_instance(it);
+        tell_host(&host, known_as.text, FMI_ERROR, CATEGORIES[FMI_ERROR], said.text);
     }
     return handle;
 }

@@ -21,13 +21,18 @@ typedef enum { INSTANCE, STATE } thing_kind;
 typedef struct entry entry;
 struct entry {
     shared handle; /* NULL: free */
-    shared thread; /* that holds it; NULL: none */
+    shared thread; /* that holds it; NULL: none; LOGGER: none, and its logger was called */
     size_t place;
     thing_kind kind;
     void *thing;
     entry *owner, *states;  /* of a state; of an instance */
     entry *next, *previous; /* states of the same owner; free entries */
+    void *teller;           /* the thread that has called the logger */
+    uintptr_t depth;        /* of its stack then */
 };
+
+static char logger_place;
+#define LOGGER ((void *)&logger_place)
 
 /* Most processes need no more than the first chunk. Place 0 holds nothing: no handle is NULL. */
 static entry first_chunk[CHUNK_SIZE];
@@ -113,23 +118,48 @@ static int is_alive(entry *it, void *handle) {
     return it != NULL && get_shared(&it->handle) == handle && handle != NULL;
 }
 
+/* Lets the entry of an instance go while its logger is called. */
+static APART void let_go_to_logger(entry *it) {
+    it->teller = this_thread();
+    it->depth = DEPTH();
+    put_shared(&it->thread, LOGGER);
+}
+
+/* Holds an entry whose logger was called, unless the logger calls now, which `inside` tells: the
+ * stack reaches down to it. To one that was left, by longjmp or an exception of C++, it does not. */
+static APART int take_from_logger(entry *it, int *inside) {
+    if (!swap_shared(&it->thread, LOGGER, this_thread())) return 0;
+    *inside = it->teller == this_thread() && DEPTH() < it->depth;
+    if (*inside) put_shared(&it->thread, LOGGER);
+    return !*inside;
+}
+
 /* The entry of a handle, which no other thread holds until it is let go; NULL if there is none, or
- * if this thread holds it already, which `inside` tells. */
+ * if this thread is in a call of it already, which `inside` tells. */
 static entry *hold(void *handle, thing_kind kind, int *inside) {
     size_t place = (uintptr_t)handle & (MOST_ENTRIES - 1);
     entry *chunk = get_shared(&chunks[place >> CHUNK_BITS]);
     entry *it = chunk == NULL ? NULL : &chunk[place & (CHUNK_SIZE - 1)];
     *inside = 0;
     while (is_alive(it, handle)) {
-        if (swap_shared(&it->thread, NULL, this_thread())) {
+        if (swap_shared(&it->thread, NULL, this_thread()) || take_from_logger(it, inside)) {
             if (is_alive(it, handle) && it->kind == kind) return it;
             put_shared(&it->thread, NULL);
             return NULL;
         }
-        *inside = get_shared(&it->thread) == this_thread();
+        *inside |= get_shared(&it->thread) == this_thread();
         if (*inside) return NULL;
         wait_a_moment();
     }
+    return NULL;
+}
+
+/* Holds an entry again after the logger has come back; NULL: it is no more that of the handle. */
+static entry *hold_after_logger(entry *it, void *handle) {
+    int inside;
+    if (!swap_shared(&it->thread, LOGGER, this_thread())) return hold(handle, INSTANCE, &inside);
+    if (is_alive(it, handle)) return it;
+    put_shared(&it->thread, LOGGER);
     return NULL;
 }
 

@@ -30,6 +30,21 @@ typedef struct {
     char **categories; /* that are wanted; none: all */
 } listener;
 
+/* How far the stack reaches down where it is called. */
+#if defined(_MSC_VER)
+#define DEPTH() ((uintptr_t)_AddressOfReturnAddress())
+#define APART __declspec(noinline)
+#else
+#define DEPTH() ((uintptr_t)__builtin_frame_address(0))
+#define APART __attribute__((noinline))
+#endif
+
+/* More stack than lies between two calls of a host that goes on after its logger was left. */
+#define MARGIN(name)                                                                             \
+    volatile char name[1 << 14];                                                                 \
+    name[0] = 0;                                                                                 \
+    (void)name[0]
+
 /* Of the version: calls the logger, which is not NULL. */
 static void deliver(const logger *host, string instance_name, int status, string category,
                     string text);

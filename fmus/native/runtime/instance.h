@@ -1,8 +1,8 @@
 /* What the parts of the component know of each other.
  *
  * text.c       texts of messages, with numbers as Python writes them
- * messages.c   what an instance says
  * handles.c    tells what is alive from what is not
+ * messages.c   what an instance says, and when the host is told
  * noise.c      Python's random numbers
  * store.c      values of ports, and what may be done with them
  * run.c        modes and steps
@@ -117,10 +117,19 @@ typedef struct {
     refusal *refused; /* in order of the first refusal */
 } run;
 
+/* A message that the host has not been told yet. */
+typedef struct untold untold;
+struct untold {
+    untold *next;
+    int status;
+    char text[1];
+};
+
 struct instance {
     listener host;
+    untold *untold; /* in their order */
+    int no_memory;  /* which the end of the call tells */
     int in_error;
-    int no_memory; /* which the end of the call tells */
     run run;
     parameter_values meant; /* the parameters that steps are taken with */
     double longest_step;

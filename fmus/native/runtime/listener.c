@@ -52,13 +52,10 @@ static int wanted(const listener *it, int status, string category) {
     return 0;
 }
 
-/* Tells a text in a category; NULL: that of the status. */
-static void tell_listener(const listener *it, int status, string category, string text) {
-    if (category == NULL) category = CATEGORIES[status];
-    if (!wanted(it, status, category)) return;
-    if (it->host.function == NULL) {
-        fprintf(stderr, "%s: %s: %s\n", it->name, category, text);
+static void tell_host(const logger *host, string name, int status, string category, string text) {
+    if (host->function == NULL) {
+        fprintf(stderr, "%s: %s: %s\n", name, category, text);
     } else {
-        deliver(&it->host, it->name, status, category, text);
+        deliver(host, name, status, category, text);
     }
 }

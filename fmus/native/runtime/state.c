@@ -238,6 +238,7 @@ static int take_refusals(reader *from, run *it, message *why) {
             *find_refusal(it, what) != NULL) {
             return compose(why, "what it refused is no text");
         }
+        if (!can_be_refused(what)) return compose(why, "it refused what cannot be refused");
         if (!note_refusal(it, what, text)) return compose(why, "no memory");
     }
     if (it->refused != NULL && !it->fault) {
@@ -327,9 +328,20 @@ static int can_be_reached(run *it, message *why) {
     return 1;
 }
 
+/* The size of a state in which everything is refused that can be, with the longest reasons. */
+static size_t largest_size(void) {
+    static const size_t LONGEST = 2 * (4 + MOST_TEXT);
+    run it = new_run();
+    writer to = {NULL, CHECKSUM_SIZE + (N_PORTS + 2) * LONGEST};
+    it.begun = 1;
+    put_run(&to, &it);
+    return to.size + sizeof version.refused / sizeof *version.refused * LONGEST;
+}
+
 static int can_be_restored(const saved *state, run *it, message *why) {
     reader from = {.bytes = state->bytes, .left = content_size(state)};
     if (!take_this(&from, MAGIC)) return compose(why, "the bytes are not those of a state");
+    if (state->size > largest_size()) return compose(why, "it has other parts");
     if (state->sealed && !has_its_checksum(state)) {
         return compose(why, "the bytes were changed since they were written");
     }

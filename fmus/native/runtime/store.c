@@ -49,6 +49,18 @@ static void release_run(run *it) {
     }
 }
 
+/* Whether a refusal can be of something. */
+static int can_be_refused(string what) {
+    if (strcmp(what, REFERENCE) == 0 || strcmp(what, INITIALISATION) == 0) return 1;
+    for (int i = 0; version.refused[i] != NULL; i++) {
+        if (strcmp(what, version.refused[i]) == 0) return 1;
+    }
+    for (int i = 0; i < N_PORTS; i++) {
+        if (strcmp(what, ports[i].name) == 0) return 1;
+    }
+    return 0;
+}
+
 /* Raises `fault` and logs. */
 static void report(instance *it, message *said, string key) {
     it->run.fault = 1;

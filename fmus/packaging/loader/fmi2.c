@@ -97,7 +97,14 @@ EXPORT component fmi2Instantiate(string name, int type, string guid, string loca
     free(path);
     if (handle == NULL) {
         if (!it->told) complain(it, FMI_ERROR, "fmi2Instantiate: %s", why);
+        logger host = it->host.host;
+        untold *messages = it->untold;
+        it->untold = NULL;
         release_instance(it);
+        tell_all(host, messages);
+    } else if (it->untold != NULL) {
+        call this = {.instance = it, .handle = handle, .lock = py.PyGILState_Ensure()};
+        give_back_and_tell(&this);
     }
     return handle;
 }

@@ -1,8 +1,8 @@
 /* The instance that the host holds, and what every call begins and ends with.
  *
  * A call holds the global interpreter lock from its beginning to its end, and its instance is
- * marked: a call of the same instance from another thread waits, one from the host's logger is
- * refused.
+ * marked: a call of the same instance from another thread waits, one from the host's logger, which
+ * is told what there is to tell after that, is refused.
  */
 #include <stdarg.h>
 #include <stdio.h>
@@ -34,6 +34,10 @@ instance *new_instance(string name, const callbacks *functions, int logging) {
 }
 
 void release_instance(instance *it) {
+    for (untold *next; it->untold != NULL; it->untold = next) {
+        next = it->untold->next;
+        free(it->untold);
+    }
     release_listener(&it->host);
     free(it);
 }
@@ -50,15 +54,36 @@ static instance *awaited(component handle) {
     return it;
 }
 
+/* Where the logger is called from. */
+static APART void mark_teller(instance *it) {
+    it->telling = 1;
+    it->teller = pthread_self();
+    it->depth = DEPTH();
+}
+
+static int is_teller(const instance *it) {
+    return it->telling && pthread_equal(it->teller, pthread_self());
+}
+
+/* Whether the logger calls, which this thread tells something. One that has been left does not: the
+ * stack does not reach down to it any more. */
+static int is_in_logger(instance *it) {
+    if (!is_teller(it)) return 0;
+    it->telling = DEPTH() < it->depth;
+    return it->telling;
+}
+
 call begin(component handle, string function, when when) {
-    call this = {.function = function, .status = FMI_ERROR};
+    call this = {.function = function, .status = FMI_ERROR, .handle = handle};
     instance *it = NULL;
+    int inside = 0;
     if (python_runs()) {
         this.lock = py.PyGILState_Ensure();
         it = awaited(handle);
-        if (it == NULL || it->busy) py.PyGILState_Release(this.lock);
+        inside = it != NULL && (it->busy || is_in_logger(it));
+        if (it == NULL || inside) py.PyGILState_Release(this.lock);
     }
-    if (it == NULL || it->busy) {
+    if (it == NULL || inside) {
         /* There is nobody else to tell: a logger that calls would do so again. */
         fprintf(stderr, "%s: %s\n", function,
                 it == NULL ? "not a live instance of this FMU" : "called by the logger");
@@ -85,6 +110,24 @@ int refuse(call *this, string wrong) {
 
 int sound(call *this, string wrong) { return wrong == NULL || refuse(this, wrong); }
 
+/* Gives the lock back, and tells the host what there is to tell. */
+void give_back_and_tell(call *this) {
+    instance *it = this->instance;
+    untold *messages = it->untold;
+    logger host = it->host.host;
+    MARGIN(margin);
+    it->untold = NULL;
+    if (messages != NULL) mark_teller(it);
+    py.PyGILState_Release(this->lock);
+    if (messages == NULL) return;
+    tell_all(host, messages);
+    if (!python_runs()) return;
+    this->lock = py.PyGILState_Ensure();
+    /* It may have been freed meanwhile. */
+    if (thing_of(this->handle, INSTANCE) == it && is_teller(it)) it->telling = 0;
+    py.PyGILState_Release(this->lock);
+}
+
 int end(call *this) {
     instance *it = this->instance;
     char why[WHY];
@@ -97,6 +140,6 @@ int end(call *this) {
         if (!it->told) complain(it, FMI_FATAL, "%s: failed for good", this->function);
     }
     it->busy = 0;
-    py.PyGILState_Release(this->lock);
+    give_back_and_tell(this);
     return this->status;
 }

@@ -105,21 +105,37 @@ void replace(void *handle, void *thing, void *owner);
 void drop(void *handle);
 void *state_of(void *owner);
 
+/* messages.c */
+
+/* A message that the host has not been told yet. */
+typedef struct untold untold;
+struct untold {
+    untold *next;
+    int status;
+    char *category, *text; /* behind the name of the instance */
+    char name[1];
+};
+
 /* guard.c */
 
 typedef struct {
     listener host;
+    untold *untold; /* in their order */
     int told;        /* whether the host has got a message of an error */
     callbacks heard; /* what PythonFMU gets for callbacks */
     component slave; /* PythonFMU's own instance */
     enum { SOUND, IN_ERROR, LOST } condition;
     int busy;
     pthread_t thread; /* that is in a call */
+    int telling;
+    pthread_t teller; /* that calls the host's logger last, if it is telling */
+    uintptr_t depth;  /* of its stack then */
 } instance;
 
 /* A call between its beginning and its end. */
 typedef struct {
     instance *instance; /* NULL: there is none, and no lock to give back */
+    component handle;
     string function;
     int status;
     int lock;
@@ -136,11 +152,11 @@ void release_instance(instance *it);
 call begin(component handle, string function, when when);
 int sound(call *this, string wrong);
 int refuse(call *this, string wrong);
+void give_back_and_tell(call *this);
 int end(call *this);
 
-/* messages.c */
-
 void tell(instance *it, int status, string category, string text);
+void tell_all(logger host, untold *messages);
 void complain(instance *it, int status, string format, ...)
     __attribute__((format(printf, 3, 4)));
 

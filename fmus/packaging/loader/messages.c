@@ -1,4 +1,8 @@
-/* What the host is told.
+/* What the host is told, and when.
+ *
+ * Its logger need not come back: it may leave by longjmp, or by an exception of C++, and take what
+ * lies between with it, Python included. So it is called at the end of a call, when all is done and
+ * the instance and the interpreter lock are given back.
  *
  * The host's logger takes a message for a format, PythonFMU hands on text: a percent sign that
  * stands alone is doubled.
@@ -37,7 +41,28 @@ void tell(instance *it, int status, string category, string text) {
     if (text == NULL) return;
     if (category == NULL || category[0] == '\0') category = CATEGORIES[known ? status : FMI_OK];
     if (status >= FMI_ERROR) it->told = 1;
-    tell_listener(&it->host, status, category, text);
+    if (!wanted(&it->host, status, category)) return;
+    size_t name_size = strlen(it->host.name) + 1, category_size = strlen(category) + 1;
+    untold **place = &it->untold,
+           *noted = malloc(sizeof *noted + name_size + category_size + strlen(text));
+    if (noted == NULL) return;
+    *noted = (untold){.status = status};
+    noted->category = noted->name + name_size;
+    noted->text = noted->category + category_size;
+    strcpy(noted->name, it->host.name);
+    strcpy(noted->category, category);
+    strcpy(noted->text, text);
+    while (*place != NULL) place = &(*place)->next;
+    *place = noted;
+}
+
+/* Tells the host messages of an instance, which it may free meanwhile. */
+void tell_all(logger host, untold *messages) {
+    for (untold *next; messages != NULL; messages = next) {
+        next = messages->next;
+        tell_host(&host, messages->name, messages->status, messages->category, messages->text);
+        free(messages);
+    }
 }
 
 void complain(instance *it, int status, string format, ...) {

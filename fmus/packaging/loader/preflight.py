@@ -6,8 +6,9 @@ compiled into it, before it forwards fmi2Instantiate. It must need nothing but P
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import os
+import stat
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -64,17 +65,21 @@ def _check(resources: str, guid: str) -> None:
 def _stamps(files: list[str]) -> list[tuple[int, int, int]]:
     """What changes when files do."""
     found = map(os.stat, files)
-    return [(stat.st_ino, stat.st_size, stat.st_mtime_ns) for stat in found]
+    return [(it.st_ino, it.st_size, it.st_mtime_ns) for it in found]
 
 
 def _examined(resources: str) -> _Sound:
     names = Path(resources, "slavemodule.txt")
-    script = names.read_text(encoding="utf-8")
+    script = _content(names).decode("utf-8")
     if not script.isidentifier():
         raise ValueError(f"{names} names no module")
     path, own_guid = Path(resources, f"{script}.py"), Path(resources, "guid.txt")
     files = [str(names), str(path), str(own_guid)]
-    stamps, text = _stamps(files), path.read_bytes()
+    stamps, text, guid = _stamps(files), _content(path), _content(own_guid).decode("utf-8")
+    # An import reads what was compiled before, if it is there.
+    cached = Path(importlib.util.cache_from_source(str(path)))
+    if cached.exists() and not cached.is_file():
+        raise ValueError(f"{cached} is no regular file")
     # It tells what is wrong with a text, where an import may find the bytes of an older one.
     compile(text, path, "exec")
     module = _imported(script, resources)
@@ -84,7 +89,16 @@ def _examined(resources: str) -> _Sound:
         setattr(module, _TEXT, text)
     if vars(module).get(_TEXT) != text:
         raise ValueError(f"another module {script} is loaded in this process")
-    return _Sound(script, own_guid.read_text(encoding="utf-8"), files, stamps)
+    return _Sound(script, guid, files, stamps)
+
+
+def _content(path: Path) -> bytes:
+    """What is in a file; from a pipe or device a read may never come back."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    with os.fdopen(descriptor, "rb") as file:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise ValueError(f"{path} is no regular file")
+        return file.read()
 
 
 def _imported(script: str, resources: str) -> ModuleType:

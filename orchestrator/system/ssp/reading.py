@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -11,7 +12,7 @@ from orchestrator.findings import Findings
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.archive import Archive, listed
-from orchestrator.system.ssp.bindings import Bindings, Given, Values
+from orchestrator.system.ssp.bindings import Bindings, Values
 from orchestrator.system.ssp.building import Builder
 from orchestrator.system.ssp.definitions import definitions_of
 from orchestrator.system.ssp.experiment import step_of, times_of
@@ -19,6 +20,7 @@ from orchestrator.system.ssp.hierarchy import Leaf, Node, Way
 from orchestrator.system.ssp.wires import Course, Wires
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.transformation import Transformation, chained
+from orchestrator.system.units import Unit
 from orchestrator.system.values import BOOLEANS, Value, real, typed
 
 _ROOT = "SystemStructureDescription"
@@ -82,6 +84,24 @@ def _read(archive: Archive, root: Element) -> System:
     return system
 
 
+@dataclass(frozen=True)
+class _Arrival:
+    """What is known of a value at a node.
+
+    Attributes:
+        start: where it sets out: at a component's port, or where it is given; None: there is none.
+        whole: what has happened to it since.
+        unit: that it has.
+        error: why it cannot come so far.
+
+    """
+
+    start: Node | None
+    whole: Transformation | None = None
+    unit: Unit | None = None
+    error: InputError | None = None
+
+
 class _Ports:
     """What feeds and what sets the ports of components.
 
@@ -99,59 +119,87 @@ class _Ports:
         self.parameters: dict[PortName, Value] = {}
         self._archive, self._leaves, self._given = archive, leaves, given
         self._used: set[Node] = set()
+        self._arrivals: dict[Node, _Arrival] = {}
         for node in dict.fromkeys((*wires.targets(), *given)):
             leaf = leaves.get(node.way)
             if leaf is not None and leaf.component is not None:
                 port = PortName(leaf.component.name, node.port)
                 try:
-                    self._follow(port, wires.course(node), leaf)
+                    self._enter(port, wires.course(node), leaf)
                 except InputError as error:
                     archive.problem(error)
         lost = [str(node) for node in given if node not in self._used]
         if lost:
             archive.note(f"values that are given to {listed(lost)} reach no component")
 
-    def _follow(self, port: PortName, course: Course, leaf: Leaf) -> None:
+    def _enter(self, port: PortName, course: Course, leaf: Leaf) -> None:
         """Enter what arrives at a port: another's value, or the outermost that is given."""
-        origin = self._leaves.get(course.nodes[0].way) if course.wires else None
-        if origin is not None:
-            self._used.update(course.nodes[1:])
-            self._feed(port, course, origin)
+        origin = self._leaves.get(course.origin.way) if course.wire else None
+        arrival = self._arrival(course) if course.wire else self._given_to(course.node)
+        if origin is None:
+            self._set(port, leaf, arrival)
+        elif origin.component is not None:
+            source = PortName(origin.component.name, course.origin.port)
+            if arrival.error is not None:
+                raise InputError(f"{source} -> {port}: {arrival.error}")
+            self.connections.append(Connection(source, port, arrival.whole))
+
+    def _arrival(self, course: Course) -> _Arrival:
+        """What is known of a value at the end of a course, of which each wire is looked at once."""
+        ahead: list[Course] = []
+        at: Course | None = course
+        while at is not None and at.node not in self._arrivals:
+            ahead.append(at)
+            at = at.before
+        for one in reversed(ahead):
+            self._arrivals[one.node] = self._arrival_by(one)
+        return self._arrivals[course.node]
+
+    def _arrival_by(self, course: Course) -> _Arrival:
+        """The same, where it is known of the course before."""
+        origin = self._leaves.get(course.origin.way)
+        if course.before is None or course.wire is None:
+            if origin is None:
+                return self._given_to(course.node)
+            connector = None if origin.component is None else origin.connector(course.node.port)
+            return _Arrival(course.node, unit=connector.unit if connector else None)
+        before = self._arrivals[course.before.node]
+        if before.start is None:
+            return self._given_to(course.node)
+        self._used.add(course.node)
+        if origin is not None and course.node in self._given:
+            self._archive.note(
+                f"{course.node}: is fed by {course.origin}, and the value that is given to it has "
+                "no effect"
+            )
+        if before.error is not None or (origin is not None and origin.component is None):
+            return before
+        try:
+            whole, unit = course.wire.carry(self._archive, before.whole, before.unit)
+        except InputError as error:
+            return _Arrival(before.start, error=error)
+        return _Arrival(before.start, whole, unit)
+
+    def _given_to(self, node: Node) -> _Arrival:
+        """A node that no value has come to before: there begins the one that is given to it."""
+        self._used.add(node)
+        if node not in self._given:
+            return _Arrival(None)
+        given, connector = self._given[node]
+        return _Arrival(node, unit=connector.unit or given.unit)
+
+    def _set(self, port: PortName, leaf: Leaf, arrival: _Arrival) -> None:
+        """Give a port the value that arrives, if any does."""
+        if arrival.start is None:
             return
-        self._used.update(course.nodes)
-        for i, node in enumerate(course.nodes):
-            if node in self._given:
-                given, connector = self._given[node]
-                unit = connector.unit or given.unit
-                try:
-                    whole = chained(
-                        given.transformation(self._archive, connector),
-                        course.transformation(unit, i),
-                    )
-                except InputError as error:
-                    raise InputError(f"{node}: {error}") from None
-                self._set(port, leaf, given, whole)
-                return
-
-    def _feed(self, port: PortName, course: Course, origin: Leaf) -> None:
-        """Connect a port to another component."""
-        for node in course.nodes[1:]:
-            if node in self._given:
-                self._archive.note(
-                    f"{node}: is fed by {course.nodes[0]}, and the value that is given to it has "
-                    "no effect"
-                )
-        if origin.component is not None:
-            source = PortName(origin.component.name, course.nodes[0].port)
-            connector = origin.connector(source.port)
-            try:
-                whole = course.transformation(connector.unit if connector else None)
-            except InputError as error:
-                raise InputError(f"{source} -> {port}: {error}") from None
-            self.connections.append(Connection(source, port, whole))
-
-    def _set(self, port: PortName, leaf: Leaf, given: Given, whole: Transformation | None) -> None:
-        """Give a port its value."""
+        given, target = self._given[arrival.start]
+        try:
+            whole = given.transformation(self._archive, target)
+            if arrival.error is not None:
+                raise arrival.error
+            whole = chained(whole, arrival.whole)
+        except InputError as error:
+            raise InputError(f"{arrival.start}: {error}") from None
         component, connector = leaf.component, leaf.connector(port.port)
         if component is None or connector is None:
             return

@@ -34,45 +34,47 @@ class Wire:
     stated: Transformation | None
     converts: bool
 
-
-@dataclass(frozen=True)
-class Course:
-    """How a value comes to a port of a component.
-
-    Attributes:
-        archive: whose connections it takes.
-        nodes: through which it comes, from its origin on, the port included.
-        wires: between them.
-
-    """
-
-    archive: Archive
-    nodes: tuple[Node, ...]
-    wires: tuple[Wire, ...]
-
-    def transformation(self, unit: Unit | None, first: int = 0) -> Transformation | None:
-        """What happens to a value on its way to the port.
+    def carry(
+        self, archive: Archive, whole: Transformation | None, unit: Unit | None
+    ) -> tuple[Transformation | None, Unit | None]:
+        """What has happened to a value at the wire's end, and the unit that it has there.
 
         Args:
-            unit: in which it sets out.
-            first: number of the node where it does.
+            archive: whose connection it is.
+            whole: what has happened to it before.
+            unit: in which it comes.
 
         Raises:
             InputError: units do not fit, or transformations cannot follow each other.
 
         """
-        whole: Transformation | None = None
-        for wire in self.wires[first:]:
-            step = wire.stated
-            if wire.converts:
-                step = chained(self.archive.conversion(unit, wire.unit), step)
-                # What a transformation makes of a value is in the target's unit, or unknown.
-                unit = wire.unit or (unit if wire.stated is None else None)
-            else:
-                # Said even where it changes nothing: the units at its ends may differ.
-                step, unit = step or Linear(), wire.unit
-            whole = chained(whole, step)
-        return whole
+        step = self.stated
+        if self.converts:
+            step = chained(archive.conversion(unit, self.unit), step)
+            # What a transformation makes of a value is in the target's unit, or unknown.
+            unit = self.unit or (unit if self.stated is None else None)
+        else:
+            # Said even where it changes nothing: the units at its ends may differ.
+            step, unit = step or Linear(), self.unit
+        return chained(whole, step), unit
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """How a value comes to a node; courses share what they have in common.
+
+    Attributes:
+        node: where it comes to.
+        origin: where it comes from: the node itself, if nothing feeds that.
+        before: how it comes to the end of the last wire; None: nothing feeds the node.
+        wire: the last one.
+
+    """
+
+    node: Node
+    origin: Node
+    before: Course | None = None
+    wire: Wire | None = None
 
 
 class Wires:
@@ -82,6 +84,8 @@ class Wires:
         """Read them; what is wrong with them becomes problems of the archive."""
         self._archive = archive
         self._wires: dict[Node, Wire] = {}
+        self._courses: dict[Node, Course] = {}
+        self._circling: set[Node] = set()
         self._read(top)
 
     def targets(self) -> Iterator[Node]:
@@ -95,14 +99,19 @@ class Wires:
             InputError: its connections lead in a circle.
 
         """
-        nodes: list[Node] = [node]
-        wires: list[Wire] = []
-        while (wire := self._wires.get(nodes[0])) is not None:
-            if wire.source in nodes:
+        # What another port has been followed through is known: all of them take linear time.
+        upstream: dict[Node, Wire] = {}
+        at = node
+        while at not in self._courses and (wire := self._wires.get(at)) is not None:
+            if at in upstream or wire.source in self._circling:
+                self._circling.update(upstream, [at])
                 raise InputError(f"{node}: the connections that feed it lead in a circle")
-            nodes.insert(0, wire.source)
-            wires.insert(0, wire)
-        return Course(self._archive, tuple(nodes), tuple(wires))
+            upstream[at] = wire
+            at = wire.source
+        course = self._courses.setdefault(at, Course(at, at))
+        for target, wire in reversed(upstream.items()):
+            course = self._courses[target] = Course(target, course.origin, course, wire)
+        return course
 
     def _read(self, group: Group) -> None:
         for connection in group.content.findall("Connections/Connection"):

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable
 from io import BytesIO
 from pathlib import Path
 from xml.etree import ElementTree
 from zipfile import ZipFile, ZipInfo
 
 from orchestrator.system.component import Component
-from orchestrator.system.names import file_name
+from orchestrator.system.names import file_name, plain
 from orchestrator.system.ssp import OSP, SSC, SSD, SSV, STRUCTURE
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.transformation import Linear, Mapped
@@ -49,25 +47,14 @@ def ssp_bytes(system: System) -> bytes:
 
 def _sources(system: System) -> dict[Path, str]:
     """Where the archive has each FMU."""
-    fmus = sorted({component.fmu for component in system.components.values()})
-    names = _distinct(fmu.name for fmu in fmus)
-    return {fmu: f"resources/{name}" for fmu, name in zip(fmus, names, strict=True)}
+    return {fmu: f"resources/{name}" for fmu, name in system.fmus().items()}
 
 
 def _parameter_sources(system: System) -> dict[str, str]:
     """Where the archive has the parameter set of each component that has one."""
     having = [name for name in system.components if system.parameters_of(name)]
-    names = _distinct(f"{name}.ssv" for name in having)
+    names = plain(f"{name}.ssv" for name in having)
     return {name: f"parameters/{file}" for name, file in zip(having, names, strict=True)}
-
-
-def _distinct(names: Iterable[str]) -> list[str]:
-    """Names of files that need no encoding in a URI, of which some hosts know nothing."""
-    found: list[str] = []
-    for name in names:
-        plain = re.sub(r"[^\w.-]", "_", name, flags=re.ASCII)
-        found.append(f"{len(found)}_{plain}" if plain in found else plain)
-    return found
 
 
 def parameter_set_xml(system: System, component: Component) -> bytes:

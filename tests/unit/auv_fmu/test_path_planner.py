@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from math import cos, hypot, pi, sin, sqrt
+from math import atan2, cos, hypot, pi, radians, sin, sqrt, tan
 
 import numpy as np
 import pytest
@@ -178,11 +178,14 @@ def test_climb_is_held_against_the_righting_moment():
 
 CORNER = path((0, 0, 0), (20, 0, 0), (20, 20, 0))
 
+#: After a climb at 80 degrees.
+UP_80 = (10, 0, 10 * tan(radians(80.0)))
+
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"waypoints": CORNER, "speed_max": 0.4}, r"near waypoint 1, .* a speed of 0\.4.* 0.4 is"),
+        ({"waypoints": CORNER, "speed_max": 0.4}, r"near waypoint 1, .* a speed of 0\.4.* 0\.4;"),
         ({"waypoints": CORNER, "turn_max": 0.4}, r"near waypoint 2, at \(19.* a turn of 0\.4"),
         ({"waypoints": path((0, 0, 0), (20, 0, 0), rounding=0.2)}, "waypoint 1.* driving force of"),
         ({"waypoints": CORNER._replace(rounding=1.0)}, r"at \(19\..*more tightly than .* 0.35 m"),
@@ -198,12 +201,88 @@ CORNER = path((0, 0, 0), (20, 0, 0), (20, 20, 0))
             "waypoint 2 is to be passed at t = 3 s, and the one before it at 3 s",
         ),
         ({"waypoints": path((1, 1, 1), (1, 1, 1), t=(3.0, 9.0))}, "there is no way to go"),
+        (
+            {"waypoints": path((0, 0, 0), UP_80, (0, 0, 20 * tan(radians(80.0))))},
+            r"near waypoint 2, at \(9\.9, 0, 56\.7\) m, the path climbs or dives at 90\.0 degrees, "
+            "5 beyond the limit of 85",
+        ),
+        (
+            {"waypoints": path((0, 0, 0), UP_80, (0, 1, 110), t=(9.0, 159.0, 309.0))},
+            r"near waypoint 2, .* climbs or dives at 89\.\d degrees, 4\.\d+ beyond",
+        ),
+        ({"speed_max": 0.49999999}, r"a speed of 0\.5 m/s, 1e-08 beyond the limit of 0\.5; go"),
         ({"vehicle": Vehicle(d33=0.0)}, "d22 and d33 must be positive"),
     ],
 )  # fmt: skip
 def test_path_that_cannot_be_followed_is_refused_where_it_cannot(changes, message):
     with pytest.raises(ImpossiblePath, match=message):
         check(Parameters(**changes))
+
+
+def pitches(waypoints: Waypoints, between: int) -> list[float]:
+    """At so many moments of each rounding, how steeply the path climbs or dives [rad]."""
+    corners = [path_planner.first_corner(waypoints, 0.0)]
+    while corners[-1].k < waypoints.n:
+        corners.append(path_planner.next_corner(waypoints, corners[-1]))
+    shares = np.linspace(-0.5, 0.5, between)
+    moments = [c.t + waypoints.rounding * a for c in corners[:-1] for a in shares]
+    velocities = [at(waypoints, t).dy_d for t in moments]
+    # Slower than that, its direction is that of rounding errors.
+    return [atan2(abs(z), hypot(x, y)) for x, y, z in velocities if hypot(x, y, z) > 1e-6]
+
+
+def is_too_steep(waypoints: Waypoints) -> bool:
+    try:
+        path_planner._check_pitch(waypoints)
+    except ImpossiblePath:
+        return True
+    return False
+
+
+@st.composite
+def steep(draw) -> Waypoints:
+    """A path of legs that are let pass, steep ones among them."""
+    points = [(0.0, 0.0, 0.0)]
+    for _ in range(draw(st.integers(1, 5))):
+        length, turn = draw(st.floats(0.1, 30.0)), draw(st.floats(0.0, 2 * pi))
+        climb = radians(draw(st.floats(70.0, 85.0)) * draw(st.sampled_from([1.0, -1.0, 0.1])))
+        leg = (cos(climb) * cos(turn), cos(climb) * sin(turn), sin(climb))
+        points.append(tuple(p + length * e for p, e in zip(points[-1], leg, strict=True)))
+    gaps = draw(st.lists(st.floats(0.1, 30.0), min_size=len(points), max_size=len(points)))
+    times = np.cumsum(gaps).tolist() if draw(st.booleans()) else None
+    return path(*points, t=times, rounding=draw(st.floats(0.3, 30.0)))
+
+
+@given(steep())
+def test_pitch_of_what_is_let_pass_is_nowhere_beyond_its_limit(waypoints):
+    """Also where roundings overlap."""
+    steepest = max(pitches(waypoints, 200))
+    assert is_too_steep(waypoints) or steepest <= motion_planner.STEEPEST + 1e-9
+
+
+@given(one=st.floats(60.0, 84.99), other=st.floats(60.0, 84.99), turn=st.floats(0.0, 180.0))
+def test_pitch_of_one_corner_is_refused_where_the_closest_pass_by_the_vertical_is_beyond(
+    one, other, turn
+):
+    """Velocities in a rounding lie on the straight line from one to the other."""
+    legs = [
+        np.array([cos(climb) * cos(psi), cos(climb) * sin(psi), sin(climb)])
+        for climb, psi in ((radians(one), 0.0), (radians(other), radians(turn)))
+    ]
+    points = [np.zeros(3), 40 * legs[0], 40 * (legs[0] + legs[1])]
+    shares = np.linspace(0.0, 1.0, 2001)[:, None]
+    x, y, z = ((1 - shares) * legs[0] + shares * legs[1]).T
+    steepest = float(np.max(np.arctan2(z, np.hypot(x, y))))
+    assume(abs(steepest - motion_planner.STEEPEST) > 1e-3)
+    assert is_too_steep(path(*map(tuple, points))) == (steepest > motion_planner.STEEPEST)
+
+
+def test_path_at_the_steepest_is_let_pass():
+    slope = tan(motion_planner.STEEPEST) * (1.0 - 1e-15)
+    for times in (None, (9.0, 99.0, 299.0)):
+        waypoints = path((0, 0, 0), (1, 0, slope), (3, 0, 3 * slope), t=times)
+        assert not is_too_steep(waypoints)
+        assert max(pitches(waypoints, 33)) == pytest.approx(motion_planner.STEEPEST, rel=1e-9)
 
 
 def test_rest_between_two_ways_is_no_turn_on_the_spot():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from xml.etree import ElementTree
 from zipfile import ZipFile
 
 import pytest
@@ -10,7 +11,9 @@ from fmpy.ssp.ssd import read_ssd, read_ssv
 
 from orchestrator.errors import InputError
 from orchestrator.findings import Findings
+from orchestrator.system.component import read_component
 from orchestrator.system.container import write_container
+from orchestrator.system.names import plain
 from orchestrator.system.osp import write_osp
 from orchestrator.system.ssp.reading import read_ssp
 from orchestrator.system.ssp.writing import write_ssp
@@ -97,3 +100,33 @@ def test_formats_without_words_for_a_transformation_refuse_it(found: System, tmp
     for write in (write_osp, write_container):
         with pytest.raises(InputError, match="write an SSP"):
             write(found, tmp_path)
+
+
+def test_fmus_of_one_name_stay_apart(tmp_path: Path):
+    """Also where names differ in case only, or one is that of the format's own file."""
+    names = ("a/M.fmu", "b/M.fmu", "b/m.fmu", "c/2_M.fmu", "c/OspSystemStructure.xml")
+    components = {}
+    for i, name in enumerate(names):
+        file = tmp_path / name
+        file.parent.mkdir(exist_ok=True)
+        components[f"c{i}"] = read_component(f"c{i}", fmu(file, variable(f"y{i}", "output")))
+    given = System("s", components, (), step=0.1)
+    contents = {name: part.fmu.read_bytes() for name, part in components.items()}
+
+    structure, *files = write_osp(given, tmp_path)
+    root = ElementTree.parse(structure).getroot()
+    sources = {s.get("name"): s.get("source", "") for s in root.iterfind(".//{*}Simulator")}
+    assert {name: (tmp_path / file).read_bytes() for name, file in sources.items()} == contents
+    assert len({file.name.lower() for file in (structure, *files)}) == 1 + len(names)
+
+    again = read_ssp(write_ssp(given, tmp_path)[0])
+    assert {name: part.fmu.read_bytes() for name, part in again.components.items()} == contents
+
+
+def test_plain_names_are_distinct_and_kept_where_they_can_be():
+    assert plain(["M.fmu", "m.fmu", "2_M.fmu", "M.fmu"]) == [
+        "M.fmu", "1_m.fmu", "2_M.fmu", "3_M.fmu",
+    ]  # fmt: skip
+    assert plain(["2_M.fmu", "M.fmu", "M.fmu", "ä b", "x"], "X") == [
+        "2_M.fmu", "M.fmu", "3_M.fmu", "__b", "4_x",
+    ]  # fmt: skip
