@@ -13,6 +13,8 @@ module                  what it holds
 :mod:`.graph`           what depends on what: feedthrough, and what reaches a component
 :mod:`.atomic`          files that appear whole or not at all
 :mod:`.leftovers`       what only one process may have, and what it leaves when it is killed
+:mod:`.cache`           what is made once and kept in the user's cache folder
+:mod:`.imports`         modules that would read a file of the current folder
 :mod:`.children`        modules run in processes that do not outlive this one
 :mod:`.unpacking`       archives unpacked, once a process and version
 :mod:`.ssp`             systems as SSP 1.0 archives, read and written
