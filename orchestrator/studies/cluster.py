@@ -20,13 +20,24 @@ from typing import Any
 
 from dask import config
 from dask.system import CPU_COUNT
-from distributed import Client, Future, KilledWorker, LocalCluster, WorkerPlugin, get_worker
+from distributed import (
+    Client,
+    Future,
+    KilledWorker,
+    Nanny,
+    Security,
+    SpecCluster,
+    WorkerPlugin,
+    get_worker,
+)
 from distributed.utils import silence_logging_cmgr
 
 from auv_fmu import __version__
 from orchestrator.errors import InputError, reason
 from orchestrator.master.interrupts import without_interrupt
 from orchestrator.studies.engine import Engine, Outcome, Run
+from orchestrator.studies.sockets import PROTOCOL, LocalScheduler, LocalWorker, host_of
+from orchestrator.system import cache
 from orchestrator.system.leftovers import process_folder
 
 #: How long a block shall take [s]: long beside the millisecond that a task costs, short for who
@@ -49,9 +60,6 @@ _GLANCE, _PATIENCE = 2.0, 120.0
 
 #: How long a process of this machine has to leave when the study is broken off [s].
 _FAREWELL = 0.5
-
-#: Where a server of this machine listens: for this machine alone, and at a port that is free.
-_LOOPBACK = "127.0.0.1:0"
 
 #: What is said of a run that no worker has survived.
 FATAL = "every process that made it died"
@@ -115,16 +123,25 @@ def _local(workers: int | None) -> Iterator[Client]:
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers}: must be at least 1")
     folder = str(process_folder())
+    place = {
+        "protocol": PROTOCOL,
+        "host": host_of(process_folder()),
+        "security": Security(require_encryption=False),
+    }
+    options = {
+        "worker_class": LocalWorker,
+        "nthreads": 1,
+        "memory_limit": 0,
+        "silence_logs": CRITICAL,
+        "env": {"TMPDIR": folder} | cache.environment(),
+    }
+    worker = {"cls": Nanny, "options": place | options}
     try:
         with without_interrupt(), config.set({"temporary-directory": folder}):
-            cluster = LocalCluster(
-                n_workers=workers or CPU_COUNT,
-                threads_per_worker=1,
-                dashboard_address=_LOOPBACK,
-                scheduler_kwargs={"dashboard": False},
-                memory_limit=0,
+            cluster = SpecCluster(
+                scheduler={"cls": LocalScheduler, "options": place | {"dashboard": False}},
+                workers=dict.fromkeys(range(workers or CPU_COUNT), worker),
                 silence_logs=CRITICAL,
-                env={"TMPDIR": folder},
             )
             client = Client(cluster, set_as_default=False)
     except (OSError, RuntimeError) as error:
@@ -140,7 +157,7 @@ def _local(workers: int | None) -> Iterator[Client]:
             raise
 
 
-def _end(cluster: LocalCluster) -> None:
+def _end(cluster: SpecCluster) -> None:
     """End processes whatever they do: what they have begun nobody wants any more."""
     for nanny in cluster.workers.values():
         with suppress(OSError, TimeoutError):

@@ -55,6 +55,12 @@ def kept(kind: str, key: str) -> dict[Path, bytes]:
     return {}
 
 
+def environment() -> dict[str, str]:
+    """What the environment of processes shall have that work for this one."""
+    root = _root(_DIGESTS)
+    return {} if root == users_folder() else {"XDG_CACHE_HOME": str(root.parent)}
+
+
 def folder_of(kind: str) -> Path:
     """The folder of a kind, made if it is not there.
 
