@@ -6,20 +6,23 @@ whose worker is lost is made again by another worker.
 
 from __future__ import annotations
 
+import asyncio
 import os
 import pickle
+import re
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
 from logging import CRITICAL
 from queue import Empty, SimpleQueue
-from threading import Lock
+from threading import Lock, Thread
 from time import monotonic
 from typing import Any
 
 from dask import config
 from dask.system import CPU_COUNT
+from dask.utils import parse_timedelta
 from distributed import (
     Client,
     Future,
@@ -30,6 +33,7 @@ from distributed import (
     WorkerPlugin,
     get_worker,
 )
+from distributed.comm import connect, get_address_host_port
 from distributed.utils import silence_logging_cmgr
 
 from auv_fmu import __version__
@@ -60,6 +64,9 @@ _GLANCE, _PATIENCE = 2.0, 120.0
 
 #: How long a process of this machine has to leave when the study is broken off [s].
 _FAREWELL = 0.5
+
+#: How the addresses of schedulers begin that ask for certificates.
+_ENCRYPTED = ("tls://", "wss://")
 
 #: What is said of a run that no worker has survived.
 FATAL = "every process that made it died"
@@ -111,11 +118,46 @@ def _remote(address: str, workers: int | None) -> Iterator[Client]:
             "--workers is for processes of this machine: those of a scheduler are started with it"
         )
     try:
+        host, port = get_address_host_port(address)
+        if not re.fullmatch(r"[^\s/]+", host) or not 0 < port < 2**16:
+            raise ValueError("that is no host, or no port")
+    except (ValueError, NotImplementedError) as error:
+        raise InputError(
+            f"{address!r} is no scheduler: {reason(error)}; it is given as tcp://HOST:PORT"
+        ) from error
+    # A client that cannot connect would wait for a minute to be closed.
+    if failure := _failure_to_connect(address):
+        raise InputError(f"no scheduler answers at {address}: {reason(failure)}") from failure
+    try:
         client = Client(address, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(f"no scheduler answers at {address}: {reason(error)}") from error
     with client:
         yield client
+
+
+def _failure_to_connect(address: str) -> Exception | None:
+    """Why there is no connection to a scheduler; None: there is."""
+    errors: SimpleQueue[Exception | None] = SimpleQueue()
+
+    async def connected() -> None:
+        seconds = parse_timedelta(config.get("distributed.comm.timeouts.connect"))
+        secrets = Security().get_connection_args("client")
+        if address.startswith(_ENCRYPTED) and secrets["ssl_context"] is None:
+            raise ValueError("name certificates in Dask's configuration, distributed.comm.tls")
+        # Who answers need not be a scheduler, and may say nothing.
+        comm = await asyncio.wait_for(connect(address, seconds, **secrets), 2 * seconds)
+        comm.abort()
+
+    def tried() -> None:
+        try:
+            errors.put(asyncio.run(connected()))
+        except Exception as error:
+            errors.put(error)
+
+    # Where this is called, a loop may be running.
+    Thread(target=tried, daemon=True).start()
+    return errors.get()
 
 
 @contextmanager
