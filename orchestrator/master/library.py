@@ -61,10 +61,6 @@ def made(in_no_time: bool = False) -> CDLL:
         )
     try:
         return _made(compiler)
-    except TimeoutExpired as error:
-        raise InputError(
-            f"the loop cannot be compiled: the C compiler has not ended after {error.timeout:g} s"
-        ) from error
     except OSError as error:
         raise InputError(f"the loop cannot be compiled: {reason(error)}") from error
 
@@ -89,8 +85,7 @@ def run_compiler(command: Sequence[str]) -> CompletedProcess[str]:
     """Run a C compiler, and end it with all that it has started if it takes too long.
 
     Raises:
-        TimeoutExpired: it does.
-        OSError: it cannot be started.
+        OSError: it does, or it cannot be started.
 
     """
     # Ctrl-C is for this process alone.
@@ -99,10 +94,12 @@ def run_compiler(command: Sequence[str]) -> CompletedProcess[str]:
     ) as process:
         try:
             said, complaints = process.communicate(timeout=_LIMIT)
-        except BaseException:
+        except BaseException as error:
             if os.name == "posix":
                 os.killpg(process.pid, signal.SIGKILL)
             process.kill()
+            if isinstance(error, TimeoutExpired):
+                raise TimeoutError(f"{command[0]} has not ended after {_LIMIT:g} s") from None
             raise
     return CompletedProcess(command, process.returncode, said, complaints)
 
