@@ -113,7 +113,7 @@ def _files(folder: Path, record: Path) -> dict[Path, bytes]:
         if not _keeps_others_out((folder / name).lstat(), above=False):
             return {}
         found = {folder / name / file: _read(folder / name / file) for file in digests}
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return {}
     whole = [sha256(content).hexdigest() for content in found.values()] == [*digests.values()]
     return found if whole else {}
