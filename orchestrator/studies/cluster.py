@@ -123,7 +123,8 @@ def _remote(address: str, workers: int | None) -> Iterator[Client]:
             raise ValueError("that is no host, or no port")
     except (ValueError, NotImplementedError) as error:
         raise InputError(
-            f"{address!r} is no scheduler: {reason(error)}; it is given as tcp://HOST:PORT"
+            f"no scheduler answers at {address or repr(address)}: {reason(error)}; an address is "
+            "like tcp://HOST:PORT"
         ) from error
     # A client that cannot connect would wait for a minute to be closed.
     if failure := _failure_to_connect(address):
