@@ -40,7 +40,7 @@ from auv_fmu import __version__
 from orchestrator.errors import InputError, reason
 from orchestrator.master.interrupts import without_interrupt
 from orchestrator.studies.engine import Engine, Outcome, Run
-from orchestrator.studies.sockets import PROTOCOL, LocalScheduler, LocalWorker, host_of
+from orchestrator.studies.sockets import LocalScheduler, LocalWorker, place_in
 from orchestrator.system import cache
 from orchestrator.system.leftovers import process_folder
 
@@ -166,11 +166,7 @@ def _local(workers: int | None) -> Iterator[Client]:
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers}: must be at least 1")
     folder = str(process_folder())
-    place = {
-        "protocol": PROTOCOL,
-        "host": host_of(process_folder()),
-        "security": Security(require_encryption=False),
-    }
+    place = place_in(process_folder()) | {"security": Security(require_encryption=False)}
     options = {
         "worker_class": LocalWorker,
         "nthreads": 1,

@@ -31,16 +31,18 @@ from tornado.iostream import IOStream, StreamClosedError
 from tornado.tcpserver import TCPServer
 
 #: How addresses begin; a folder and the name of a socket in it, a number, follow.
-PROTOCOL = "unix"
-_PREFIX = f"{PROTOCOL}://"
+_PROTOCOL = "unix"
+_PREFIX = f"{_PROTOCOL}://"
 
 #: Paths of sockets are not longer than this on every system.
 _LONGEST = 100
 
 
-def host_of(folder: Path) -> str:
-    """A folder as Dask's addresses have it in the place of a host."""
-    return quote(str(folder))
+def place_in(folder: Path) -> dict[str, str]:
+    """Where Dask's servers are to listen: in a folder, or where that cannot be, to this machine."""
+    if not hasattr(socket, "AF_UNIX"):
+        return {"protocol": "tcp", "host": "127.0.0.1"}
+    return {"protocol": _PROTOCOL, "host": quote(str(folder))}
 
 
 @contextmanager
@@ -115,7 +117,7 @@ class _Backend(TCPBackend):  # type: ignore[misc]
         return f"{parse_host_port(loc)[0]}:0"
 
 
-backends[PROTOCOL] = _Backend()
+backends[_PROTOCOL] = _Backend()
 
 
 class LocalScheduler(Scheduler):  # type: ignore[misc]
