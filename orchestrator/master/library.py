@@ -8,6 +8,7 @@ import signal
 import sys
 import sysconfig
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from ctypes import CDLL
 from functools import cache
 from hashlib import sha256
@@ -35,13 +36,18 @@ _KIND = "loop"
 #: How long this machine's compiler may take [s], and ziglang, which makes a C library, too.
 _LIMIT, _LIMIT_OF_ZIG = 60.0, 600.0
 
+#: Libraries that this process has loaded, by cache folders.
+_in_use: dict[Path, CDLL] = {}
+
 
 def kept() -> CDLL | None:
     """The library that was compiled earlier; None: there is none."""
-    try:
-        return next(map(_loaded, user_cache.kept(_KIND, _key())), None)
-    except OSError:
-        return None
+    folder = user_cache.users_folder()
+    if folder not in _in_use:
+        # What is loaded needs no second look: short runs would take longer for it.
+        with suppress(OSError):
+            _in_use.update((folder, _loaded(path)) for path in user_cache.kept(_KIND, _key()))
+    return _in_use.get(folder)
 
 
 def made(in_no_time: bool = False) -> CDLL:
