@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from fmus.packaging.loader import compiler
+from fmus.packaging.loader import compiler, run_compiler
 from fmus.packaging.platforms import TARGETS, Platform, this_machine
 from fmus.packaging.universal import universal
 
@@ -27,6 +27,9 @@ _SMALL = ("-Os",)
 
 #: For the linker of Linux: no trace of when and where, and no padding to whole pages.
 _LINUX = ("-Wl,--build-id=none", "-Wl,-z,noseparate-code")
+
+#: How long this machine's compiler may take [s], and ziglang, which makes a C library, too.
+_LIMIT, _LIMIT_OF_ZIG = 120.0, 900.0
 
 
 class Compiler(NamedTuple):
@@ -66,7 +69,7 @@ def compiler_for(platforms: Sequence[Platform]) -> Compiler:
 
 
 def _version_of(command: str) -> str:
-    process = subprocess.run([command, "--version"], capture_output=True, text=True, check=False)
+    process = run_compiler([command, "--version"], None)
     return process.stdout.partition("\n")[0] or command
 
 
@@ -96,10 +99,8 @@ def library(
             target = ("-target", TARGETS[machine]) if compiler.targets else ()
             size = _SMALL if machine.endswith("-windows") else _NO_TABLES
             options = [*target, *FLAGS, *size, "-o", made.name, main, "-lm"]
-            process = subprocess.run(
-                [*compiler.command, *options],
-                cwd=folder, capture_output=True, text=True, check=False,
-            )  # fmt: skip
+            limit = _LIMIT_OF_ZIG if compiler.targets else _LIMIT
+            process = run_compiler([*compiler.command, *options], Path(folder), limit)
             if process.returncode != 0:
                 raise OSError(
                     f"{compiler.name} makes no {name} for {machine}: {_complaint(process)}"

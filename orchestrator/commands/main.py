@@ -5,13 +5,17 @@ from __future__ import annotations
 import logging
 import os
 import sys
+import warnings
 from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
+from typing import Any
 
 from orchestrator.commands import streams
 from orchestrator.commands.streams import say
 from orchestrator.errors import reason
 from orchestrator.master.interrupts import orderly_end
+from orchestrator.system.imports import imported_apart
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -23,7 +27,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     streams.fill()
     status = 0
     try:
-        with orderly_end():
+        with orderly_end(), warnings.catch_warnings():
+            warnings.showwarning = partial(_warn, warnings.showwarning)
+            # What is in the current folder may be of somebody else.
+            imported_apart("matplotlib", "matplotlibrc")
             # Half a second of imports, in which Ctrl-C must find an answer, too.
             status = int(import_module("orchestrator.commands.parser").dispatch(arguments))
     except SystemExit as end:
@@ -39,6 +46,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         say(reason(error))
         status = 2
     return status if streams.finished() else status or 1
+
+
+def _warn(otherwise: Any, message: Warning | str, category: type[Warning], *place: Any) -> None:
+    """Say what is for the user, without the line of the program that it comes from."""
+    if category is UserWarning:
+        say(f"warning: {message}")
+    else:
+        otherwise(message, category, *place)
 
 
 if __name__ == "__main__":

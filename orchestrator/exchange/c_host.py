@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.errors import InputError, last_line
+from orchestrator.errors import InputError, last_line, reason
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.library import COMPILERS, machines_compiler
+from orchestrator.master.library import COMPILERS, machines_compiler, run_compiler
 from orchestrator.master.schedule import gathered, stages
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
@@ -47,7 +47,10 @@ def compiled(folder: Path, command: Sequence[str] = (), name: str = "host") -> P
     options = ["-std=c99", "-O2", "-o", str(program), str(SOURCE)]
     if program.suffix != ".exe":
         options.append("-ldl")  # until glibc 2.34, dlopen is in a library of its own
-    process = subprocess.run([*found, *options], capture_output=True, text=True, check=False)
+    try:
+        process = run_compiler([*found, *options])
+    except OSError as error:
+        raise InputError(f"{SOURCE.name} does not compile: {reason(error)}") from error
     if process.returncode != 0:
         raise InputError(f"{SOURCE.name} does not compile: {last_line(process.stderr)}")
     return program

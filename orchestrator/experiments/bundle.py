@@ -13,10 +13,7 @@ import shutil
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from shutil import rmtree
-from tempfile import mkdtemp
-
-from platformdirs import user_cache_path
+from tempfile import TemporaryDirectory
 
 from orchestrator.errors import InputError, last_line, reason
 from orchestrator.experiments.bill_of_materials import (
@@ -24,14 +21,13 @@ from orchestrator.experiments.bill_of_materials import (
     CHECKSUMS,
     bill,
     checksums,
-    digest_of,
 )
 from orchestrator.experiments.folder import replaced
 from orchestrator.experiments.wiring import closed_loop
-from orchestrator.system.atomic import to_disk
+from orchestrator.system.cache import folder_of, keep, kept, users_folder
 from orchestrator.system.children import run_module
 from orchestrator.system.component import WRITABLE
-from orchestrator.system.leftovers import claimed
+from orchestrator.system.leftovers import claimed, process_folder
 from orchestrator.system.ssp.writing import ssp_bytes
 
 #: The kinds of FMU that a component comes as: Python sources, or their translation to C.
@@ -46,8 +42,8 @@ DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "n
 #: The archive of the closed loop, and what was built beside it, from what.
 ARCHIVE, MANIFEST = "auv.ssp", "build.json"
 
-#: How the name of a folder of the cache begins that is being made.
-_PARTIAL = ".partial-"
+#: What the FMUs of runs are in the user's cache folder.
+_KIND = "fmus"
 
 #: Packages that the FMUs of each kind are made of.
 _SOURCES = {PYTHON: ("auv_fmu", "fmus", "pythonfmu"), NATIVE: ("auv_fmu", "fmus")}
@@ -147,45 +143,31 @@ def current_fmus(kind: str = PYTHON, fmi: str = FMI[0]) -> Path:
     """
     if kind not in KINDS:
         raise InputError(f"kind {kind!r}: use one of {', '.join(KINDS)}")
-    cache_folder = user_cache_path("auv-fmu", appauthor=False) / "fmus"
-    folder = cache_folder / _fingerprint(kind, fmi)
-    if _is_whole(folder):
-        return folder
+    key = _fingerprint(kind, fmi)
+    if found := _kept(key):
+        return found
     try:
-        cache_folder.mkdir(parents=True, exist_ok=True)
-        partial = Path(mkdtemp(prefix=_PARTIAL, dir=cache_folder))
-        try:
-            with claimed(partial):
-                _build_cached(partial, folder, "--kind", kind, "--fmi", fmi)
-        finally:
-            rmtree(partial, ignore_errors=True)
+        with claimed(folder_of(_KIND), wait=True):
+            # Another process may have been first.
+            return _kept(key) or _built(key, "--kind", kind, "--fmi", fmi)
     except OSError as error:
-        # Or another process was first; its folder holds the same.
-        if not _is_whole(folder):
-            raise InputError(
-                f"cannot keep FMUs in {cache_folder}: {reason(error)}; set XDG_CACHE_HOME to a "
-                "folder that can be written"
-            ) from error
-    return folder
+        raise InputError(
+            f"cannot keep FMUs in {users_folder()}: {reason(error)}; set XDG_CACHE_HOME to a "
+            "folder that can be written"
+        ) from error
 
 
-def _build_cached(partial: Path, folder: Path, *options: str) -> None:
-    """Build into a folder that takes the place of another when it is whole."""
-    run_fmus("packaging.build", partial, *options)
-    for path in (*partial.iterdir(), partial):
-        to_disk(path)
-    # What somebody has cleaned away in part is made anew.
-    rmtree(folder, ignore_errors=True)
-    partial.rename(folder)
+def _kept(key: str) -> Path | None:
+    """The folder of FMUs that were built earlier."""
+    return next((path.parent for path in kept(_KIND, key)), None)
 
 
-def _is_whole(folder: Path) -> bool:
-    """Whether a folder holds the FMUs that were built into it, as they were then."""
-    try:
-        built = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["sha256"]
-        return all(digest_of(folder / name) == digest for name, digest in built.items())
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return False
+def _built(key: str, *options: str) -> Path:
+    """Build FMUs, and keep them."""
+    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
+        run_fmus("packaging.build", Path(temporary), *options)
+        files = {path.name: path.read_bytes() for path in sorted(Path(temporary).iterdir())}
+    return keep(_KIND, key, files)[0].parent
 
 
 def _fingerprint(kind: str, fmi: str) -> str:

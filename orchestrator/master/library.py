@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
+import signal
 import sys
 import sysconfig
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from ctypes import CDLL
 from functools import cache
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
-from subprocess import CompletedProcess
+from subprocess import PIPE, CompletedProcess, Popen, TimeoutExpired
 from tempfile import TemporaryDirectory
 
-from platformdirs import user_cache_path
-
 from orchestrator.errors import InputError, last_line, reason
+from orchestrator.system import cache as user_cache
 from orchestrator.system.children import run_module
-from orchestrator.system.leftovers import claimed
+from orchestrator.system.leftovers import claimed, process_folder
 
 _SOURCE = Path(__file__).with_name("stepper.c")
 
@@ -30,16 +30,24 @@ _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC")
 #: C compilers, the first of which is taken that there is.
 COMPILERS = ("cc", "gcc", "clang")
 
-#: How the name of a folder of the cache begins in which it is compiled.
-_PARTIAL = ".partial-"
+#: What it is in the user's cache folder.
+_KIND = "loop"
+
+#: How long this machine's compiler may take [s], and ziglang, which makes a C library, too.
+_LIMIT, _LIMIT_OF_ZIG = 60.0, 600.0
+
+#: Libraries that this process has loaded, by cache folders.
+_in_use: dict[Path, CDLL] = {}
 
 
 def kept() -> CDLL | None:
     """The library that was compiled earlier; None: there is none."""
-    try:
-        return _loaded(_place())
-    except OSError:
-        return None
+    folder = user_cache.users_folder()
+    if folder not in _in_use:
+        # What is loaded needs no second look: short runs would take longer for it.
+        with suppress(OSError):
+            _in_use.update((folder, _loaded(path)) for path in user_cache.kept(_KIND, _key()))
+    return _in_use.get(folder)
 
 
 def made(in_no_time: bool = False) -> CDLL:
@@ -76,56 +84,74 @@ def _of_the_machine() -> _Compiler | None:
     command = machines_compiler()
     if command is None:
         return None
-    return lambda *arguments: subprocess.run(
-        # Ctrl-C is for this process alone.
-        [command, *arguments], capture_output=True, text=True, check=False,
-        start_new_session=True,
-    )  # fmt: skip
+    return lambda *arguments: run_compiler([command, *arguments])
+
+
+def run_compiler(command: Sequence[str]) -> CompletedProcess[str]:
+    """Run a C compiler, and end it with all that it has started if it takes too long.
+
+    Raises:
+        OSError: it does, or it cannot be started.
+
+    """
+    # Ctrl-C is for this process alone.
+    with Popen(
+        command, stdout=PIPE, stderr=PIPE, text=True, errors="replace", start_new_session=True
+    ) as process:
+        try:
+            said, complaints = process.communicate(timeout=_LIMIT)
+        except BaseException as error:
+            if os.name == "posix":
+                os.killpg(process.pid, signal.SIGKILL)
+            process.kill()
+            if isinstance(error, TimeoutExpired):
+                raise TimeoutError(f"{command[0]} has not ended after {_LIMIT:g} s") from None
+            raise
+    return CompletedProcess(command, process.returncode, said, complaints)
 
 
 def _zig() -> _Compiler | None:
     """The compiler of the package ziglang, which takes some seconds the first time."""
     if find_spec("ziglang") is None:
         return None
-    return lambda *arguments: run_module("ziglang", "cc", *arguments)
+    return lambda *arguments: run_module("ziglang", "cc", *arguments, timeout=_LIMIT_OF_ZIG)
 
 
 def _made(compiler: _Compiler) -> CDLL:
-    """The library, compiled beside its place and put there when it is whole.
+    """The library, compiled and kept.
 
     Raises:
         OSError: it cannot be compiled, kept or loaded.
 
     """
-    place = _place()
-    place.parent.mkdir(parents=True, exist_ok=True)
-    with claimed(place.parent, wait=True):
+    with claimed(user_cache.folder_of(_KIND), wait=True):
         if library := kept():
             # Another process was first.
             return library
-        with TemporaryDirectory(prefix=_PARTIAL, dir=place.parent) as folder:
-            partial = Path(folder, place.name)
-            process = compiler(*_FLAGS, str(_SOURCE), "-o", str(partial))
+        with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
+            path = Path(temporary, _name())
+            process = compiler(*_FLAGS, str(_SOURCE), "-o", str(path))
             if process.returncode != 0:
                 raise OSError(last_line(process.stderr))
-            with partial.open("rb") as file:
-                os.fsync(file.fileno())
-            partial.replace(place)
+            [place] = user_cache.keep(_KIND, _key(), {path.name: path.read_bytes()})
     return _loaded(place)
 
 
 @cache
 def _loaded(place: Path) -> CDLL:
-    return CDLL(str(place))
+    library = CDLL(str(place))
+    if not hasattr(library, "advance"):
+        raise OSError(f"{place} has no function advance")
+    return library
 
 
-def _place() -> Path:
-    """Where the library of this text, these flags and this kind of machine is kept."""
-    return user_cache_path("auv-fmu", appauthor=False) / "loop" / _name()
+def _name() -> str:
+    return "stepper" + (".dll" if sys.platform == "win32" else ".so")
 
 
 @cache
-def _name() -> str:
+def _key() -> str:
+    """Of the text, the flags and the kind of machine."""
     digest = sha256(_SOURCE.read_bytes())
     digest.update("\0".join((*_FLAGS, sysconfig.get_platform())).encode())
-    return digest.hexdigest()[:16] + (".dll" if sys.platform == "win32" else ".so")
+    return digest.hexdigest()[:16]

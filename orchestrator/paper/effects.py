@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
@@ -17,14 +16,13 @@ from auv_fmu.output_feedback import Gains
 from orchestrator.analysis.certificates import COLUMNS, certificates
 from orchestrator.analysis.figures import (
     COLOURS,
-    SETTINGS,
     STYLES,
     Drawn,
     draw_commands,
     overlay,
     save,
 )
-from orchestrator.analysis.figures.style import WIDTH
+from orchestrator.analysis.figures.style import WIDTH, styled
 from orchestrator.analysis.signals import ACTUATORS, AXES, limits
 from orchestrator.paper.claims import FIVE, FIVE_PD, QUIET, SEVEN
 from orchestrator.paper.formatting import actuator_values, numbers, picture, plain
@@ -110,7 +108,7 @@ def show_effect(name: str, outcomes: Sequence[Outcome], folder: Path) -> str:
         if outcome.failure is not None:
             return f"A run ended early: {plain(outcome.failure)}"
     [found] = [effect for effect in EFFECTS if effect.name == name]
-    with mpl.rc_context(SETTINGS):
+    with styled():
         shown = found.show(*outcomes)
         save(shown.figure, folder / f"{name}.png")
     return f"{shown.text}\n\n{picture(found.title, f'{folder.name}/{name}.png')}"

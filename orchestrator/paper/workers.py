@@ -21,6 +21,7 @@ from tqdm import tqdm
 
 from orchestrator.errors import InputError, reason
 from orchestrator.master.interrupts import Interrupts, held_interrupts, without_interrupt
+from orchestrator.system.imports import imported_apart
 from orchestrator.system.leftovers import process_folder
 
 #: How long the loop waits before it asks whether it shall stop [s].
@@ -125,6 +126,7 @@ def _begin() -> None:
     threading.Thread(target=_follow, daemon=True).start()
     # As in the process that has started this one.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
+    imported_apart("matplotlib", "matplotlibrc")
 
 
 def _follow() -> None:

@@ -13,6 +13,7 @@ module                what it holds
 :mod:`.indices`       what comes out of a run, from its rows
 :mod:`.store`         what has come out of a study, as it comes and at the end
 :mod:`.cluster`       who makes which runs, and where: Dask
+:mod:`.sockets`       Dask's processes on this machine, which no other user reaches
 :mod:`.figures`       what is drawn of it
 :mod:`.sweep`         a study as a whole
 :mod:`.ready_page`    the page of the studies that come with the program

@@ -6,27 +6,42 @@ whose worker is lost is made again by another worker.
 
 from __future__ import annotations
 
+import asyncio
 import os
 import pickle
+import re
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
 from logging import CRITICAL
 from queue import Empty, SimpleQueue
-from threading import Lock
+from threading import Lock, Thread
 from time import monotonic
 from typing import Any
 
 from dask import config
 from dask.system import CPU_COUNT
-from distributed import Client, Future, KilledWorker, LocalCluster, WorkerPlugin, get_worker
+from dask.utils import parse_timedelta
+from distributed import (
+    Client,
+    Future,
+    KilledWorker,
+    Nanny,
+    Security,
+    SpecCluster,
+    WorkerPlugin,
+    get_worker,
+)
+from distributed.comm import connect, get_address_host_port
 from distributed.utils import silence_logging_cmgr
 
 from auv_fmu import __version__
 from orchestrator.errors import InputError, reason
 from orchestrator.master.interrupts import without_interrupt
 from orchestrator.studies.engine import Engine, Outcome, Run
+from orchestrator.studies.sockets import LocalScheduler, LocalWorker, place_in
+from orchestrator.system import cache
 from orchestrator.system.leftovers import process_folder
 
 #: How long a block shall take [s]: long beside the millisecond that a task costs, short for who
@@ -50,8 +65,8 @@ _GLANCE, _PATIENCE = 2.0, 120.0
 #: How long a process of this machine has to leave when the study is broken off [s].
 _FAREWELL = 0.5
 
-#: Where a server of this machine listens: for this machine alone, and at a port that is free.
-_LOOPBACK = "127.0.0.1:0"
+#: How the addresses of schedulers begin that ask for certificates.
+_ENCRYPTED = ("tls://", "wss://")
 
 #: What is said of a run that no worker has survived.
 FATAL = "every process that made it died"
@@ -103,6 +118,18 @@ def _remote(address: str, workers: int | None) -> Iterator[Client]:
             "--workers is for processes of this machine: those of a scheduler are started with it"
         )
     try:
+        host, port = get_address_host_port(address)
+        if not re.fullmatch(r"[^\s/]+", host) or not 0 < port < 2**16:
+            raise ValueError("that is no host, or no port")
+    except (ValueError, NotImplementedError) as error:
+        raise InputError(
+            f"no scheduler answers at {address or repr(address)}: {reason(error)}; an address is "
+            "like tcp://HOST:PORT"
+        ) from error
+    # A client that cannot connect would wait for a minute to be closed.
+    if failure := _failure_to_connect(address):
+        raise InputError(f"no scheduler answers at {address}: {reason(failure)}") from failure
+    try:
         client = Client(address, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(f"no scheduler answers at {address}: {reason(error)}") from error
@@ -110,21 +137,50 @@ def _remote(address: str, workers: int | None) -> Iterator[Client]:
         yield client
 
 
+def _failure_to_connect(address: str) -> Exception | None:
+    """Why there is no connection to a scheduler; None: there is."""
+    errors: SimpleQueue[Exception | None] = SimpleQueue()
+
+    async def connected() -> None:
+        seconds = parse_timedelta(config.get("distributed.comm.timeouts.connect"))
+        secrets = Security().get_connection_args("client")
+        if address.startswith(_ENCRYPTED) and secrets["ssl_context"] is None:
+            raise ValueError("name certificates in Dask's configuration, distributed.comm.tls")
+        # Who answers need not be a scheduler, and may say nothing.
+        comm = await asyncio.wait_for(connect(address, seconds, **secrets), 2 * seconds)
+        comm.abort()
+
+    def tried() -> None:
+        try:
+            errors.put(asyncio.run(connected()))
+        except Exception as error:
+            errors.put(error)
+
+    # Where this is called, a loop may be running.
+    Thread(target=tried, daemon=True).start()
+    return errors.get()
+
+
 @contextmanager
 def _local(workers: int | None) -> Iterator[Client]:
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers}: must be at least 1")
     folder = str(process_folder())
+    place = place_in(process_folder()) | {"security": Security(require_encryption=False)}
+    options = {
+        "worker_class": LocalWorker,
+        "nthreads": 1,
+        "memory_limit": 0,
+        "silence_logs": CRITICAL,
+        "env": {"TMPDIR": folder} | cache.environment(),
+    }
+    worker = {"cls": Nanny, "options": place | options}
     try:
         with without_interrupt(), config.set({"temporary-directory": folder}):
-            cluster = LocalCluster(
-                n_workers=workers or CPU_COUNT,
-                threads_per_worker=1,
-                dashboard_address=_LOOPBACK,
-                scheduler_kwargs={"dashboard": False},
-                memory_limit=0,
+            cluster = SpecCluster(
+                scheduler={"cls": LocalScheduler, "options": place | {"dashboard": False}},
+                workers=dict.fromkeys(range(workers or CPU_COUNT), worker),
                 silence_logs=CRITICAL,
-                env={"TMPDIR": folder},
             )
             client = Client(cluster, set_as_default=False)
     except (OSError, RuntimeError) as error:
@@ -140,7 +196,7 @@ def _local(workers: int | None) -> Iterator[Client]:
             raise
 
 
-def _end(cluster: LocalCluster) -> None:
+def _end(cluster: SpecCluster) -> None:
     """End processes whatever they do: what they have begun nobody wants any more."""
     for nanny in cluster.workers.values():
         with suppress(OSError, TimeoutError):

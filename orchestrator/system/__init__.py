@@ -15,6 +15,8 @@ module                  what it holds
 :mod:`.sealed`          records that carry a checksum over themselves
 :mod:`.ledger`          what was written into a folder: the proof that a file is ours
 :mod:`.leftovers`       what only one process may have, and what it leaves when it is killed
+:mod:`.cache`           what is made once and kept in the user's cache folder
+:mod:`.imports`         modules that would read a file of the current folder
 :mod:`.children`        modules run in processes that do not outlive this one
 :mod:`.unpacking`       archives unpacked, once a process and version
 :mod:`.ssp`             systems as SSP 1.0 archives, read and written

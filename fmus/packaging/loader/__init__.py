@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import signal
 import subprocess
 import sys
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -31,6 +34,36 @@ def compiler() -> str | None:
     return shutil.which("cc") or shutil.which("gcc")
 
 
+def run_compiler(
+    command: Sequence[str], folder: Path | None, limit: float = 120.0
+) -> subprocess.CompletedProcess[str]:
+    """Run a C compiler, and end it with all that it has started if it takes too long.
+
+    Args:
+        command: with its arguments.
+        folder: that it runs in; None: the current one.
+        limit: how long it may take [s].
+
+    Raises:
+        OSError: it takes longer, or cannot be started.
+
+    """
+    with subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        errors="replace", start_new_session=True,
+    ) as process:  # fmt: skip
+        try:
+            said, complaints = process.communicate(timeout=limit)
+        except BaseException as error:
+            if os.name == "posix":
+                os.killpg(process.pid, signal.SIGKILL)
+            process.kill()
+            if isinstance(error, subprocess.TimeoutExpired):
+                raise TimeoutError(f"{command[0]} has not ended after {limit:g} s") from None
+            raise
+    return subprocess.CompletedProcess(command, process.returncode, said, complaints)
+
+
 @cache
 def compiled() -> bytes:
     """The loader as a shared library.
@@ -44,10 +77,9 @@ def compiled() -> bytes:
         raise OSError("the native loader needs Linux and a C compiler; build with --loader plain")
     with TemporaryDirectory(prefix="auv_fmu_loader_") as folder:
         library = Path(folder, "loader.so")
-        process = subprocess.run(
-            [command, "-O2", "-s", "-Wl,--build-id=none", "-o", str(library), *FLAGS],
-            cwd=FOLDER, capture_output=True, text=True, check=False,
-        )  # fmt: skip
+        process = run_compiler(
+            [command, "-O2", "-s", "-Wl,--build-id=none", "-o", str(library), *FLAGS], FOLDER
+        )
         if process.returncode != 0:
             raise OSError(f"the native loader does not compile: {process.stderr.strip()}")
         return library.read_bytes()

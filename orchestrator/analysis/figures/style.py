@@ -106,13 +106,18 @@ def _set(symbol: re.Match[str]) -> str:
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw with :data:`SETTINGS`; what matplotlib thinks of it is not for the user."""
+    """Draw with :data:`SETTINGS` and nothing that a matplotlibrc says, wherever that may be.
+
+    What matplotlib thinks of it is not for the user.
+    """
     log = logging.getLogger("matplotlib")
     level = log.level
     log.setLevel(logging.ERROR)
     try:
-        with mpl.rc_context(SETTINGS), warnings.catch_warnings():
+        with mpl.rc_context(), warnings.catch_warnings():
             warnings.simplefilter("ignore")
+            mpl.rcdefaults()
+            mpl.rcParams.update(SETTINGS)
             yield
     finally:
         log.setLevel(level)

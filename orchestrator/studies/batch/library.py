@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import os
+import pickle
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import Any
-
-from platformdirs import user_cache_path
 
 from auv_fmu.closed_loop import LAWS, Law
 from orchestrator.studies.batch import kernel
 from orchestrator.studies.batch.kernel import Moment
+from orchestrator.system.cache import keep, kept
+from orchestrator.system.imports import imported_apart
+
+#: What it is in the user's cache folder.
+_KIND = "batch"
 
 
 @cache
@@ -24,18 +28,63 @@ def compiled(gains: type[Any]) -> Callable[..., Moment]:
     """The function :func:`.kernel.run` for the controller with a type of gains.
 
     It is compiled when it is first called, which takes some ten seconds, unless some process of
-    this machine has done so before.
+    this user has done so before.
     """
     # Not installed for those who make no studies.
+    imported_apart("numba", ".numba_config.yaml")
     import numba  # noqa: PLC0415
+
+    # It would look for that file before each compilation, too.
+    numba.core.config._config_fname = os.devnull
 
     from orchestrator.studies.batch.equations import EQUATIONS, OPTIONS  # noqa: PLC0415
 
-    path = _place()
-    made = EQUATIONS.anew(kernel, path or Path(kernel.__file__))
+    made = EQUATIONS.anew(kernel, Path(kernel.__file__))
     vars(made)["law"] = Law(*(EQUATIONS.function(function) for function in LAWS[gains]))
-    run: Callable[..., Moment] = numba.njit(made.run.py_func, cache=path is not None, **OPTIONS)
+    run: Callable[..., Moment] = numba.njit(made.run.py_func, **OPTIONS)
+    vars(run)["_cache"] = _Kept(gains.__name__)
     return run
+
+
+class _Kept:
+    """What numba asks for code that was compiled earlier, in the place of its own cache.
+
+    Numba's own is where its configuration says, and takes whatever is there.
+    """
+
+    cache_path = None
+
+    def __init__(self, name: str) -> None:
+        """Take the name of a variant of the kernel."""
+        self._name = name
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """The code for the types of arguments, or None."""
+        from numba.core.compiler import CompileResult  # noqa: PLC0415
+
+        target.refresh()
+        rebuild: Any = CompileResult._rebuild
+        for content in kept(_KIND, self._key(signature, target.codegen())).values():
+            return rebuild(target, *pickle.loads(content))
+        return None
+
+    def save_overload(self, signature: Any, result: Any) -> None:
+        """Keep code."""
+        from numba.core import serialize  # noqa: PLC0415
+
+        dumps: Any = serialize.dumps
+        key = self._key(signature, result.codegen)
+        # What cannot be kept is compiled again.
+        with suppress(OSError):
+            if not kept(_KIND, key):
+                keep(_KIND, key, {"kernel": dumps(result._reduce())})
+
+    def _key(self, signature: Any, codegen: Any) -> str:
+        import numba  # noqa: PLC0415
+
+        machine = (numba.__version__, sys.version, codegen.magic_tuple())
+        text = repr((self._name, signature, *machine))
+        return f"{digest()}-{sha256(text.encode()).hexdigest()[:16]}"
 
 
 @cache
@@ -50,22 +99,3 @@ def digest() -> str:
             found.update(f"{package}/{path.relative_to(root)}\0".encode())
             found.update(path.read_bytes())
     return found.hexdigest()[:16]
-
-
-def _place() -> Path | None:
-    """The file beside which numba keeps what it has compiled; None: it cannot be written.
-
-    Numba looks at nothing but the file of the function, so this one's folder bears the digest of
-    all that it calls, and its time is always the same.
-    """
-    source = Path(kernel.__file__)
-    path = user_cache_path("auv-fmu", appauthor=False) / "batch" / digest() / source.name
-    with suppress(OSError):
-        if not path.exists():
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with NamedTemporaryFile(dir=path.parent, delete=False) as file:
-                file.write(source.read_bytes())
-            os.utime(file.name, (0, 0))
-            Path(file.name).replace(path)
-        return path
-    return None

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from ctypes import CDLL
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,8 @@ import pytest
 from orchestrator.errors import InputError
 from orchestrator.master import library, loop
 from orchestrator.master.experiment import Experiment
+from orchestrator.system import cache as user_cache
+from support.machine import eventually, members
 
 #: Warnings are errors, and C is that of the standard.
 STRICT = ["-Wall", "-Wextra", "-pedantic", "-Werror"]
@@ -78,20 +81,54 @@ def test_a_compiler_that_fails_is_quoted(tmp_path, cache, monkeypatch):
 
 
 @needs_compiler
-@pytest.mark.parametrize("broken", [b"", b"\x7fELF nonsense"])
-def test_a_library_that_was_broken_is_made_anew(cache, broken):
-    cache.mkdir(parents=True)
-    library._place().write_bytes(broken)
+@pytest.mark.parametrize("length", [0, 100, 3000, -1])
+def test_a_library_that_was_cut_is_never_loaded_but_made_anew(cache, length, monkeypatch):
+    # In another process: this one would hold on to the library.
+    code = "from orchestrator.master import library; print(library.made()._name)"
+    [place] = map(Path, subprocess.check_output([sys.executable, "-c", code]).decode().split())
+    content = place.read_bytes()
+    place.write_bytes(content[:length])
+    loaded = []
+    monkeypatch.setattr(library, "CDLL", lambda path: loaded.append(path) or CDLL(path))
     assert library.kept() is None
     assert library.made().advance
-    assert [path.stat().st_size > 1000 for path in cache.iterdir()] == [True]
+    assert loaded and str(place) not in loaded
+    # Whatever that is, it is not ours to overwrite.
+    assert place.read_bytes() == content[:length]
 
 
 @needs_compiler
-def test_what_a_killed_process_has_left_goes(cache):
-    (cache / ".partial-left").mkdir(parents=True)
+def test_a_library_without_the_function_is_no_library(cache, tmp_path):
+    source = tmp_path / "other.c"
+    source.write_text("int other(void) { return 0; }")
+    other = tmp_path / "other.so"
+    subprocess.run(["cc", "-shared", "-o", other, source], check=True)
+    user_cache.keep("loop", library._key(), {"stepper.so": other.read_bytes()})
+    assert library.kept() is None
+    assert library.made().advance
+
+
+@needs_compiler
+def test_what_others_have_in_the_cache_stays(cache):
+    own = [cache / ".partial-mine" / "notes", cache / "stepper.so", cache / "thesis.tex"]
+    for path in own:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        path.write_text("mine")
     library.made()
-    assert [path.suffix for path in cache.iterdir()] == [".so"]
+    assert [path.read_text() for path in own] == ["mine"] * 3
+
+
+@pytest.mark.parametrize("script", ["sleep 1000", "exec sleep 1000", "sleep 1000 >&- 2>&-"])
+def test_a_compiler_that_hangs_is_ended_with_what_it_has_started(tmp_path, monkeypatch, script):
+    compiler = tmp_path / "cc"
+    compiler.write_text(f"#!/bin/sh\necho $$ > {tmp_path}/session\n{script}\necho\n")
+    compiler.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setattr(library, "_LIMIT", 0.5)
+    with pytest.raises(InputError, match=r"cannot be compiled: .*/cc has not ended after 0\.5 s$"):
+        library.made()
+    session = int((tmp_path / "session").read_text())
+    assert eventually(lambda: not members(session))
 
 
 @needs_compiler

@@ -6,11 +6,13 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
 from contextlib import ExitStack, contextmanager
 from itertools import count
+from pathlib import Path
 
 import pytest
 
@@ -23,6 +25,11 @@ from dask import config
 from orchestrator.errors import InputError
 from orchestrator.studies import cluster
 from orchestrator.studies.cluster import FATAL, making
+
+TESTS = Path(__file__).parents[3]
+
+#: Less than the minute for which a client waits that could not connect [s].
+PATIENCE = 45.0
 
 
 def numbers_and_squares(blocks):
@@ -160,3 +167,50 @@ def test_who_cannot_make_runs_is_said_in_a_line(means, text):
         making(Toy(), [], **means),
     ):
         pass
+
+
+def test_no_address_leaves_anything_to_wait_for():
+    """Whoever waits is patient here: it is said before anybody is asked, and the process ends."""
+    addresses = [
+        "", "localhost", "tcp://", "tcp://:1", "tcp://a b:1", "tcp://a/b:1", "tcp://[::1",
+        "tcp://127.0.0.1:x", "tcp://127.0.0.1:0", "tcp://127.0.0.1:99999", "foo://a:1", "a://b://c",
+        "inproc://a", "tls://127.0.0.1:1", "wss://127.0.0.1:1",
+    ]  # fmt: skip
+    code = (
+        "from orchestrator.errors import InputError\n"
+        "from orchestrator.studies.cluster import making\n"
+        "from support.toy_engine import Toy\n"
+        f"for address in {addresses}:\n"
+        "    try:\n"
+        "        with making(Toy(), [], scheduler=address): pass\n"
+        "    except InputError as error: print(error)\n"
+    )
+    process = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PYTHONPATH": str(TESTS)}, capture_output=True, text=True,
+        timeout=PATIENCE, check=True,
+    )  # fmt: skip
+    beginnings = [line.split(": ")[0] for line in process.stdout.splitlines()]
+    assert beginnings == [f"no scheduler answers at {one or repr(one)}" for one in addresses]
+    assert process.stderr == ""
+
+
+def test_who_answers_and_says_nothing_is_no_scheduler():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        with (
+            gives_up_after(0.5),
+            pytest.raises(InputError, match=r"^no scheduler answers"),
+            making(Toy(), [], scheduler=address),
+        ):
+            pass
+
+
+@pytest.mark.parametrize("name", ["x" * 150, "a:b [c] %41"])
+def test_temporary_folders_have_any_name(tmp_path, monkeypatch, name):
+    folder = tmp_path / name
+    folder.mkdir()
+    monkeypatch.setattr(cluster, "process_folder", lambda: folder)
+    runs = [run(number) for number in range(20)]
+    with making(Toy(), iter(runs), workers=1) as blocks:
+        assert numbers_and_squares(blocks) == expected(runs)

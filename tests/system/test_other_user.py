@@ -1,0 +1,162 @@
+"""Another user of this machine can neither feed a cache nor reach a sweep."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import shutil
+import socket
+import subprocess
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from tempfile import mkdtemp
+from uuid import uuid4
+
+import pytest
+
+from orchestrator.master import library
+from orchestrator.system.cache import keep, kept
+from orchestrator.system.leftovers import process_folder
+from support.machine import called
+from support.toy_engine import Toy, outcome, run
+
+pytestmark = pytest.mark.skipif(
+    os.geteuid() != 0 or shutil.which("useradd") is None, reason="only root makes users"
+)
+
+#: A library that leaves a mark when it is loaded.
+LIBRARY = """
+#include <fcntl.h>
+__attribute__((constructor)) static void mark(void) { open("MARK", O_CREAT, 0600); }
+int advance(void) { return 0; }
+"""
+
+
+@pytest.fixture(scope="module")
+def other() -> Iterator[int]:
+    """Another user."""
+    name = f"auv-{uuid4().hex[:12]}"
+    subprocess.run(["useradd", "--no-create-home", "--shell", "/bin/false", name], check=True)
+    try:
+        yield int(subprocess.check_output(["id", "-u", name]))
+    finally:
+        subprocess.run(["userdel", name], check=True, capture_output=True)
+
+
+@pytest.fixture
+def shared(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder that everybody can write into, in which the cache is to be."""
+    folder = Path(mkdtemp())
+    folder.chmod(0o1777)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
+    yield folder
+    shutil.rmtree(folder)
+
+
+def done_by(user: int, what: Callable[[], object]) -> bool:
+    """Whether another user can do something, in a copy of this process."""
+    child = os.fork()
+    if child == 0:
+        try:
+            os.setgroups([])
+            os.setresgid(user, user, user)
+            os.setresuid(user, user, user)
+            what()
+            os._exit(0)
+        except BaseException:
+            os._exit(1)
+    return os.waitpid(child, 0)[1] == 0
+
+
+class Mark:
+    """What leaves a mark when it is unpickled."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[Callable[[str], int], tuple[str]]:
+        return os.system, (f"touch {self.path}",)
+
+
+@pytest.fixture
+def planted(shared: Path, other: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of another user's, with what it takes to be taken for ours; where marks are left."""
+    mark = tmp_path / "mark"
+    source = tmp_path / "planted.c"
+    source.write_text(LIBRARY.replace("MARK", str(mark)))
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", tmp_path / "planted.so", source], check=True)
+    forged = Path(mkdtemp())
+    monkeypatch.setenv("XDG_CACHE_HOME", str(forged))
+    keep("loop", library._key(), {"stepper.so": (tmp_path / "planted.so").read_bytes()})
+    keep("batch", "0", {"kernel": pickle.dumps(Mark(mark))})
+    monkeypatch.setenv("XDG_CACHE_HOME", str(shared))
+    for path in (forged, *forged.rglob("*")):
+        path.chmod(0o777)
+
+    def plant() -> None:
+        for folder in (forged / "auv-fmu").iterdir():
+            shutil.copytree(folder, shared / "auv-fmu" / folder.name)
+
+    # As it was made with umask 0, or by the other user.
+    (shared / "auv-fmu").mkdir()
+    (shared / "auv-fmu").chmod(0o777)
+    assert done_by(other, plant)
+    shutil.rmtree(forged)
+    return mark
+
+
+@pytest.mark.parametrize("owner", ["root", "other"])
+def test_what_another_user_has_put_into_the_cache_is_not_run(planted, shared, other, owner):
+    if owner == "other":
+        os.chown(shared / "auv-fmu", other, other)
+    status, said = called("run", "fig4", "--stop-time", "0.1", "--loop", "compiled")
+    assert status == 0
+    [line] = said
+    assert line.startswith("auv-fmu: warning: nothing is kept for later, because ")
+    assert str(shared / "auv-fmu") in line
+    assert not planted.exists()
+    with pytest.warns(UserWarning, match="only you can write"):
+        assert not kept("batch", "0")
+
+
+def test_once_the_folder_is_mended_files_of_another_user_are_not_run(planted, shared):
+    subprocess.run(["chmod", "-R", "go-w", shared / "auv-fmu"], check=True)
+    for folder in (shared / "auv-fmu").iterdir():
+        os.chown(folder, 0, 0)
+    assert library.kept() is None
+    assert not kept("batch", "0")
+    assert library.made().advance
+    assert not planted.exists()
+
+
+def test_a_folder_cannot_be_made_before_us(shared, other):
+    assert done_by(other, lambda: (shared / "auv-fmu").mkdir(0o755))
+    with pytest.warns(UserWarning, match="only you can write"):
+        [path] = keep("loop", "0", {"a": b""})
+    assert path.is_relative_to(process_folder())
+
+
+def test_a_sweep_cannot_be_reached(other):
+    psutil = pytest.importorskip("psutil", reason="needs the extra `studies`")
+    pytest.importorskip("distributed", reason="needs the extra `studies`")
+    from orchestrator.studies.cluster import making  # noqa: PLC0415
+
+    runs = [run(number) for number in range(400)]
+    with making(Toy(0.001), iter(runs), workers=2) as blocks:
+        made = list(next(blocks))
+        this = psutil.Process()
+        processes = [this, *this.children(recursive=True)]
+        open_to = [one for process in processes for one in process.net_connections("all")]
+        assert not [one for one in open_to if one.status == psutil.CONN_LISTEN]
+        paths = {one.laddr for one in open_to if one.family == socket.AF_UNIX and one.laddr}
+        ours = [path for path in paths if path.startswith(str(process_folder()))]
+        # The scheduler, and for each worker it and who looks after it.
+        assert len(ours) == 5
+        for path in ours:
+            socket.socket(socket.AF_UNIX).connect(path)
+            assert not done_by(other, partial(socket.socket(socket.AF_UNIX).connect, path))
+        assert not done_by(other, lambda: list(process_folder().iterdir()))
+        made += [one for block in blocks for one in block]
+    expected = [outcome(one).indices["square"] for one in runs]
+    assert [one.indices["square"] for one in sorted(made, key=lambda one: one.number)] == expected
