@@ -7,7 +7,6 @@ from importlib.metadata import version
 from pathlib import Path
 
 from orchestrator.errors import InputError
-from orchestrator.experiments.bill_of_materials import digest_of
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.master.checkpoint import (
     Checkpoints,
@@ -93,7 +92,7 @@ def _identity(prepared: Prepared) -> Identity:
     return {
         "auv-fmu": version("auv-fmu"),
         "the components": ", ".join(system.components),
-        **{f"the FMU of {name}": digest_of(of.fmu) for name, of in system.components.items()},
+        **{f"the FMU of {name}": of.digest for name, of in system.components.items()},
         **{f"what feeds {wire.target}": repr(wire) for wire in system.connections},
         "the events": repr(prepared.events),
         "the inputs": "" if prepared.course is None else prepared.course.digest,

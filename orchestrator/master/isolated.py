@@ -30,7 +30,6 @@ from orchestrator.master.keeper import END
 from orchestrator.master.log import Log
 from orchestrator.master.texts import Texts
 from orchestrator.system.component import Component
-from orchestrator.system.unpacking import unpacked
 from orchestrator.system.values import Value
 
 #: How long a call may take by default [s]: an FMU may fetch a licence or read maps first.
@@ -357,13 +356,13 @@ class _Keeper:
     def __init__(
         self, components: Mapping[str, Component], connections: Sequence[socket.socket]
     ) -> None:
-        folders = [unpacked(component.fmu) for component in components.values()]
+        folders = [component.folder for component in components.values()]
         descriptors = [connection.fileno() for connection in connections]
         order = {
             "path": [entry for entry in sys.path if isinstance(entry, str)],
             "temporary": sorted({str(folder.parent) for folder in folders}),
             "components": [
-                (component.name, str(component.fmu), str(folder), descriptor)
+                (component.name, str(component.fmu), component.digest, str(folder), descriptor)
                 for component, folder, descriptor in zip(
                     components.values(), folders, descriptors, strict=True
                 )

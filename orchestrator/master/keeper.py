@@ -42,8 +42,8 @@ def keep(order: dict[str, Any]) -> None:
     and its exit status to the standard output when its process has ended.
 
     Args:
-        order: `components`, each with its name, FMU, folder and the descriptor of a socket, and
-            `temporary`, folders that nobody else removes if the parent is killed.
+        order: `components`, each with its name, FMU, digest, folder and the descriptor of a socket,
+            and `temporary`, folders that nobody else removes if the parent is killed.
 
     """
     parent = os.getppid()
@@ -51,9 +51,9 @@ def keep(order: dict[str, Any]) -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     children = _Children()
-    for name, fmu, folder, descriptor in order["components"]:
+    for name, fmu, digest, folder, descriptor in order["components"]:
         if children.start(name):
-            serve(name, Path(fmu), Path(folder), _alone_with(descriptor))
+            serve(name, Path(fmu), digest, Path(folder), _alone_with(descriptor))
             return
         os.close(descriptor)
     if not children.watched(parent):

@@ -22,17 +22,18 @@ from orchestrator.system.description import read_description
 from orchestrator.system.structure import System
 
 
-def serve(name: str, fmu: Path, folder: Path, connection: socket.socket) -> None:
+def serve(name: str, fmu: Path, digest: str, folder: Path, connection: socket.socket) -> None:
     """Say that it begins, instantiate an FMU, and answer requests until there are no more.
 
     Args:
         name: of the component.
         fmu: the file, for messages.
+        digest: of it.
         folder: into which it is unpacked.
         connection: to whom wants it simulated.
 
     """
-    component = Component(name, fmu, read_description(folder).description)
+    component = Component(name, fmu, read_description(folder).description, digest)
     inputs, outputs = sizes(component)
     # Before the inputs: time and step size.
     channel, letters = Channel(connection, outputs, 2 + inputs), Letters()

@@ -20,7 +20,6 @@ import orchestrator
 from orchestrator.analysis.metrics import Metrics
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
-from orchestrator.experiments.bill_of_materials import digest_of
 from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.experiments.record import PACKAGES
@@ -129,7 +128,7 @@ def key_of(prepared: Prepared) -> str:
     """Digest of all that an outcome depends on."""
     system = prepared.system
     content = {
-        "components": {name: digest_of(part.fmu) for name, part in system.components.items()},
+        "components": {name: part.digest for name, part in system.components.items()},
         "connections": sorted(f"{wire.source} {wire.target}" for wire in system.connections),
         "parameters": sorted(
             (str(name), value)
@@ -161,6 +160,8 @@ def _make(run: Run, file: Path) -> Outcome:
     """Make a run and keep its outcome; a task for a worker."""
     try:
         prepared = run.prepared()
+        if key_of(prepared) != file.stem:
+            raise InputError("FMUs have changed while the report was made; make it anew")
         metrics, seen = Metrics(), VisibleRows()
         simulate(
             prepared.system,
