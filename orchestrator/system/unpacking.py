@@ -26,6 +26,9 @@ from orchestrator.system.leftovers import process_folder
 #: An archive that holds more than this is not unpacked.
 _MOST_FILES, _MOST_BYTES = 100_000, 2**30
 
+#: Nor one that is longer than this, whatever it says that it holds [bytes].
+_LONGEST = 2 * _MOST_BYTES
+
 #: Files of an archive that are read into memory, and how long they may be [bytes].
 _DESCRIPTIONS, _MOST_OF_A_DESCRIPTION = (".xml", ".ssd", ".ssv", ".ssm"), 100_000_000
 
@@ -101,14 +104,20 @@ def _unpacked(archive: Path, file: BufferedReader) -> Unpacked:
     version = _version_of(file)
     digest = _digests.get(version)
     if digest is None:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    if digest not in _folders:
-        folder = _extracted(archive, file)
-        if _version_of(file) != version:
-            rmtree(folder, ignore_errors=True)
-            raise InputError(f"{archive}: is being written; try again when it is whole")
-        _folders[digest] = folder
-    _digests[version] = digest
+        with ZipFile(file) as content:
+            # Before the file is read to its end, which it may not have.
+            _check(content.infolist())
+            if (size := os.fstat(file.fileno()).st_size) > _LONGEST:
+                raise ValueError(f"it is {size:,} bytes long, more than {_LONGEST:,}")
+            file.seek(0)
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+            if digest not in _folders:
+                folder = _extracted(archive, content)
+                if _version_of(file) != version:
+                    rmtree(folder, ignore_errors=True)
+                    raise InputError(f"{archive}: is being written; try again when it is whole")
+                _folders[digest] = folder
+        _digests[version] = digest
     return Unpacked(_folders[digest], digest)
 
 
@@ -118,21 +127,19 @@ def _version_of(file: BufferedReader) -> _Version:
     return it.st_dev, it.st_ino, it.st_size, it.st_mtime_ns, it.st_ctime_ns
 
 
-def _extracted(archive: Path, file: BufferedReader) -> Path:
-    with ZipFile(file) as content:
-        _check(content.infolist())
+def _extracted(archive: Path, content: ZipFile) -> Path:
+    try:
+        folder = Path(mkdtemp(dir=process_folder()))
         try:
-            folder = Path(mkdtemp(dir=process_folder()))
-            try:
-                content.extractall(folder)
-            except BaseException:
-                rmtree(folder, ignore_errors=True)
-                raise
-        except OSError as error:
-            raise InputError(
-                f"{archive}: cannot be unpacked into {gettempdir()}: {reason(error)}; set "
-                "TMPDIR to another folder"
-            ) from error
+            content.extractall(folder)
+        except BaseException:
+            rmtree(folder, ignore_errors=True)
+            raise
+    except OSError as error:
+        raise InputError(
+            f"{archive}: cannot be unpacked into {gettempdir()}: {reason(error)}; set "
+            "TMPDIR to another folder"
+        ) from error
     return folder
 
 
