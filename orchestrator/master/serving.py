@@ -16,6 +16,7 @@ from orchestrator.master.loaded import LoadedInstance, loaded
 from orchestrator.master.log import Letters
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import member, step
+from orchestrator.master.surroundings import Surroundings
 from orchestrator.master.texts import Texts
 from orchestrator.system.component import Component
 from orchestrator.system.description import read_description
@@ -58,6 +59,7 @@ class _Served:
         self, component: Component, instance: LoadedInstance, channel: Channel, letters: Letters
     ) -> None:
         self._instance, self._channel, self._letters = instance, channel, letters
+        self._surroundings = Surroundings()
         system = System(component.name, {component.name: component}, ())
         row = Row(system, {component.name: instance})
         self._member = member(instance)
@@ -96,6 +98,7 @@ class _Served:
             note |= {"failed": str(error), "fatal": error.fatal}
         except Exception as error:
             note |= {"failed": f"{self._instance.name}: {reason(error)}", "fatal": True}
+        self._surroundings.end_copy()
         if messages := self._letters.handed_over():
             note["messages"] = messages
         if news := self._texts.since(self._told):
