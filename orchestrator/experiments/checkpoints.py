@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
@@ -58,6 +59,9 @@ def checkpoints_of(
         Checkpoints(place, _identity(prepared), every, resume)
         for place, prepared in zip(places, runs, strict=True)
     ]
+    for checkpoints in found:
+        # FMUs may change the current folder.
+        checkpoints.folder = checkpoints.folder.absolute()
     times = [checkpoints.time for checkpoints in found]
     for prepared, time in zip(runs, times, strict=True):
         if time is not None:
@@ -83,7 +87,15 @@ def leave(
         if is_whole:
             checkpoints.remove()
         elif checkpoints.time is not None:
-            say(f"--resume goes on from t = {checkpoints.time:g} s, from {checkpoints.folder}")
+            place = _shown(checkpoints.folder)
+            say(f"--resume goes on from t = {checkpoints.time:g} s, from {place}")
+
+
+def _shown(folder: Path) -> Path:
+    """A folder as it is called from the current one, if that holds it."""
+    with suppress(OSError, ValueError):
+        return folder.relative_to(Path.cwd())
+    return folder
 
 
 def _identity(prepared: Prepared) -> Identity:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import glob
 from collections.abc import Iterator
-from contextlib import chdir, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from shutil import copytree
 from tempfile import mkdtemp
@@ -15,6 +15,7 @@ import fmpy
 from fmpy.fmi2 import FMU2Slave, fmi2Error
 
 from orchestrator.errors import InputError, reason
+from orchestrator.master.surroundings import within
 from orchestrator.system.component import Component
 from orchestrator.system.unpacking import check_place, runs_python
 
@@ -80,7 +81,7 @@ class Library:
         check_binary(component, folder)
         try:
             # fmpy changes the current folder meanwhile, and leaves it so if it fails.
-            with chdir(Path.cwd()):
+            with within(folder):
                 self.fmu = FMU2OfOthers(
                     guid=component.description.guid,
                     modelIdentifier=component.description.coSimulation.modelIdentifier,

@@ -78,7 +78,7 @@ def _of_the_machine() -> _Compiler | None:
         return None
     return lambda *arguments: subprocess.run(
         # Ctrl-C is for this process alone.
-        [command, *arguments], capture_output=True, text=True, check=False,
+        [command, *arguments], capture_output=True, text=True, errors="replace", check=False,
         start_new_session=True,
     )  # fmt: skip
 
