@@ -66,7 +66,9 @@ def compiler_for(platforms: Sequence[Platform]) -> Compiler:
 
 
 def _version_of(command: str) -> str:
-    process = subprocess.run([command, "--version"], capture_output=True, text=True, check=False)
+    process = subprocess.run(
+        [command, "--version"], capture_output=True, text=True, errors="replace", check=False
+    )
     return process.stdout.partition("\n")[0] or command
 
 
@@ -98,7 +100,7 @@ def library(
             options = [*target, *FLAGS, *size, "-o", made.name, main, "-lm"]
             process = subprocess.run(
                 [*compiler.command, *options],
-                cwd=folder, capture_output=True, text=True, check=False,
+                cwd=folder, capture_output=True, text=True, errors="replace", check=False,
             )  # fmt: skip
             if process.returncode != 0:
                 raise OSError(

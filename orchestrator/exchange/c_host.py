@@ -46,7 +46,9 @@ def compiled(folder: Path, command: Sequence[str] = (), name: str = "host") -> P
     options = ["-std=c99", "-O2", "-o", str(program), str(SOURCE)]
     if program.suffix != ".exe":
         options.append("-ldl")  # until glibc 2.34, dlopen is in a library of its own
-    process = subprocess.run([*found, *options], capture_output=True, text=True, check=False)
+    process = subprocess.run(
+        [*found, *options], capture_output=True, text=True, errors="replace", check=False
+    )
     if process.returncode != 0:
         raise InputError(f"{SOURCE.name} does not compile: {last_line(process.stderr)}")
     return program

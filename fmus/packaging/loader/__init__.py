@@ -46,7 +46,7 @@ def compiled() -> bytes:
         library = Path(folder, "loader.so")
         process = subprocess.run(
             [command, "-O2", "-s", "-Wl,--build-id=none", "-o", str(library), *FLAGS],
-            cwd=FOLDER, capture_output=True, text=True, check=False,
+            cwd=FOLDER, capture_output=True, text=True, errors="replace", check=False,
         )  # fmt: skip
         if process.returncode != 0:
             raise OSError(f"the native loader does not compile: {process.stderr.strip()}")
