@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -28,9 +29,38 @@ def reason(error: BaseException) -> str:
     return "; ".join(said).replace(":; ", ": ") or repr(error)
 
 
+def unforeseen(error: Exception) -> str:
+    """What an exception says during a run, in one line.
+
+    But for a full disk or short memory none is foreseen there. An FMU may have closed files of this
+    process, or changed what Python's modules hold.
+    """
+    if isinstance(error, InputError | MemoryError):
+        return reason(error)
+    if isinstance(error, OSError) and error.errno != errno.EBADF:
+        return reason(error)
+    return (
+        f"{type(error).__name__}: {reason(error)}; if an FMU has changed this process, --isolate "
+        "gives it one of its own"
+    )
+
+
 def shortened(text: str, most: int = 80) -> str:
     """A text for a message, cut where it gets long."""
     return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def plain(text: str, kept: str = "") -> str:
+    """A text in which nothing of a name speaks to the terminal.
+
+    Args:
+        text: to be shown.
+        kept: letters that may stay, though they are not printed.
+
+    """
+    return "".join(
+        letter if letter.isprintable() or letter in kept else repr(letter)[1:-1] for letter in text
+    )
 
 
 def last_line(text: str, otherwise: str = "no reason given") -> str:

@@ -13,7 +13,6 @@ from orchestrator.findings import Findings
 from orchestrator.master.binary import check_binary
 from orchestrator.master.schedule import delays
 from orchestrator.system.examination import examine, surprises
-from orchestrator.system.unpacking import unpacked
 
 #: How long a run could last that nobody makes [s].
 _SOME_TIME = 1.0
@@ -54,7 +53,7 @@ def _fmu(options: argparse.Namespace, findings: Findings) -> list[str]:
     if component is None:
         return []
     with findings.collecting():
-        check_binary(component, unpacked(component.fmu))
+        check_binary(component, component.folder)
     return list(surprises(component))
 
 
@@ -65,7 +64,7 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
         scenario, system = loaded(options.file, variant=options.variant, findings=findings)
         for name, component in system.components.items():
             with findings.collecting():
-                check_binary(component, unpacked(component.fmu))
+                check_binary(component, component.folder)
             to_know += [f"{name}: {text}" for text in surprises(component)]
         request = Request()
         if scenario.stop_time is None and system.stop_time is None:

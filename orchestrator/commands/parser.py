@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
+from itertools import pairwise
 
 from orchestrator.commands import build, check, exchange, look, new, paper, run, sweep, upkeep
 from orchestrator.commands.options import BAD_INPUT, FAILED, INTERRUPTED
@@ -15,9 +17,11 @@ from orchestrator.errors import InputError, StartError
 
 def dispatch(arguments: Sequence[str] | None) -> int:
     """Run what the arguments say; returns the exit status."""
+    given = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        options = parser().parse_args(arguments)
-        options.command = ["auv-fmu", *(sys.argv[1:] if arguments is None else arguments)]
+        options = parser().parse_args(given)
+        _check_no_empty(given)
+        options.command = ["auv-fmu", *given]
         return int(options.action(options))
     except InputError as error:
         say(str(error))
@@ -27,6 +31,20 @@ def dispatch(arguments: Sequence[str] | None) -> int:
         return INTERRUPTED
     except Unheard:
         return FAILED
+
+
+def _check_no_empty(arguments: Sequence[str]) -> None:
+    """Check that all arguments say something: a variable of the shell may be unset.
+
+    Raises:
+        InputError: one is empty.
+
+    """
+    for before, argument in pairwise(("auv-fmu", *arguments)):
+        if not argument:
+            raise InputError(f"the argument after {before} is empty")
+        if re.fullmatch(r"--[\w-]+=", argument):
+            raise InputError(f"{argument} says nothing")
 
 
 def parser() -> argparse.ArgumentParser:

@@ -7,7 +7,7 @@ import sys
 from contextlib import suppress
 from typing import TextIO
 
-from orchestrator.errors import shortened
+from orchestrator.errors import plain, shortened
 
 #: Letters of a line for the user: a name or a value in it may be a whole file.
 _LONGEST = 4000
@@ -34,7 +34,7 @@ def fill() -> None:
 def say(text: str) -> None:
     """A line for the user beside the output."""
     with suppress(OSError):
-        print(shortened(f"auv-fmu: {_plain(text)}", _LONGEST), file=sys.stderr, flush=True)
+        print(shortened(f"auv-fmu: {plain(text)}", _LONGEST), file=sys.stderr, flush=True)
 
 
 def show(*lines: object) -> None:
@@ -46,15 +46,10 @@ def show(*lines: object) -> None:
     """
     try:
         for line in lines:
-            print(_plain(str(line)))
+            print(plain(str(line)))
     except OSError as error:
         _give_up(sys.stdout, error)
         raise Unheard from error
-
-
-def _plain(text: str) -> str:
-    """A text in one line, in which nothing of a name speaks to the terminal."""
-    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
 
 
 def finished() -> bool:

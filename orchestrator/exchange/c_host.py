@@ -16,7 +16,6 @@ from orchestrator.master.schedule import gathered, stages
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.unpacking import unpacked
 from orchestrator.system.values import Value
 
 SOURCE = Path(__file__).with_name("host.c")
@@ -59,7 +58,7 @@ def compiled(folder: Path, command: Sequence[str] = (), name: str = "host") -> P
 def library_of(component: Component) -> Path:
     """The library of an FMU for this machine, unpacked."""
     identifier = component.description.coSimulation.modelIdentifier
-    return unpacked(component.fmu) / "binaries" / "linux64" / f"{identifier}.so"
+    return component.folder / "binaries" / "linux64" / f"{identifier}.so"
 
 
 def plan(system: System, experiment: Experiment, library: Library = library_of) -> str:

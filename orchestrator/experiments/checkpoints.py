@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
 from orchestrator.errors import InputError
-from orchestrator.experiments.bill_of_materials import digest_of
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.master.checkpoint import (
     Checkpoints,
@@ -62,6 +62,9 @@ def checkpoints_of(
         Checkpoints(folder, _identity(prepared), every, resume, force, token)
         for folder, prepared in zip(folders, runs, strict=True)
     ]
+    for checkpoints in found:
+        # FMUs may change the current folder.
+        checkpoints.folder = checkpoints.folder.absolute()
     times = [checkpoints.time for checkpoints in found]
     for prepared, time in zip(runs, times, strict=True):
         if time is not None:
@@ -87,7 +90,15 @@ def leave(
         if is_whole:
             checkpoints.remove()
         elif checkpoints.time is not None:
-            say(f"--resume goes on from t = {checkpoints.time:g} s, from {checkpoints.folder}")
+            place = _shown(checkpoints.folder)
+            say(f"--resume goes on from t = {checkpoints.time:g} s, from {place}")
+
+
+def _shown(folder: Path) -> Path:
+    """A folder as it is called from the current one, if that holds it."""
+    with suppress(OSError, ValueError):
+        return folder.relative_to(Path.cwd())
+    return folder
 
 
 def _identity(prepared: Prepared) -> Identity:
@@ -96,7 +107,7 @@ def _identity(prepared: Prepared) -> Identity:
     return {
         "auv-fmu": version("auv-fmu"),
         "the components": ", ".join(system.components),
-        **{f"the FMU of {name}": digest_of(of.fmu) for name, of in system.components.items()},
+        **{f"the FMU of {name}": of.digest for name, of in system.components.items()},
         **{f"what feeds {wire.target}": repr(wire) for wire in system.connections},
         "the events": repr(prepared.events),
         "the inputs": "" if prepared.course is None else prepared.course.digest,

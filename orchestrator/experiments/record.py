@@ -12,14 +12,13 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from orchestrator.experiments.bill_of_materials import digest_of
 from orchestrator.experiments.bundle import NATIVE, PYTHON
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observer import Ending, Header, Occurrence
 from orchestrator.system.ledger import RECORD
 from orchestrator.system.names import port_name
-from orchestrator.system.unpacking import runs_python, unpacked
+from orchestrator.system.unpacking import runs_python
 
 #: The indices of a run.
 METRICS = "metrics.json"
@@ -94,8 +93,8 @@ def write_record(
         "fmus": {
             component.name: {
                 "file": component.fmu.name,
-                "sha256": digest_of(component.fmu),
-                "kind": PYTHON if runs_python(unpacked(component.fmu)) else NATIVE,
+                "sha256": component.digest,
+                "kind": PYTHON if runs_python(component.folder) else NATIVE,
             }
             for component in prepared.system.components.values()
         },

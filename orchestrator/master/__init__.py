@@ -10,6 +10,7 @@ module                  what it holds
 :mod:`.loaded`          an FMU loaded into this process
 :mod:`.isolated`        an FMU in a process of its own, from this side
 :mod:`.placing`         in which process each FMU runs
+:mod:`.surroundings`    what FMUs may change of this process, and how it is as before
 :mod:`.channel`         messages between the two
 :mod:`.serving`         what that process does
 :mod:`.keeper`          the process that starts such processes, and leaves none behind

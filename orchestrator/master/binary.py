@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import glob
 from collections.abc import Iterator
-from contextlib import chdir, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from shutil import copytree
 from tempfile import mkdtemp
@@ -17,6 +17,7 @@ from fmpy.fmi2 import FMU2Slave, fmi2Error, fmi2Status
 
 from orchestrator.errors import InputError, reason
 from orchestrator.master.mode import put_back
+from orchestrator.master.surroundings import within
 from orchestrator.system.component import Component
 from orchestrator.system.unpacking import check_place, runs_python
 
@@ -97,7 +98,7 @@ class Library:
         check_binary(component, folder)
         try:
             # fmpy changes the current folder meanwhile, and leaves it so if it fails.
-            with chdir(Path.cwd()):
+            with within(folder):
                 self.fmu = FMU2OfOthers(
                     guid=component.description.guid,
                     modelIdentifier=component.description.coSimulation.modelIdentifier,

@@ -12,6 +12,8 @@ import json
 import socket
 from base64 import b64decode, b64encode
 from collections.abc import Callable
+from contextlib import suppress
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -19,8 +21,9 @@ import numpy as np
 from orchestrator.master.transfer import KINDS
 from orchestrator.system.component import Component
 
-#: Bytes beyond which a note is none: the state of an FMU may be large.
-_LONGEST_NOTE = 1 << 30
+#: Bytes beyond which a note is none: of one with the state of an FMU, which may be large, and of
+#: any other.
+LONGEST_STATE, LONGEST_NOTE = 1 << 30, 1 << 25
 
 #: What stands for bytes in a note: an object with this key alone, which is no variable's name.
 _BYTES = "\0base64"
@@ -46,7 +49,7 @@ class Channel:
         Args:
             connection: whose timeout, if it has one, says how often `waited` is called.
             outgoing, incoming: how many numbers go with each message.
-            waited: called with the seconds for which nothing has moved, to raise something.
+            waited: called with the seconds for which a message is waited for, to raise something.
 
         """
         self._connection = connection
@@ -63,26 +66,30 @@ class Channel:
             OSError: the other end is closed.
 
         """
-        text = b"" if note is None else json.dumps(note, default=_as_text).encode()
+        written = "" if note is None else json.dumps(note, default=_as_text, ensure_ascii=False)
+        text = written.encode(errors="replace")
         self._sent[0] = len(text)
         self._move(self._connection.send, self._sent_bytes)
         if text:
             self._move(self._connection.send, memoryview(text))
 
-    def receive(self) -> Any:
+    def receive(self, longest: int = LONGEST_STATE) -> Any:
         """Receive a message, and return its note, or None.
+
+        Args:
+            longest: note that may come [bytes].
 
         Raises:
             EOFError, OSError: the other end is closed.
-            ValueError: it is no message.
+            ValueError, RecursionError, MemoryError: it is no message.
 
         """
         self._move(self._connection.recv_into, self._received_bytes)
         length = self._received[0]
         if length == 0.0:
             return None
-        if not 1.0 <= length <= _LONGEST_NOTE:
-            raise ValueError("no message")
+        if not 1.0 <= length <= longest:
+            raise ValueError(f"a note of {length:g} bytes, where {longest:,} are the most")
         text = bytearray(int(length))
         self._move(self._connection.recv_into, memoryview(text))
         return json.loads(text, object_hook=_from_text)
@@ -93,19 +100,16 @@ class Channel:
 
     def _move(self, move: Callable[[memoryview], int], data: memoryview) -> None:
         """Send or receive all of some bytes."""
-        waited = 0.0
+        begun = monotonic()
         while True:
-            try:
+            with suppress(TimeoutError):
                 n = move(data)
-            except TimeoutError:
-                waited += self._connection.gettimeout() or 0.0
-                self._waited(waited)
-                continue
-            if n == len(data):
-                return
-            if n == 0:
-                raise EOFError
-            data = data[n:]
+                if n == len(data):
+                    return
+                if n == 0:
+                    raise EOFError
+                data = data[n:]
+            self._waited(monotonic() - begun)
 
 
 def _as_text(value: bytes) -> dict[str, str]:

@@ -25,7 +25,7 @@ from uuid import uuid4
 import numpy as np
 
 from orchestrator.errors import InputError, reason
-from orchestrator.master.attendant import Lasting, Run
+from orchestrator.master.attendant import NEVER, Lasting, Run
 from orchestrator.master.log import Log
 from orchestrator.master.observer import Ending, Header, NotKept
 from orchestrator.master.spool import Spool, begins
@@ -196,7 +196,7 @@ class Checkpoints:
                 self._resume(run, found)
         elif run.made:
             self._write(run)
-        steps = max(round(self._every / run.experiment.step), 1)
+        steps = max(round(min(self._every / run.experiment.step, NEVER)), 1)
         return (run.made // steps + 1) * steps
 
     def remove(self) -> None:

@@ -8,10 +8,10 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from importlib.util import find_spec
-from io import StringIO
+from io import BufferedWriter, RawIOBase, StringIO
 from itertools import compress, islice
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,13 +27,79 @@ _ROWS = 8192
 _BYTES, _CHUNK_BYTES = 9, 1024
 
 
+class _Output(RawIOBase):
+    """A new file to write to, which is opened again where an FMU in this process has closed it."""
+
+    def __init__(self, path: Path) -> None:
+        """Make it."""
+        self._path, self._at = path, 0
+        self._descriptor = self._opened(os.O_CREAT | os.O_TRUNC)
+        self._status = os.fstat(self._descriptor)
+
+    def check_place(self) -> None:
+        """Check that it is still where it was made.
+
+        Raises:
+            OSError: what is written would go nowhere.
+
+        """
+        try:
+            is_there = os.path.samestat(self._path.stat(), self._status)
+        except FileNotFoundError:
+            is_there = False
+        if not is_there:
+            raise FileNotFoundError(f"{self._path} was moved or deleted while it was written")
+        if not self._is_open():
+            self._descriptor = self._opened()
+
+    def fileno(self) -> int:
+        """Its descriptor."""
+        return self._descriptor
+
+    def writable(self) -> bool:
+        """It is."""
+        return True
+
+    def tell(self) -> int:
+        """How much was written [bytes]."""
+        return self._at
+
+    def write(self, content: Any) -> int:
+        """Write some of what there is to write."""
+        os.lseek(self._descriptor, self._at, os.SEEK_SET)
+        n = os.write(self._descriptor, content)
+        self._at += n
+        return n
+
+    def truncate(self, size: int | None = None) -> int:
+        """Cut it off."""
+        self._at = self._at if size is None else size
+        os.ftruncate(self._descriptor, self._at)
+        return self._at
+
+    def close(self) -> None:
+        """Close it, if that is still to be done."""
+        if not self.closed:
+            super().close()
+            if self._is_open():
+                os.close(self._descriptor)
+
+    def _opened(self, flags: int = 0) -> int:
+        return os.open(self._path, os.O_WRONLY | getattr(os, "O_BINARY", 0) | flags, 0o666)
+
+    def _is_open(self) -> bool:
+        """Whether the descriptor is that of the file, and not closed or of another one by now."""
+        with suppress(OSError):
+            return os.path.samestat(os.fstat(self._descriptor), self._status)
+        return False
+
+
 class CsvLines:
     """A file of CSV that ends with a whole line, whenever and however writing ends."""
 
     def __init__(self, path: Path, names: Sequence[str]) -> None:
         """Make the file and write the names of its columns."""
-        self._path = path
-        self._file = path.open("wb", buffering=0)
+        self._file = _Output(path)
         self.write([names])
 
     def write(self, lines: Sequence[Sequence[object]]) -> None:
@@ -43,7 +109,7 @@ class CsvLines:
             OSError: not all of them could be written; those that could are there.
 
         """
-        _check_place(self._file, self._path)
+        self._file.check_place()
         text = StringIO(newline="")
         csv.writer(text, lineterminator="\n").writerows(lines)
         content = text.getvalue().encode()
@@ -110,7 +176,8 @@ class ParquetFile:
         for place, _ in self._texts:
             kinds[place] = self._arrow.string()
         self._schema = self._arrow.schema(list(zip(("time", *header.columns), kinds, strict=True)))
-        self._file = self._path.open("wb")
+        self._output = _Output(self._path)
+        self._file = BufferedWriter(self._output)
         self._writer = import_module("pyarrow.parquet").ParquetWriter(self._file, self._schema)
         self._waiting = [np.empty((0, len(self._schema)))]
         self._n, self._room = 0, min(header.experiment.rows, _ROWS)
@@ -127,6 +194,7 @@ class ParquetFile:
 
     def end(self, ending: Ending) -> None:
         """Write the rest and close the file."""
+        self._output.check_place()
         if len(rest := np.vstack(self._waiting)):
             self._write(rest)
         self._writer.close()
@@ -147,25 +215,12 @@ class ParquetFile:
             OSError: there is not enough.
 
         """
-        _check_place(self._file, self._path)
+        self._output.check_place()
         self._file.flush()
         if hasattr(os, "posix_fallocate"):
             columns = len(self._schema)
             needed = columns * (self._room * _BYTES + (self._n + 2) * _CHUNK_BYTES)
             os.posix_fallocate(self._file.fileno(), self._file.tell(), needed)
-
-
-def _check_place(file: IO[bytes], path: Path) -> None:
-    """Check that a file is still where it was made.
-
-    Raises:
-        OSError: what is written would go nowhere.
-
-    """
-    with suppress(FileNotFoundError):
-        if os.path.samestat(os.fstat(file.fileno()), path.stat()):
-            return
-    raise FileNotFoundError(f"{path} was moved or deleted while it was written")
 
 
 #: Writers by the ending of their files.

@@ -15,6 +15,13 @@ from typing import Any
 _STOPS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
 
 
+#: What ends a process that has not asked for it, such as the alarm that an FMU has set.
+_ENDS = [
+    getattr(signal, n)
+    for n in ("SIGALRM", "SIGVTALRM", "SIGPROF", "SIGUSR1", "SIGUSR2", "SIGIO", "SIGXCPU")
+    if hasattr(signal, n)
+]
+
 #: After so many signals, somebody does not want to wait any more.
 _INSISTENCE = 3
 
@@ -55,6 +62,14 @@ class Interrupts:
         """Whether it is to end without what takes long: asked twice, or not from the keyboard."""
         return len(self.signals) > 1 or any(number != signal.SIGINT for number in self.signals)
 
+    def __str__(self) -> str:
+        """Which signal has come first, where it is none that a user sends."""
+        first = self.signals[0] if self.signals else 0
+        if first not in _ENDS:
+            return ""
+        name = signal.Signals(first).name
+        return f" by {name}, which an FMU may have caused (--isolate gives it its own process)"
+
     @contextmanager
     def insistence(self, give_up: Callable[[], None]) -> Iterator[None]:
         """Within the context, have the third signal end the process, whatever an FMU does.
@@ -81,17 +96,20 @@ class Interrupts:
             # Not while it is giving up.
             leaving.acquire()
             signal.set_wakeup_fd(before)
-            os.close(end_of_signals)
+            # An FMU may have closed it.
+            with suppress(OSError):
+                os.close(end_of_signals)
 
     def _count(self, numbers: int, give_up: Callable[[], None], leaving: threading.Lock) -> None:
         n = 0
-        while number := os.read(numbers, 1):
-            n += number[0] in _STOPS
-            if n >= _INSISTENCE and leaving.acquire(blocking=False):
-                with suppress(Exception):
-                    self.hand_over()
-                give_up()
-        os.close(numbers)
+        with suppress(OSError):
+            while number := os.read(numbers, 1):
+                n += number[0] in _STOPS
+                if n >= _INSISTENCE and leaving.acquire(blocking=False):
+                    with suppress(Exception):
+                        self.hand_over()
+                    give_up()
+            os.close(numbers)
 
     def take(self, number: int, _frame: Any) -> None:
         """Collect a signal: a handler for :func:`signal.signal`."""
@@ -163,6 +181,7 @@ def held_interrupts(
     interrupts = Interrupts(announce)
     # What is ignored stays so: nohup, or a shell's background.
     heeded = [n for n in _STOPS if signal.getsignal(n) not in (signal.SIG_IGN, None)]
+    heeded += [n for n in _ENDS if signal.getsignal(n) is signal.SIG_DFL]
     with _handled(heeded, interrupts.take):
         yield interrupts
 

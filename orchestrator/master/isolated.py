@@ -20,19 +20,18 @@ from time import monotonic
 from typing import Any
 
 import numpy as np
-from fmpy.fmi2 import fmi2Warning
+from fmpy.fmi2 import fmi2OK, fmi2Pending, fmi2Warning
 
 from orchestrator.errors import InputError, StartError, reason
 from orchestrator.master import layout
-from orchestrator.master.channel import Channel, sizes
+from orchestrator.master.channel import LONGEST_NOTE, LONGEST_STATE, Channel, sizes
 from orchestrator.master.instance import ComponentFailed, Ended, Instance, Part
 from orchestrator.master.interrupts import Interrupts
 from orchestrator.master.keeper import END
 from orchestrator.master.log import Log
 from orchestrator.master.texts import Texts
 from orchestrator.system.component import Component
-from orchestrator.system.unpacking import unpacked
-from orchestrator.system.values import Value
+from orchestrator.system.values import Value, is_integer, is_of
 
 #: How long a call may take by default [s]: an FMU may fetch a licence or read maps first.
 STEP_TIMEOUT = 60.0
@@ -43,6 +42,9 @@ _START = 60.0
 #: How often the wait for an FMU looks about [s], how long it still waits when the user wants to
 #: stop [s], and how long an FMU has to be freed when the run has failed [s].
 _GLANCE, _PATIENCE, _FAREWELL = 0.1, 1.0, 5.0
+
+#: Statuses that a message can have.
+_STATUSES = range(fmi2OK, fmi2Pending + 1)
 
 #: What the keeper begins with: the modules that this process would find, and no main module.
 _BEGIN = """
@@ -117,7 +119,7 @@ class IsolatedInstance:
             interrupts: that end the wait for a call.
 
         """
-        self.name = component.name
+        self.name, self._component = component.name, component
         self.set_inputs: list[Callable[[], int]] = []
         self.get_outputs: list[Callable[[], int]] = [self._take_outputs]
         self._status, self._log = status, log
@@ -127,6 +129,7 @@ class IsolatedInstance:
         self._inputs, self._outputs = np.zeros(0), np.zeros(0)
         self._text_inputs: list[int] = []
         self._text_outputs: list[int] = []
+        self._integer_outputs: list[int] = []
         # Those of the run, and those of the process there, which numbers its own.
         self._texts, self._theirs, self._told = Texts(), Texts(), len(Texts())
         inputs, outputs = sizes(component)
@@ -157,6 +160,8 @@ class IsolatedInstance:
                     self._text_inputs += places
                 else:
                     self._text_outputs += [place - first for place in places]
+            elif part.kind != "Real" and part.causality == "output":
+                self._integer_outputs += range(part.place.start - first, part.place.stop - first)
 
     def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
@@ -177,10 +182,12 @@ class IsolatedInstance:
         if not ports:
             return {}
         values = self._ask("read", list(ports))
-        answers = isinstance(values, dict) and values.keys() == set(ports)
-        if not (answers and all(isinstance(value, Value) for value in values.values())):
+        if not (isinstance(values, dict) and values.keys() == set(ports)):
             raise self._nonsense()
-        return dict(values)
+        variables = self._component.variables
+        if not all(is_of(variables[port], value) for port, value in values.items()):
+            raise self._nonsense()
+        return values
 
     def tune(self, values: Mapping[str, Value]) -> None:
         """Set tunable parameters between two steps."""
@@ -259,12 +266,15 @@ class IsolatedInstance:
 
     def _read_outputs(self) -> None:
         """Take the outputs that have come with a message."""
-        self._outputs[:] = outputs = self._channel.incoming
+        outputs = self._channel.incoming
+        if not all(is_integer(outputs[i]) for i in self._integer_outputs):
+            raise self._nonsense()
         try:
             for i in self._text_outputs:
-                self._outputs[i] = self._texts.number(self._theirs.text(outputs[i]))
+                outputs[i] = self._texts.number(self._theirs.text(outputs[i]))
         except ValueError as error:
-            raise self._nonsense() from error
+            raise self._nonsense(error) from error
+        self._outputs[:] = outputs
 
     def _ask(self, call: str, *arguments: Any) -> Any:
         if self._steps:
@@ -287,15 +297,17 @@ class IsolatedInstance:
 
     def _receive(self) -> Any:
         """The value of the answer to what was asked for."""
+        longest = LONGEST_STATE if self._doing == "state" else LONGEST_NOTE
         try:
-            note = self._channel.receive()
+            note = self._channel.receive(longest)
             return None if note is None else self._read(**note)
         except (EOFError, OSError) as error:
             raise self._lost() from error
         except InputError:
             raise
-        except (ValueError, TypeError, RecursionError) as error:
-            raise self._nonsense() from error
+        # Whatever an FMU has made its process send.
+        except (ValueError, TypeError, AttributeError, RecursionError, MemoryError) as error:
+            raise self._nonsense(error) from error
 
     def _read(
         self,
@@ -308,16 +320,20 @@ class IsolatedInstance:
         texts: Sequence[str] = (),
     ) -> Any:
         for text in texts:
-            self._theirs.number(str(text))
+            self._theirs.number(_text(text))
         self._told = len(self._theirs)
         for status, text in messages:
-            self._log.take(int(status), str(text))
-        if refused is not None:
-            raise InputError(str(refused))
-        if ended is not None:
-            raise Ended(str(ended))
+            if status not in _STATUSES:
+                raise ValueError("it knows another status than FMI")
+            self._log.take(int(status), _line(text))
         if failed is not None:
-            raise ComponentFailed(str(failed), bool(fatal))
+            raise ComponentFailed(_line(failed), bool(fatal))
+        if refused is not None and self._doing == "instantiate":
+            raise InputError(_line(refused))
+        if ended is not None and self._doing == "doStep":
+            raise Ended(_line(ended))
+        if refused is not None or ended is not None:
+            raise ValueError(f"it cannot end a run in {self._doing}")
         return value
 
     def _waited(self, seconds: float) -> None:
@@ -331,14 +347,26 @@ class IsolatedInstance:
                 f"{self.name}: {self._doing} has not ended within {limit:g} s", fatal=True
             )
 
-    def _nonsense(self) -> ComponentFailed:
-        return ComponentFailed(f"{self.name}: its process answers nonsense", fatal=True)
+    def _nonsense(self, error: BaseException | None = None) -> ComponentFailed:
+        why = "" if error is None else f": {reason(error)}"
+        text = f"{self.name}: its process answers nonsense in {self._doing}{why}"
+        return ComponentFailed(text, fatal=True)
 
     def _lost(self) -> ComponentFailed:
         status = self._status(_FAREWELL)
         return ComponentFailed(
             f"{self.name}: its process {_end(status)} in {self._doing}", fatal=True
         )
+
+
+def _text(value: str) -> str:
+    """A text that has come, if it is one that can be written."""
+    value.encode()
+    return value
+
+
+def _line(value: str) -> str:
+    return "; ".join(_text(value).splitlines())
 
 
 def _end(status: int | None) -> str:
@@ -358,13 +386,13 @@ class _Keeper:
     def __init__(
         self, components: Mapping[str, Component], connections: Sequence[socket.socket]
     ) -> None:
-        folders = [unpacked(component.fmu) for component in components.values()]
+        folders = [component.folder for component in components.values()]
         descriptors = [connection.fileno() for connection in connections]
         order = {
             "path": [entry for entry in sys.path if isinstance(entry, str)],
             "temporary": sorted({str(folder.parent) for folder in folders}),
             "components": [
-                (component.name, str(component.fmu), str(folder), descriptor)
+                (component.name, str(component.fmu), component.digest, str(folder), descriptor)
                 for component, folder, descriptor in zip(
                     components.values(), folders, descriptors, strict=True
                 )

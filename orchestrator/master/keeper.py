@@ -14,10 +14,12 @@ import signal
 import socket
 import sys
 import warnings
+from codecs import getincrementaldecoder
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from orchestrator.errors import plain
 from orchestrator.master.serving import serve
 
 #: What is written to the keeper to have all ended; the end of its input says that nobody is there.
@@ -42,8 +44,8 @@ def keep(order: dict[str, Any]) -> None:
     and its exit status to the standard output when its process has ended.
 
     Args:
-        order: `components`, each with its name, FMU, folder and the descriptor of a socket, and
-            `temporary`, folders that nobody else removes if the parent is killed.
+        order: `components`, each with its name, FMU, digest, folder and the descriptor of a socket,
+            and `temporary`, folders that nobody else removes if the parent is killed.
 
     """
     parent = os.getppid()
@@ -51,9 +53,9 @@ def keep(order: dict[str, Any]) -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     children = _Children()
-    for name, fmu, folder, descriptor in order["components"]:
+    for name, fmu, digest, folder, descriptor in order["components"]:
         if children.start(name):
-            serve(name, Path(fmu), Path(folder), _alone_with(descriptor))
+            serve(name, Path(fmu), digest, Path(folder), _alone_with(descriptor))
             return
         os.close(descriptor)
     if not children.watched(parent):
@@ -80,6 +82,8 @@ class _Output:
     def __init__(self, name: str, descriptor: int) -> None:
         self._name, self._descriptor = name, descriptor
         self._left = _MOST_OUTPUT
+        # A letter may come in two pieces.
+        self._decoded = getincrementaldecoder("utf-8")("backslashreplace").decode
         os.set_blocking(descriptor, False)
 
     def forward(self) -> None:
@@ -87,7 +91,8 @@ class _Output:
         with suppress(BlockingIOError):
             text = os.read(self._descriptor, _PIPE)
             if self._left > 0:
-                _show(text[: self._left])
+                shown = plain(self._decoded(text[: self._left]), "\n\t")
+                _show(shown.encode())
                 self._left -= len(text)
                 if self._left <= 0:
                     _show(f"\nauv-fmu: {self._name}: writes more than is shown\n".encode())

@@ -47,7 +47,6 @@ from orchestrator.master.mode import put_back
 from orchestrator.master.texts import Texts
 from orchestrator.master.transfer import Block, text_of
 from orchestrator.system.component import Component
-from orchestrator.system.unpacking import unpacked
 from orchestrator.system.values import Value
 
 #: FMI's categories of messages about what goes wrong (FMI 2.0.4, section 2.2.4).
@@ -333,7 +332,7 @@ def loaded(
         InputError: the FMU cannot be loaded.
 
     """
-    folder = unpacked(component.fmu) if folder is None else folder
+    folder = component.folder if folder is None else folder
     with library_of(component, folder) as library:
         instance = LoadedInstance(component, library, listener)
         try:

@@ -6,8 +6,13 @@ from typing import Any, Protocol
 
 from fmpy.fmi2 import fmi2Discard, fmi2Warning
 
+from orchestrator.errors import shortened
+
 #: Messages that are kept: an FMU may have something to say in every step.
 _MOST_MESSAGES = 100
+
+#: Letters of a message on its way from another process.
+_LONGEST_LETTER = 10_000
 
 
 class Listener(Protocol):
@@ -76,7 +81,7 @@ class Letters:
     def take(self, status: int, text: str) -> None:
         """Take a message; of a flood the log would not keep more than this."""
         if status >= fmi2Warning and len(self._waiting) < _MOST_MESSAGES:
-            self._waiting.append((status, text))
+            self._waiting.append((status, shortened(text, _LONGEST_LETTER)))
 
     def handed_over(self) -> list[tuple[int, str]]:
         """Those that have come since the last call."""

@@ -6,14 +6,15 @@ step was made with.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from time import monotonic
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from orchestrator.errors import reason
+from orchestrator.errors import unforeseen
 from orchestrator.master import layout
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.texts import Texts
@@ -116,19 +117,25 @@ class Blocks:
 
     """
 
-    def __init__(self, width: int, observers: Sequence[Observer]) -> None:
+    def __init__(
+        self,
+        width: int,
+        observers: Sequence[Observer],
+        ours: Callable[[], AbstractContextManager[None]] = nullcontext,
+    ) -> None:
         """Make room for one block.
 
         Args:
             width: values in a row, without the time.
             observers: to be told.
+            ours: a context that they are told in.
 
         """
         self._rows = np.empty((_ROWS, 1 + width))
         self._times, self._values = self._rows[:, 0], self._rows[:, 1:]
         self.block = layout.Block(self._rows.ctypes.data, _ROWS)
         self.due = monotonic() + _PATIENCE
-        self._observers = observers
+        self._observers, self._ours = observers, ours
 
     def append(self, t: float, values: np.ndarray) -> None:
         """Take a row."""
@@ -150,7 +157,8 @@ class Blocks:
         if n := self.block.n:
             # Counted as told before they are told: an observer that fails is not told twice.
             self.block.n = 0
-            self._tell(self._rows[:n])
+            with self._ours():
+                self._tell(self._rows[:n])
         self.due = monotonic() + _PATIENCE
 
     def tell(self, rows: np.ndarray) -> None:
@@ -168,7 +176,7 @@ class Blocks:
         for observer in self._observers:
             try:
                 observer.take(rows)
-            except (OSError, MemoryError) as error:
+            except Exception as error:
                 failures.append(error)
         if failures:
-            raise NotKept(f"stopped at t = {rows[-1, 0]:g} s: {reason(failures[0])}")
+            raise NotKept(f"stopped at t = {rows[-1, 0]:g} s: {unforeseen(failures[0])}")

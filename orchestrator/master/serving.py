@@ -18,6 +18,7 @@ from orchestrator.master.loaded import LoadedInstance, loaded
 from orchestrator.master.log import Letters
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import member, step
+from orchestrator.master.surroundings import Surroundings
 from orchestrator.master.texts import Texts
 from orchestrator.system.component import Component
 from orchestrator.system.description import read_description
@@ -25,17 +26,18 @@ from orchestrator.system.structure import System
 
 
 @np.errstate(all="ignore")
-def serve(name: str, fmu: Path, folder: Path, connection: socket.socket) -> None:
+def serve(name: str, fmu: Path, digest: str, folder: Path, connection: socket.socket) -> None:
     """Say that it begins, instantiate an FMU, and answer requests until there are no more.
 
     Args:
         name: of the component.
         fmu: the file, for messages.
+        digest: of it.
         folder: into which it is unpacked.
         connection: to whom wants it simulated.
 
     """
-    component = Component(name, fmu, read_description(folder).description)
+    component = Component(name, fmu, read_description(folder).description, digest)
     inputs, outputs = sizes(component)
     # Before the inputs: time and step size.
     channel, letters = Channel(connection, outputs, 2 + inputs), Letters()
@@ -60,6 +62,7 @@ class _Served:
         self, component: Component, instance: LoadedInstance, channel: Channel, letters: Letters
     ) -> None:
         self._instance, self._channel, self._letters = instance, channel, letters
+        self._surroundings = Surroundings()
         system = System(component.name, {component.name: component}, ())
         row = Row(system, {component.name: instance})
         self._member = member(instance)
@@ -98,6 +101,7 @@ class _Served:
             note |= {"failed": str(error), "fatal": error.fatal}
         except Exception as error:
             note |= {"failed": f"{self._instance.name}: {reason(error)}", "fatal": True}
+        self._surroundings.end_copy()
         if messages := self._letters.handed_over():
             note["messages"] = messages
         if news := self._texts.since(self._told):

@@ -10,7 +10,7 @@ from time import monotonic
 
 import numpy as np
 
-from orchestrator.errors import InputError, StartError, reason, shortened
+from orchestrator.errors import InputError, StartError, reason, shortened, unforeseen
 from orchestrator.master.attendant import Attendance, Attendant, Run
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.instance import ComponentFailed, Ended, Instance
@@ -25,6 +25,7 @@ from orchestrator.master.placing import placed
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import delays, schedule, stages
 from orchestrator.master.signals import Gathering, Signals
+from orchestrator.master.surroundings import Surroundings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import literal, same
@@ -69,9 +70,11 @@ def simulate(
     for delay in delays(system, experiment.order):
         log.remark(delay)
     experiment = _whole_steps(system, experiment, log)
-    with held_interrupts() as interrupts, ExitStack() as stack:
+    with held_interrupts() as interrupts, Surroundings() as surroundings, ExitStack() as stack:
         with _explained():
             instances = stack.enter_context(placed(system.components, log, isolation, interrupts))
+            # Before their processes are ended: a copy must not do that for the process itself.
+            stack.enter_context(surroundings)
             loop = _possible_loop(loop, instances, log)
             row = Row(system, instances, slow)
             _initialise(system, instances, row, experiment, log)
@@ -80,8 +83,8 @@ def simulate(
             texts = dict.fromkeys(map(str, row.text_ports), row.texts)
             header = Header(names, experiment, parameters, loop.name, texts)
         scheduled = schedule(system, experiment, plan, instances, row)
-        with _told(header, observers) as tell:
-            blocks = Blocks(len(row.shown), observers)
+        with _told(header, observers, surroundings) as tell:
+            blocks = Blocks(len(row.shown), observers, surroundings.ours)
             interrupts.hand_over = blocks.hand_over
             blocks.append(experiment.start_time, row.shown)
             signals = Signals(row, [stage.gather for stage in scheduled], system.connections)
@@ -100,7 +103,7 @@ def simulate(
             order = [name for names in plan for name in names]
             remark = None
             try:
-                failure = _advance(run, loop, Attendance(run), order)
+                failure = _advance(run, loop, Attendance(run), order, surroundings)
             except NotKept as error:
                 # Rows that cannot be kept need not be computed.
                 failure = str(error)
@@ -248,6 +251,7 @@ def _advance(
     loop: Loop,
     attendance: Attendance,
     order: Sequence[str],
+    surroundings: Surroundings,
 ) -> str | None:
     """Step to the end, or to the first failure, and say what it was."""
     blocks, failure = run.blocks, None
@@ -259,15 +263,20 @@ def _advance(
             if monotonic() > blocks.due:
                 blocks.hand_over()
             if run.interrupts.signals:
-                failure = f"interrupted at t = {run.time:.12g} s"
+                failure = f"interrupted at t = {run.time:.12g} s{run.interrupts}"
                 break
     except ComponentFailed as error:
         failure = f"stopped at t = {run.time:.12g} s: {error}"
     except KeyboardInterrupt:
-        failure = f"interrupted at t = {run.time:.12g} s"
+        failure = f"interrupted at t = {run.time:.12g} s{run.interrupts}"
     except Ended as end:
         blocks.hand_over()
         raise Ended(f"ended at t = {run.time:.12g} s: {end}") from None
+    except (InputError, NotKept):
+        raise
+    except Exception as error:
+        failure = f"stopped at t = {run.time:.12g} s: {unforeseen(error)}"
+    surroundings.put_back()
     # Also where another component has refused it in the same step.
     if wrong := run.row.wrong(order):
         failure = f"stopped at t = {run.experiment.time(run.made + 1):.12g} s: {wrong}"
@@ -285,18 +294,22 @@ def _explained() -> Iterator[None]:
 
 
 @contextmanager
-def _told(header: Header, observers: Sequence[Observer]) -> Iterator[Callable[[Ending], None]]:
+def _told(
+    header: Header, observers: Sequence[Observer], surroundings: Surroundings
+) -> Iterator[Callable[[Ending], None]]:
     """Tell observers of the beginning, and of the end even where one of them fails."""
     begun: list[Observer] = []
 
     def tell(ending: Ending) -> None:
+        surroundings.put_back()
         while begun:
             begun.pop(0).end(ending)
 
     try:
-        for observer in observers:
-            observer.begin(header)
-            begun.append(observer)
+        with surroundings.ours():
+            for observer in observers:
+                observer.begin(header)
+                begun.append(observer)
         yield tell
     except BaseException as error:
         with suppress(Exception):

@@ -18,7 +18,6 @@ import orchestrator
 from orchestrator.analysis.metrics import Metrics
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
-from orchestrator.experiments.bill_of_materials import digest_of
 from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.folder import opened
 from orchestrator.experiments.preparation import Prepared
@@ -124,7 +123,7 @@ class Outcomes:
             else:
                 missing.setdefault(key, (prepared.experiment.rows, wanted))
         longest_first = sorted(missing.items(), key=lambda item: -item[1][0])
-        tasks = {key: partial(_make, run) for key, (_, run) in longest_first}
+        tasks = {key: partial(_make, run, key) for key, (_, run) in longest_first}
         for key, outcome in workers.results(tasks, "run"):
             self._outcomes[key] = outcome
             if outcome.failure is None:
@@ -146,7 +145,7 @@ def key_of(prepared: Prepared) -> str:
     """Digest of all that an outcome depends on."""
     system = prepared.system
     content = {
-        "components": {name: digest_of(part.fmu) for name, part in system.components.items()},
+        "components": {name: part.digest for name, part in system.components.items()},
         "connections": sorted(f"{wire.source} {wire.target}" for wire in system.connections),
         "parameters": sorted(
             (str(name), value)
@@ -174,10 +173,12 @@ def _code() -> str:
     return digest.hexdigest()
 
 
-def _make(run: Run) -> Outcome:
+def _make(run: Run, key: str) -> Outcome:
     """Make a run; a task for a worker."""
     try:
         prepared = run.prepared()
+        if key_of(prepared) != key:
+            raise InputError("FMUs have changed while the report was made; make it anew")
         metrics, seen = Metrics(), VisibleRows()
         simulate(
             prepared.system,

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import InputError
-from orchestrator.experiments.bill_of_materials import digest_of
 from orchestrator.master.events import Event, Events
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.loop import LOOPS, chosen
@@ -19,6 +18,7 @@ from orchestrator.studies.indices import Indices
 from orchestrator.system.leftovers import process_folder
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
+from orchestrator.system.unpacking import archive_of
 
 
 class FmuEngine:
@@ -46,7 +46,7 @@ class FmuEngine:
         content = [
             (
                 name,
-                [(part.name, digest_of(part.fmu)) for part in system.components.values()],
+                [(part.name, part.digest) for part in system.components.values()],
                 system.connections,
                 system.parameters,
                 self._events.get(name, ()),
@@ -89,9 +89,14 @@ class FmuEngine:
         return Outcome(run.number, indices.values())
 
     def __getstate__(self) -> dict[str, Any]:
-        """With the FMUs, each once, by their digests."""
+        """With the FMUs, each once, by their digests.
+
+        Raises:
+            InputError: one has changed since it was read.
+
+        """
         archives = {
-            part.fmu: (digest_of(part.fmu), part.fmu.read_bytes())
+            part.digest: archive_of(part.fmu, part.digest)
             for system in self._systems.values()
             for part in system.components.values()
         }
@@ -104,13 +109,13 @@ class FmuEngine:
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         """Put the FMUs where this process keeps what is temporary."""
-        places = {fmu: _place(*content) for fmu, content in state["archives"].items()}
+        places = {digest: _place(digest, content) for digest, content in state["archives"].items()}
         self._loop, self._events = state["loop"], state["events"]
         self._systems = {
             name: replace(
                 system,
                 components={
-                    part.name: replace(part, fmu=places[part.fmu])
+                    part.name: replace(part, fmu=places[part.digest])
                     for part in system.components.values()
                 },
             )

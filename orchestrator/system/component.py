@@ -13,7 +13,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 from orchestrator.errors import InputError, did_you_mean
 from orchestrator.findings import Findings
 from orchestrator.system.description import described
-from orchestrator.system.unpacking import version_of
+from orchestrator.system.unpacking import folder_of, unpacked
 from orchestrator.system.values import Value, typed
 
 #: The versions of FMI that a system can be written with, and those that the master can step.
@@ -28,12 +28,24 @@ class Component:
         name: of the instance.
         fmu: the file.
         description: what its modelDescription.xml says.
+        digest: SHA-256 of the file as it was read. That is what runs, and what records name.
 
     """
 
     name: str
     fmu: Path
     description: ModelDescription
+    digest: str
+
+    @property
+    def folder(self) -> Path:
+        """The folder into which it has been unpacked.
+
+        Raises:
+            InputError: it was read in another process, and the file is another one now.
+
+        """
+        return folder_of(self.fmu, self.digest)
 
     @cached_property
     def variables(self) -> dict[str, ModelVariable]:
@@ -139,7 +151,8 @@ def read_component(
         InputError: the file is missing or is no such FMU for co-simulation.
 
     """
-    found = described(fmu, version_of(fmu), tuple(versions))
+    folder, digest = unpacked(fmu)
+    found = described(fmu, folder, tuple(versions))
     if findings is not None and (remark := found.remark()):
         findings.note(f"{name}: the description of {fmu.name} is not valid: {remark}")
-    return Component(name, fmu, found.description)
+    return Component(name, fmu, found.description, digest)

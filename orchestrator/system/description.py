@@ -13,7 +13,6 @@ import fmpy
 from fmpy.model_description import ModelDescription, ValidationError
 
 from orchestrator.errors import InputError, reason, shortened
-from orchestrator.system.unpacking import Version, unpacked
 from orchestrator.system.values import integer, real
 
 _CAUSALITIES = {"parameter", "calculatedParameter", "input", "output", "local", "independent"}
@@ -61,18 +60,18 @@ def read_description(folder: Path) -> Described:
 
 
 @lru_cache(maxsize=256)
-def described(fmu: Path, _: Version, versions: Sequence[str]) -> Described:
-    """The description of an FMU for co-simulation, read once a version of the file.
+def described(fmu: Path, folder: Path, versions: Sequence[str]) -> Described:
+    """The description of an FMU for co-simulation, read once.
 
     Args:
         fmu: the file.
+        folder: into which it is unpacked.
         versions: of FMI that it may have.
 
     Raises:
         InputError: it is no such FMU.
 
     """
-    folder = unpacked(fmu)
     try:
         version = _version(folder / "modelDescription.xml")
         if version not in versions:

@@ -69,7 +69,7 @@ def _flaws(fmu: Path) -> list[str]:
 def _dangling(fmu: Path) -> Iterator[str]:
     """References in the structure of the model to variables that do not exist."""
     try:
-        root = ElementTree.parse(unpacked(fmu) / "modelDescription.xml").getroot()
+        root = ElementTree.parse(unpacked(fmu).folder / "modelDescription.xml").getroot()
     except (OSError, ElementTree.ParseError):
         return
     known = range(1, 1 + len(root.findall("ModelVariables/ScalarVariable")))

@@ -48,7 +48,9 @@ def claimed(path: Path, wait: bool = False) -> Iterator[None]:
         _lock(descriptor, wait)
         yield
     finally:
-        os.close(descriptor)
+        # An FMU may have closed it.
+        with suppress(OSError):
+            os.close(descriptor)
 
 
 def _lock(descriptor: int, wait: bool = False) -> bool:

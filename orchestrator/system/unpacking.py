@@ -1,20 +1,23 @@
-"""Archives unpacked once a process and version.
+"""Archives unpacked once a process and content.
 
-A version is unpacked into a temporary folder of the process, which ends with it. Running a system
-again then neither unzips an FMU nor loads its library a second time.
+A content is unpacked into a temporary folder of the process, which ends with it. Running a system
+again then neither unzips an FMU nor loads its library a second time; and what was read of a file
+stays what it was, whatever becomes of the file.
 """
 
 from __future__ import annotations
 
+import hashlib
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from io import BufferedReader
 from pathlib import Path, PurePosixPath
 from shutil import rmtree
 from tempfile import gettempdir, mkdtemp
 from threading import Lock
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 from zipfile import ZipFile, ZipInfo
 
 from orchestrator.errors import InputError, reason
@@ -23,6 +26,9 @@ from orchestrator.system.leftovers import process_folder
 
 #: An archive that holds more than this is not unpacked, nor one that does so with those in it.
 _MOST_FILES, _MOST_BYTES = 100_000, 2**30
+
+#: Nor one that is longer than this, whatever it says that it holds [bytes].
+_LONGEST = 2 * _MOST_BYTES
 
 #: Folders in folders that an archive may have: Python enters them one in the other.
 _MOST_FOLDERS = 100
@@ -35,6 +41,9 @@ _DESCRIPTIONS, _MOST_OF_A_DESCRIPTION = (".xml", ".ssd", ".ssv", ".ssm"), 100_00
 
 #: Runs in several threads share what is unpacked.
 _LOCK = Lock()
+
+#: A file as it is now; when it is written it gets another one.
+_Version: TypeAlias = tuple[int, ...]
 
 
 @dataclass
@@ -49,39 +58,29 @@ class _Whole:
 #: By the folders that they are unpacked into.
 _wholes: dict[Path, _Whole] = {}
 
-
-class Version(NamedTuple):
-    """A file as it is now; another content has another version."""
-
-    path: Path
-    modified: int
-    size: int
-    inode: int
+#: Digests by the files that had them, and folders by the digests of what is in them.
+_digests: dict[_Version, str] = {}
+_folders: dict[str, Path] = {}
 
 
-def version_of(path: Path) -> Version:
-    """The version of a file.
+class Unpacked(NamedTuple):
+    """An archive as it was read: the folder that it was unpacked into, and its SHA-256."""
 
-    Raises:
-        InputError: there is no such file.
-
-    """
-    check_file(path)
-    status = path.stat()
-    return Version(path.resolve(), status.st_mtime_ns, status.st_size, status.st_ino)
+    folder: Path
+    digest: str
 
 
-def unpacked(archive: Path) -> Path:
-    """The folder into which an FMU or SSP has been unpacked.
+def unpacked(archive: Path) -> Unpacked:
+    """An FMU or SSP as it is now, unpacked.
 
     Raises:
         InputError: it cannot be unpacked.
 
     """
-    version = version_of(archive)
+    check_file(archive)
     try:
-        with _LOCK:
-            return _unpacked(version)
+        with _LOCK, archive.open("rb") as file:
+            return _unpacked(archive, file)
     except InputError:
         raise
     # What is wrong with an archive, each of Python's decompressors says in exceptions of its own.
@@ -89,28 +88,83 @@ def unpacked(archive: Path) -> Path:
         raise InputError(f"{archive}: cannot be opened: {reason(error)}") from error
 
 
-@cache
-def _unpacked(archive: Version) -> Path:
-    place = process_folder().resolve()
-    with ZipFile(archive.path) as content:
-        entries = content.infolist()
-        _check(entries)
-        around = (_wholes.get(folder) for folder in archive.path.parents)
-        whole = next(filter(None, around), None) or _Whole(archive.path)
-        files, size = len(entries), sum(entry.file_size for entry in entries)
-        _check_with(whole, files, size)
+def folder_of(archive: Path, digest: str) -> Path:
+    """The folder of an archive as it was read, in this process or in another one.
+
+    Raises:
+        InputError: this process has not read it, and the file is another one now.
+
+    """
+    folder = _folders.get(digest)
+    if folder is None:
+        folder, now = unpacked(archive)
+        _check_same(archive, now, digest)
+    return folder
+
+
+def archive_of(archive: Path, digest: str) -> bytes:
+    """The bytes of an archive as it was read.
+
+    Raises:
+        InputError: the file is another one now.
+
+    """
+    check_file(archive)
+    content = archive.read_bytes()
+    _check_same(archive, hashlib.sha256(content).hexdigest(), digest)
+    return content
+
+
+def _check_same(archive: Path, now: str, digest: str) -> None:
+    if now != digest:
+        raise InputError(f"{archive}: has changed since it was read; begin anew")
+
+
+def _unpacked(archive: Path, file: BufferedReader) -> Unpacked:
+    version = _version_of(file)
+    digest = _digests.get(version)
+    if digest is None:
+        with ZipFile(file) as content:
+            # Before the file is read to its end, which it may not have.
+            _check(content.infolist())
+            if (size := os.fstat(file.fileno()).st_size) > _LONGEST:
+                raise ValueError(f"it is {size:,} bytes long, more than {_LONGEST:,}")
+            file.seek(0)
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+            if digest not in _folders:
+                folder = _extracted(archive, content)
+                if _version_of(file) != version:
+                    rmtree(folder, ignore_errors=True)
+                    raise InputError(f"{archive}: is being written; try again when it is whole")
+                _folders[digest] = folder
+        _digests[version] = digest
+    return Unpacked(_folders[digest], digest)
+
+
+def _version_of(file: BufferedReader) -> _Version:
+    # A file that is written gets another time of change, whatever is done to the others.
+    it = os.fstat(file.fileno())
+    return it.st_dev, it.st_ino, it.st_size, it.st_mtime_ns, it.st_ctime_ns
+
+
+def _extracted(archive: Path, content: ZipFile) -> Path:
+    archive, entries = archive.resolve(), content.infolist()
+    around = (_wholes.get(folder) for folder in archive.parents)
+    whole = next(filter(None, around), None) or _Whole(archive)
+    files, size = len(entries), sum(entry.file_size for entry in entries)
+    _check_with(whole, files, size)
+    try:
+        folder = Path(mkdtemp(dir=process_folder().resolve()))
         try:
-            folder = Path(mkdtemp(dir=place))
-            try:
-                content.extractall(folder)
-            except BaseException:
-                rmtree(folder, ignore_errors=True)
-                raise
-        except OSError as error:
-            raise InputError(
-                f"{archive.path}: cannot be unpacked into {gettempdir()}: {reason(error)}; set "
-                "TMPDIR to another folder"
-            ) from error
+            content.extractall(folder)
+        except BaseException:
+            rmtree(folder, ignore_errors=True)
+            raise
+    except OSError as error:
+        raise InputError(
+            f"{archive}: cannot be unpacked into {gettempdir()}: {reason(error)}; set "
+            "TMPDIR to another folder"
+        ) from error
     _wholes[folder] = whole
     whole.files += files
     whole.bytes += size

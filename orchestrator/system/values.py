@@ -146,6 +146,23 @@ def same(wanted: Value, held: Value) -> bool:
     return wanted == held
 
 
+def is_of(variable: ModelVariable, value: object) -> bool:
+    """Whether a value is one that the variable can have."""
+    kind = type_of(variable)
+    if kind in ("Integer", "Enumeration"):
+        return type(value) is int and is_integer(value)
+    if isinstance(value, str):
+        # Half of a pair of UTF-16 is no text.
+        return kind == "String" and value.encode(errors="ignore").decode() == value
+    return type(value) is {"Real": float, "Boolean": bool}.get(kind)
+
+
+def is_integer(number: float) -> bool:
+    """Whether a number is one of FMI's Integers."""
+    least, most = INTEGERS
+    return least <= number <= most and number == int(number)
+
+
 def unit_of(variable: ModelVariable) -> str | None:
     """The unit of a variable, its own or that of its type."""
     declared = variable.declaredType

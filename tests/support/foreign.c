@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "slave.h"
@@ -16,6 +17,7 @@ enum { ENTER, EXIT, STEP, TERMINATE, FREE };
 enum {
     BEHAVE, NOT_A_NUMBER, INFINITE, SILENT_ERROR, FATAL, EXITS, CRASHES, ABORTS, HANGS, SPINS,
     KILLED, WRITES, LOGS, LEAVES_A_PROCESS, CLOSES_ALL, ANSWERS_ITSELF, SIGNALS,
+    ALARMS, FORKS, CLOSES_FILES, MOVES, ESCAPES,
 };
 enum { U, Y, AT, ACT, PHASE, VARIABLES };
 
@@ -89,6 +91,24 @@ static Status act(Instance *instance, int phase)
     case CLOSES_ALL:
         for (int descriptor = 0; descriptor < 64; descriptor++)
             close(descriptor);
+        break;
+    case ALARMS:
+        raise(SIGALRM);
+        break;
+    case FORKS:
+        if (fork())
+            wait(NULL);
+        break;
+    case CLOSES_FILES:
+        for (int descriptor = 3; descriptor < 64; descriptor++)
+            close(descriptor);
+        break;
+    case MOVES:
+        if (chdir("/"))
+            return Error;
+        break;
+    case ESCAPES:
+        fputs("\033]0;owned\007 gr\303\274n\n\r\302\233", stderr);
         break;
     case ANSWERS_ITSELF:
         for (int descriptor = 3; descriptor < 64; descriptor++)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 from zipfile import ZipFile
+from zlib import crc32
 
 from pythonfmu import FmuBuilder
 
@@ -45,10 +46,12 @@ def _names(enumeration: str) -> dict[str, int]:
 PHASES, ACTS = _names("ENTER"), _names("BEHAVE")
 
 
-_RAISES = """
+_SLAVE = """
+import builtins, json, os, sys
+import numpy
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 
-class Raises(Fmi2Slave):
+class Acts(Fmi2Slave):
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
         self.y = 0.0
@@ -56,7 +59,7 @@ class Raises(Fmi2Slave):
 
     def do_step(self, current_time, step_size):
         if current_time > 0.1:
-            raise RuntimeError("no water left")
+            {act}
         self.y = current_time + step_size
         return True
 """
@@ -64,8 +67,14 @@ class Raises(Fmi2Slave):
 
 def build_raising_fmu(folder: Path) -> Path:
     """A slave of PythonFMU, as its own builder makes it, whose step raises after 0.1 s."""
-    script = folder / "raises.py"
-    script.write_text(_RAISES, encoding="utf-8")
+    return build_slave(folder, 'raise RuntimeError("no water left")')
+
+
+def build_slave(folder: Path, act: str) -> Path:
+    """A slave of PythonFMU, whose output is the time, with a statement that its step executes."""
+    # A process imports a module of a name once.
+    script = folder / f"acts_{crc32(act.encode())}.py"
+    script.write_text(_SLAVE.format(act=act), encoding="utf-8")
     return Path(FmuBuilder.build_FMU(script, dest=folder))
 
 

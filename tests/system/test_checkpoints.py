@@ -322,6 +322,13 @@ def test_what_makes_no_sense_is_refused(capsys):
     assert not Path("r").exists()
 
 
+@pytest.mark.parametrize("every", ["1e300", "1e308"])
+def test_an_interval_longer_than_any_run(every):
+    arguments = ["fig4", "--stop-time", "0.1", "--no-figures", "--checkpoint-every", every]
+    assert run(*arguments, out="r") == 0
+    assert not Path("r/checkpoint").exists()
+
+
 def test_an_fmu_without_a_state_is_refused_by_name_before_the_run(tmp_path, capsys):
     build(tmp_path, Shape((0, 0, 0, 0), (1, 0, 0, 0))).rename("odd.fmu")
     Path("odd.toml").write_text('stop_time = 1.0\nonly = ["odd"]\n[components]\nodd = "odd.fmu"\n')

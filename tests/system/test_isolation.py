@@ -30,10 +30,13 @@ from orchestrator.master.table import Table
 from orchestrator.system.component import read_component
 from orchestrator.system.ssp.writing import write_ssp
 from orchestrator.system.structure import System
-from support.foreign import build_c_fmu, build_raising_fmu, foreign_system
+from support.foreign import build_c_fmu, build_raising_fmu, build_slave, foreign_system
 from support.machine import LOOPS
 
 STEP = 0.02
+
+#: What FMUs do to the process that they are in, and the run survives.
+DOES_TO_THE_PROCESS = ("FORKS", "MOVES", "CLOSES_FILES", "ALARMS")
 
 
 @pytest.fixture(scope="module")
@@ -280,7 +283,8 @@ def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path, loop: s
 def archives(c_fmu: Path, raising: System, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The systems as SSPs, each in a folder named by what happens in it."""
     folder = tmp_path_factory.mktemp("archives")
-    systems = {act: foreign_system(c_fmu, act) for act in ("FATAL", "HANGS", "CRASHES")}
+    acts = ("FATAL", "HANGS", "CRASHES", *DOES_TO_THE_PROCESS)
+    systems = {act: foreign_system(c_fmu, act) for act in acts}
     for name, system in {**systems, "raises": raising}.items():
         (folder / name).mkdir()
         write_ssp(system, folder / name)
@@ -328,6 +332,112 @@ def test_command_line_says_what_happened_and_keeps_the_rows(
     rows = np.vstack(list(read_rows(out / "result.csv")))
     assert rows[-1, 0] == pytest.approx(last_time)
     assert list(temporary.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "form"),
+    [
+        (["--loop", "python"], "csv"),
+        (["--loop", "compiled"], "parquet"),
+        (["--isolate"], "csv"),
+    ],
+)
+@pytest.mark.parametrize("act", ["FORKS", "MOVES", "CLOSES_FILES"])
+def test_rows_are_kept_whatever_an_fmu_does_to_the_process(
+    archives, workplace, mark, act, form, options
+):
+    """Into a folder that is named from the current one."""
+    if form == "parquet":
+        pytest.importorskip("pyarrow")
+    [archive] = (archives / act).iterdir()
+    (workplace / "temporary").mkdir()
+    process = command(
+        "run", archive, "--stop-time", 0.5, "--no-figures", "--out", "out", "--format", form,
+        *options, folder=workplace / "temporary",
+    )  # fmt: skip
+    _, errors = process.communicate()
+    assert len(errors.splitlines()) <= 1
+    rows = np.vstack(list(read_rows(Path("out", f"result.{form}"))))
+    closed = act == "CLOSES_FILES" and options == ["--isolate"]
+    assert len(rows) == (6 if closed else 26)
+    assert process.returncode == (0 if act != "CLOSES_FILES" else process.returncode)
+    assert {path.name for path in Path("out").iterdir()} == {
+        f"result.{form}", "metrics.json", "run.json",
+    }  # fmt: skip
+    assert left_over(mark) == []
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_an_alarm_ends_a_run_with_its_rows(archives, workplace, loop):
+    [archive] = (archives / "ALARMS").iterdir()
+    process = command(
+        "run", archive, "--stop-time", 0.5, "--no-figures", "--loop", loop, "--out", "out",
+        folder=workplace,
+    )  # fmt: skip
+    _, errors = process.communicate()
+    assert process.returncode == 1
+    last = errors.splitlines()[-1]
+    assert last.startswith("auv-fmu: foreign interrupted at t = 0.")
+    assert "by SIGALRM, which an FMU may have caused (--isolate" in last
+    assert len(np.vstack(list(read_rows(Path("out", "result.csv"))))) >= 6
+
+
+@pytest.mark.parametrize(
+    "act",
+    [
+        "sys.stdout = sys.stderr = None",
+        "sys.stdout.close(); sys.stderr.close()",
+        "json.dumps = builtins.print = None",
+        "[setattr(numpy, name, None) for name in list(vars(numpy))]",
+        "os.chdir('/')",
+        "os.fork()",
+    ],
+)
+def test_what_a_python_slave_does_to_the_interpreter_costs_no_rows(workplace, act):
+    """As often as it is told to do so; what is written and said is written and said."""
+    system = System("slave", {"a": read_component("a", build_slave(workplace, act))}, ())
+    [archive] = write_ssp(system, workplace)
+    process = command("run", archive, "--stop-time", 0.5, "--out", "out", folder=workplace)
+    shown, errors = process.communicate()
+    assert errors == "auv-fmu: no figure: the run has no plant.eta.x\n"
+    assert shown.endswith("written to out/\n")
+    assert process.returncode == 0
+    rows = np.vstack(list(read_rows(Path("out", "result.csv"))))
+    assert np.allclose(rows[:, 0], rows[:, 1])
+    assert len(rows) == 26
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_an_fmu_finds_the_current_folder_that_it_has_left(workplace, loop):
+    """However often this program looks after its files; and the user finds that of before."""
+    act = "(current_time < 0.13 and os.chdir('/')) or (os.getcwd() == '/') or 1 / 0"
+    system = System("slave", {"a": read_component("a", build_slave(workplace, act))}, ())
+    experiment, table = Experiment(0.02 * 2000, STEP), Table()
+    assert simulate(system, experiment, [table], loop=chosen(loop, experiment)).failure is None
+    assert len(table) == 2001
+    assert Path.cwd() == workplace
+
+
+@pytest.mark.parametrize("how", [["--loop", "python"], ["--isolate"]])
+def test_a_current_folder_that_is_gone_is_not_needed(dist, tmp_path, how):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    script = 'cd "$1" && rmdir "$1" && shift && exec "$@"'
+    program = [sys.executable, "-P", "-m", "orchestrator", "run", "fig4", "--stop-time", "0.1"]
+    end = ["--no-figures", "--out", tmp_path / "out", *how]
+    process = subprocess.run(
+        ["sh", "-c", script, "sh", gone, *program, *end],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (process.returncode, process.stderr) == (0, "")
+    assert len(np.vstack(list(read_rows(tmp_path / "out" / "result.csv")))) == 6
+
+
+def test_nothing_that_an_isolated_fmu_writes_speaks_to_the_terminal(c_fmu, capfd):
+    assert run_isolated(foreign_system(c_fmu, "ESCAPES", at=0.46)).failure is None
+    first, second, *_ = capfd.readouterr().err.split("\n")
+    assert first == r"\x1b]0;owned\x07 grün"
+    assert second.startswith(r"\r\x9b")
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
+import pickle
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +16,12 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
+from orchestrator.errors import InputError
 from orchestrator.experiments.stored import read_result
 from orchestrator.master.files import read_columns, read_rows
+from orchestrator.studies.fmu_engine import FmuEngine
+from orchestrator.system.unpacking import unpacked
+from support.others import build, system_of
 
 pytestmark = pytest.mark.usefixtures("workplace")
 
@@ -82,6 +89,59 @@ def test_record_says_what_was_run_and_with_what():
     assert "fig5-pd/result.csv" in record["files"]
     companion = json.loads(Path("results/fig5/fig5-pd/run.json").read_text())
     assert companion["fmus"]["controller"]["file"] == "PdController.fmu"
+
+
+def with_another_content(fmu: Path) -> None:
+    """Rewrite an FMU in its place, so that neither its name, inode, size nor time tells."""
+    before = fmu.stat()
+    build(fmu.parent, change=('modelName="Others"', 'modelName="Theirs"'))
+    os.utime(fmu, ns=(before.st_atime_ns, before.st_mtime_ns))
+    after = fmu.stat()
+    assert (after.st_ino, after.st_size, after.st_mtime_ns) == (
+        before.st_ino, before.st_size, before.st_mtime_ns,
+    )  # fmt: skip
+
+
+def replace_by_another(fmu: Path) -> None:
+    other = build(fmu.parent, "REMEMBERS")
+    other.replace(fmu)
+
+
+@pytest.mark.parametrize("change", [replace_by_another, with_another_content, Path.unlink])
+def test_record_names_the_fmu_that_ran(workplace: Path, change: Callable[[Path], object]):
+    """Whatever becomes of the file after it was read, and during the run."""
+    fmu = build(workplace)
+    digest = hashlib.sha256(fmu.read_bytes()).hexdigest()
+    system = system_of(fmu)
+    change(fmu)
+    result = simulate(system, stop_time=0.2)
+    assert (result["a.y"] == 101325.0).all()
+    record = json.loads((result.save("r") / "run.json").read_text())
+    assert record["fmus"]["a"] == {"file": fmu.name, "sha256": digest, "kind": "native"}
+
+
+def test_an_fmu_that_has_another_content_is_another_one(workplace: Path):
+    """Also where it has the name, the place, the size and the time of the one before."""
+    fmu = build(workplace)
+    folder, digest = unpacked(fmu)
+    assert unpacked(fmu) == (folder, digest)
+    with_another_content(fmu)
+    again = unpacked(fmu)
+    assert again.digest == hashlib.sha256(fmu.read_bytes()).hexdigest() != digest
+    assert b"Theirs" in (again.folder / "modelDescription.xml").read_bytes()
+    copy = workplace / "copy.fmu"
+    copy.write_bytes(fmu.read_bytes())
+    assert unpacked(copy) == again
+
+
+def test_who_takes_fmus_along_takes_those_that_were_read(workplace: Path):
+    fmu = build(workplace)
+    engine = FmuEngine({"s": system_of(fmu)})
+    assert pickle.loads(pickle.dumps(engine)).digest == engine.digest
+    replace_by_another(fmu)
+    with pytest.raises(InputError, match=r"plain\.fmu: has changed since it was read"):
+        pickle.dumps(engine)
+    assert FmuEngine({"s": system_of(fmu)}).digest != engine.digest
 
 
 def test_stored_result_is_read_again_with_its_parameters():

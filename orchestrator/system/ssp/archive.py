@@ -49,7 +49,7 @@ class Archive:
 
         """
         self.path, self.findings = path, findings
-        self.folder = unpacked(path)
+        self.folder = unpacked(path).folder
 
     def problem(self, text: object) -> None:
         """Take note of what makes a run meaningless, or impossible."""

@@ -15,7 +15,6 @@ from orchestrator.system.ssp.hierarchy import Bus, Connector, Group, Leaf, Node
 from orchestrator.system.ssp.transformations import converts_units, transformation_of
 from orchestrator.system.transformation import Transformation, chained
 from orchestrator.system.units import Unit
-from orchestrator.system.unpacking import unpacked
 
 #: The types of files that are known.
 _VALUES, _MAPPING = "application/x-ssp-parameter-set", "application/x-ssp-parameter-mapping"
@@ -127,7 +126,7 @@ class Bindings:
         if stated == "SSD":
             return None
         if isinstance(owner, Leaf) and owner.component is not None:
-            return unpacked(owner.component.fmu)
+            return owner.component.folder
         raise InputError(f"a file of {'.'.join(owner.way)!r}, which is no component with an FMU")
 
     def _mapped(

@@ -69,13 +69,17 @@ def test_a_cache_that_cannot_be_written_is_named(tmp_path, monkeypatch):
     assert "\n" not in str(error.value)
 
 
-def test_a_compiler_that_fails_is_quoted(tmp_path, cache, monkeypatch):
+@pytest.mark.parametrize(
+    ("said", "heard"), [("no licence", "no licence"), (r"\377 licence", "\ufffd licence")]
+)
+def test_a_compiler_that_fails_is_quoted(tmp_path, cache, monkeypatch, said, heard):
+    """Also where what it says is no text."""
     compiler = tmp_path / "cc"
-    compiler.write_text("#!/bin/sh\necho first >&2\necho no licence >&2\nexit 1\n")
+    compiler.write_text(f"#!/bin/sh\necho first >&2\nprintf '{said}' >&2\nexit 1\n")
     compiler.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
     assert loop.chosen("auto", steps(100_000)).name == "python"
-    with pytest.raises(InputError, match="the loop cannot be compiled: no licence"):
+    with pytest.raises(InputError, match=f"the loop cannot be compiled: {heard}"):
         loop.chosen("compiled", steps(1))
     assert list(cache.iterdir()) == []
 
