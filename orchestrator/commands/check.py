@@ -9,6 +9,7 @@ from typing import Any
 from orchestrator.commands.options import BAD_INPUT, OK, add_variant
 from orchestrator.commands.streams import show
 from orchestrator.experiments.preparation import Request, loaded, prepare
+from orchestrator.experiments.waypoints import impossible_paths
 from orchestrator.findings import Findings
 from orchestrator.master.binary import check_binary
 from orchestrator.master.schedule import delays
@@ -71,5 +72,7 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
             to_know.append("names no stop time: a run wants --stop-time")
             request = Request(stop_time=(system.start_time or 0.0) + _SOME_TIME)
         prepared = prepare(scenario, system, request)
+        for text in impossible_paths(prepared.system):
+            findings.problem(text)
         to_know += delays(prepared.system, prepared.experiment.order)
     return to_know

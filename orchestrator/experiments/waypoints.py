@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from auv_fmu.path_planner import MOST
+from auv_fmu import path_planner
+from auv_fmu.actuators import Limits
+from auv_fmu.path_planner import MOST, Parameters, Waypoints
+from auv_fmu.vehicle import Vehicle
+from orchestrator.analysis.signals import ACTUATORS
 from orchestrator.experiments.entries import Entry, is_text
 from orchestrator.reading import explained, lines_of
 from orchestrator.system.names import PortName
+from orchestrator.system.structure import System
 from orchestrator.system.values import finite
 
 #: The planner of the closed loop.
 PLANNER = "planner"
+
+#: The name of its model.
+_MODEL = "PathPlanner"
 
 #: What `[path]` may hold.
 ENTRIES: dict[str, Entry] = {
@@ -65,6 +73,37 @@ def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
     for number, waypoint in enumerate(waypoints, start=1):
         values |= {f"waypoint[{number}].{name}": value for name, value in waypoint.items()}
     return {PortName(component, port): value for port, value in values.items()}
+
+
+def impossible_paths(system: System) -> Iterator[str]:
+    """What PathPlanners of a system will refuse of their paths, without a run of them."""
+    for name, component in system.components.items():
+        if component.description.modelName != _MODEL:
+            continue
+        try:
+            path_planner.check(_planned({**component.starts, **system.parameters_of(name)}))
+        except KeyError:
+            # Another model of that name.
+            continue
+        except ArithmeticError as error:
+            yield f"{name}: {error}"
+
+
+def _planned(values: Mapping[str, Any]) -> Parameters:
+    """Parameters of the equations, from the values of ports."""
+    x, y, z, t = (
+        tuple(values[f"waypoint[{k}].{axis}"] for k in range(1, 1 + MOST)) for axis in "xyzt"
+    )
+    timed, cruise, rounding = (values[name] for name in ("timed", "cruise", "rounding"))
+    limits = (tuple(values[f"{end}.{name}"] for name in ACTUATORS) for end in Limits._fields)
+    return Parameters(
+        Waypoints(values["count"], x, y, z, t, timed, cruise, rounding),
+        Vehicle(*(values[name.replace("_", ".")] for name in Vehicle._fields)),
+        values["ell"],
+        Limits(*limits),
+        values["speed_max"],
+        values["turn_max"],
+    )
 
 
 def _waypoint(row: Mapping[Any, Any], names: Sequence[str], where: str) -> dict[str, float]:

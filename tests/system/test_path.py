@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,15 @@ import pytest
 from auv_fmu import path_planner
 from auv_fmu.path_planner import Waypoints
 from orchestrator.analysis.signals import tracking_error
+from orchestrator.commands.main import main
 from orchestrator.errors import InputError
 from orchestrator.experiments.scenario import read_scenario
+from orchestrator.experiments.waypoints import impossible_paths
 from orchestrator.experiments.wiring import closed_loop
+from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
+from orchestrator.system.structure import System
+from support.archives import fmu, variable
 from support.runs import run
 
 #: Near the default path, at times: straight ahead, a rest, and a turn to starboard.
@@ -87,3 +93,34 @@ def test_path_through_the_vertical_is_refused_in_one_line(request, kind: str):
     with pytest.raises(InputError, match=r"near waypoint 2, .* dives at 90\.0 degrees") as error:
         run(steep, 1.0, 0.02)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("table", "why"),
+    [
+        ("x,y,z\n0,0,0\n10,0,56.7\n0,0,113.4\n", "near waypoint 2, at (9.9, 0, 56.7) m, the path"),
+        ("x,y,z\n0,0,0\n1,0,56.7\n", "the way from waypoint 1 to 2 climbs or dives at 89.0"),
+        ("x,y,z\n0,0,0\n9,0,0\n0,0,0\n", "the path turns back on the spot at waypoint 2"),
+        (TABLE, None),
+    ],
+)
+def test_check_says_of_a_path_what_a_run_would(workplace: Path, capsys, table, why):
+    (workplace / "survey.csv").write_text(table)
+    (workplace / "mine.toml").write_text(
+        '[components]\nplanner = "PathPlanner"\n[path]\nfile = "survey.csv"\n'
+    )
+    assert main(["check", "mine.toml"]) == (2 if why else 0)
+    said = capsys.readouterr().out
+    assert f"problem: planner: {why}" in said if why else "nothing is wrong" in said
+
+
+def test_another_model_of_the_name_is_left_alone(tmp_path: Path):
+    file = fmu(tmp_path / "a.fmu", variable("count", "parameter"))
+    with zipfile.ZipFile(file) as archive:
+        text = archive.read("modelDescription.xml").decode()
+    with zipfile.ZipFile(file, "w") as archive:
+        renamed = text.replace('modelName="M"', 'modelName="PathPlanner"')
+        archive.writestr("modelDescription.xml", renamed)
+    component = read_component("planner", file)
+    assert component.description.modelName == "PathPlanner"
+    assert [*impossible_paths(System("s", {"planner": component}, ()))] == []
