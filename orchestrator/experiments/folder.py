@@ -96,17 +96,22 @@ def publish(ledger: Ledger) -> Path:
         with beside.writing() as empty:
             empty.rmdir()
             unfinished.rename(empty)
-            _publish(beside)
+            try:
+                _publish(beside)
+            except BaseException:
+                if not beside.is_moving:
+                    empty.rename(unfinished)
+                raise
         return place
     is_whole_result = (unfinished / RECORD).is_file() and failure_in(unfinished) is None
     _publish(ledger)
-    if is_whole_result and (folder / INCOMPLETE).is_dir():
-        with suppress(Taken):
-            earlier = Ledger(folder / INCOMPLETE)
+    incomplete = folder / INCOMPLETE
+    if is_whole_result and incomplete.is_dir() and not incomplete.is_symlink():
+        # What the user has changed of it stays.
+        with suppress(Taken, OSError):
+            earlier = Ledger(incomplete)
             earlier.remove(earlier.files)
-    with suppress(OSError):
-        # Fails where there is something in it.
-        (folder / INCOMPLETE).rmdir()
+            incomplete.rmdir()
     return folder
 
 

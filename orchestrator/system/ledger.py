@@ -85,6 +85,11 @@ class Ledger:
         """The names of what was written."""
         return self._files.keys()
 
+    @property
+    def is_moving(self) -> bool:
+        """Whether files have begun to take their places."""
+        return bool(self._moving)
+
     def owns(self, name: str) -> bool:
         """Whether a file is as it was written."""
         return _digest_in(self.folder, name) in self._known(name)
@@ -121,7 +126,7 @@ class Ledger:
             yield self.unfinished
         finally:
             # What has begun to take its place stays, and the next one goes on with it.
-            if not self._moving:
+            if not self.is_moving:
                 self._discard()
                 if is_new and not self._files:
                     self._remove()

@@ -257,6 +257,34 @@ def test_a_run_that_came_to_no_end_stands_beside_a_whole_one_until_the_next(tmp_
     assert not (tmp_path / "r" / "incomplete").exists()
 
 
+def test_a_link_called_incomplete_leads_nowhere(tmp_path: Path):
+    """Though what is there was written by a run."""
+    write(tmp_path / "other", "a.csv")
+    (tmp_path / "r").mkdir()
+    (tmp_path / "r" / "incomplete").symlink_to(tmp_path / "other")
+    write(tmp_path / "r", "a.csv", text="whole")
+    before = contents(tmp_path)
+    write(tmp_path / "r", "a.csv", text="half", failure="interrupted")
+    after = contents(tmp_path)
+    assert {name: after[name] for name in before} == before
+    assert after["r/incomplete-2/a.csv"] == b"half"
+
+
+def test_rows_are_kept_that_cannot_go_beside_a_whole_result(tmp_path: Path, monkeypatch):
+    write(tmp_path / "r", "a.csv", text="whole")
+    replace = os.replace
+
+    def fail(source: Path, target: Path) -> None:
+        if Path(target).parent.name == "incomplete":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", fail)
+    with pytest.raises(InputError, match="what was written is in .*/incomplete-2;"):
+        write(tmp_path / "r", "a.csv", text="half", failure="interrupted", keep=lambda: True)
+    assert (tmp_path / "r" / "incomplete-2" / "a.csv").read_text() == "half"
+
+
 def test_a_run_that_came_to_no_end_takes_the_place_of_another_such(tmp_path: Path):
     write(tmp_path / "r", "a.csv", text="half", failure="interrupted")
     write(tmp_path / "r", "a.csv", failure="stopped")
