@@ -91,7 +91,7 @@ def place(folder: Path, platform: str, ending: str) -> c_host.Library:
 @pytest.mark.skipif(NM is None, reason="there is no nm")
 @pytest.mark.parametrize("name", NAMES)
 def test_library_needs_the_c_library_and_its_mathematics_alone(unpacked: Path, name: str):
-    library = place(unpacked, "linux64", ".so")(Component(name, Path(name), None))
+    library = place(unpacked, "linux64", ".so")(Component(name, Path(name), None, ""))
     found = {path.name: path for path in libraries_of(library)}
     given = {s for n, path in found.items() if n.startswith(("libc.", "libm."))
              for s in symbols(path, "--defined-only")}  # fmt: skip

@@ -49,9 +49,9 @@ from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.files import CsvFile
 from orchestrator.master.observer import Observer
 from orchestrator.master.table import Table
+from orchestrator.system import unpacking
 from orchestrator.system.leftovers import _process_folder
 from orchestrator.system.ssp.writing import ssp_bytes
-from orchestrator.system.unpacking import _unpacked
 
 from . import files_mutators as mutators
 from .files_oracle import agreement
@@ -312,6 +312,12 @@ def _stop(_: int, __: FrameType | None) -> None:
     raise Overdue
 
 
+def _forget() -> None:
+    """Unpack archives anew."""
+    for kept in (unpacking._folders, unpacking._digests, unpacking._wholes):
+        kept.clear()
+
+
 @contextmanager
 def prepared() -> Iterator[dict[str, Kind]]:
     """All kinds of files, after one run of each with its valid file."""
@@ -319,7 +325,7 @@ def prepared() -> Iterator[dict[str, Kind]]:
     with tempfile.TemporaryDirectory(prefix="mutated-files-") as folder:
         # Temporary files go into a folder of their own, so that writing beside it is seen.
         tempfile.tempdir, sys.dont_write_bytecode = folder, True
-        _unpacked.cache_clear()
+        _forget()
         _process_folder.cache_clear()
         try:
             runs = {order: simulate("fig4", stop_time=RECORDED, order=order) for order in ORDERS}
@@ -332,7 +338,7 @@ def prepared() -> Iterator[dict[str, Kind]]:
                 yield found
         finally:
             tempfile.tempdir, sys.dont_write_bytecode = before
-            _unpacked.cache_clear()
+            _forget()
             _process_folder.cache_clear()
 
 

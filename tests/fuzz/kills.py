@@ -27,8 +27,9 @@ from tqdm import trange
 
 from orchestrator.commands.main import main as auv_fmu
 from orchestrator.experiments.bundle import current_fmus
-from orchestrator.experiments.folder import settle
+from orchestrator.experiments.folder import opened
 from orchestrator.paper import report
+from orchestrator.system.ledger import LEDGER
 from orchestrator.system.leftovers import process_folder
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -133,9 +134,11 @@ class Attack:
         counts[f"{self._name}: {'killed' if killed else 'was done before'}"] += 1
         if not is_over(pid):
             self._lose(share, "a child stays")
-        half = (self._place / ".whole").is_dir()
+        half = '"moving": {}' not in (self._place / LEDGER).read_text()
         counts[f"{self._name}: killed while files took their places"] += half
-        settle(self._place)
+        with opened(self._place):
+            # Goes on with what was begun, as the next command does.
+            pass
         found = visible(self._place)
         if found not in (self._old_files, self._new_files):
             self._lose(share, "neither the old result nor the new one")
@@ -146,7 +149,7 @@ class Attack:
             self._lose(share, "the next one leaves something else")
 
     def _left(self) -> list[Path]:
-        hidden = [path for path in self._place.rglob(".*") if path.name != "."]
+        hidden = [path for path in self._place.rglob(".*") if path.name not in (".", LEDGER)]
         return hidden + list(self._place.glob("checkpoint"))
 
     def _lose(self, share: float, what: str) -> None:

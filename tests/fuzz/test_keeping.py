@@ -375,7 +375,7 @@ def test_no_changed_bit_is_taken_in_silence(here: Path, tmp_path: Path, name: st
     assert reading()[0] == 0
     right = made(whole)
 
-    @settings(max_examples=EXAMPLES * 4, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=EXAMPLES * 3, suppress_health_check=list(HealthCheck))
     @given(st.floats(0.0, 1.0, exclude_max=True), st.integers(0, 7))
     def check(place: float, bit: int) -> None:
         rmtree(whole)

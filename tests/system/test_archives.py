@@ -157,7 +157,7 @@ def test_bombs_in_an_archive_are_one_bomb(dist: Path, tmp_path: Path, monkeypatc
     fmu = entries(dist / "DisturbanceGenerator.fmu")
     parts = {}
     for i in range(20):
-        bomb = zipped(tmp_path / "bomb.fmu", {**fmu, "resources/zeros": bytes(900_000)})
+        bomb = zipped(tmp_path / "bomb.fmu", {**fmu, "resources/zeros": bytes([i]) * 900_000})
         parts[f"resources/{i}.fmu"] = bomb.read_bytes()
     components = "".join(component(f"c{i}", f"resources/{i}.fmu") for i in range(20))
     content = {STRUCTURE: described(system(components)).encode(), **parts}

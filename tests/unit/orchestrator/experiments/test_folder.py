@@ -280,7 +280,7 @@ def test_rows_are_kept_that_cannot_go_beside_a_whole_result(tmp_path: Path, monk
         replace(source, target)
 
     monkeypatch.setattr(os, "replace", fail)
-    with pytest.raises(InputError, match="what was written is in .*/incomplete-2;"):
+    with pytest.raises(InputError, match=r"what was written is in .*/incomplete-2;"):
         write(tmp_path / "r", "a.csv", text="half", failure="interrupted", keep=lambda: True)
     assert (tmp_path / "r" / "incomplete-2" / "a.csv").read_text() == "half"
 
