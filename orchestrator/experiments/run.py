@@ -301,6 +301,8 @@ def _give_up(
         place = publish(Ledger(folder))
         say(f"{last.prepared.scenario.name} {last.ending.failure}; its rows are in {place}")
         rmtree(process_folder(), ignore_errors=True)
+    except Exception as error:
+        say(f"ended: an FMU did not return; its rows are in {unfinished}: {reason(error)}")
     finally:
         os._exit(_FAILED)
 
