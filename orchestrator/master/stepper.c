@@ -21,6 +21,9 @@
 /* The worst of FMI's statuses that is no failure, and one that is. */
 enum { FMI2_WARNING = 1, FMI2_ERROR = 3 };
 
+/* Steps of which so many take no time to speak of are timed so many together. */
+enum { MANY = 1024, FEW = 8 };
+
 /* Partial sums that processors add side by side. */
 enum { LANES = 4 };
 
@@ -88,19 +91,27 @@ typedef struct {
     int status;
 } failure;
 
-/* Take on the default floating-point mode after calls of an FMU: see mode.py. */
+/* Take on the default floating-point mode after calls of an FMU: see mode.py. Whether it was
+ * another one, as far as that can be told. */
 #ifdef __x86_64__
-static inline void put_back(void) {
+enum { CAN_TELL = 1 };
+static inline int put_back(void) {
     const unsigned flags = 0x3f, sse = 0x1f80;
     const unsigned short x87 = 0x37f;
     unsigned present;
     __asm__ volatile("stmxcsr %0" : "=m"(present));
     if ((present & ~flags) != sse) {
         __asm__ volatile("ldmxcsr %0\n\tfldcw %1" : : "m"(sse), "m"(x87) : "memory");
+        return 1;
     }
+    return 0;
 }
 #else
-static inline void put_back(void) { fesetenv(FE_DFL_ENV); }
+enum { CAN_TELL = 0 };
+static inline int put_back(void) {
+    fesetenv(FE_DFL_ENV);
+    return 0;
+}
 #endif
 
 /* Why Python has to look. */
@@ -146,6 +157,20 @@ static int get(const move *outputs, void *component) {
 /* Whether a status is worse than a warning, or none of FMI's. */
 static int is_bad(int status) { return (unsigned)status > FMI2_WARNING; }
 
+/* Read the outputs of a stage, with care for the mode after each component; whether one failed. */
+static int outputs_failed(const stage *this, int careful, failure *why) {
+    size_t i, j;
+    for (i = 0; i < this->n_members; i++) {
+        const member *it = &this->members[i];
+        why->member = i;
+        for (j = 0; j < it->n_outputs; j++) {
+            if (is_bad(why->status = get(&it->outputs[j], it->component))) return 1;
+        }
+        if (careful) put_back();
+    }
+    return 0;
+}
+
 /* Step the components of a stage; whether one of them failed. */
 static int stage_failed(const stage *this, double t, double h, failure *why) {
     size_t i, j;
@@ -161,15 +186,9 @@ static int stage_failed(const stage *this, double t, double h, failure *why) {
         if (this->n_members > 1) put_back();
     }
     why->call = GET_OUTPUTS;
-    for (i = 0; i < this->n_members; i++) {
-        const member *it = &this->members[i];
-        why->member = i;
-        for (j = 0; j < it->n_outputs; j++) {
-            if (is_bad(why->status = get(&it->outputs[j], it->component))) return 1;
-        }
-        put_back();
-    }
-    return 0;
+    if (outputs_failed(this, !CAN_TELL, why)) return 1;
+    /* One that is read after another has changed the mode is read again. */
+    return put_back() && this->n_members > 1 && outputs_failed(this, 1, why);
 }
 
 static double mapped(const mapping *this, double value) {
@@ -240,6 +259,8 @@ static int all_finite(const double values[], size_t n) {
 EXPORTED int advance(const run *this, size_t k, size_t until, double patience, block *rows,
                      failure *why) {
     const double due = now() + patience;
+    double last = due - patience;
+    int unasked = 1; /* steps until the clock is asked again, which takes as long as an FMI call */
     for (; k < until && rows->n < rows->most; k++) {
         double *row = rows->rows + rows->n * (1 + this->n_shown);
         if (step_failed(this, k, why)) {
@@ -250,7 +271,12 @@ EXPORTED int advance(const run *this, size_t k, size_t until, double patience, b
         row[0] = time_after(this, k + 1);
         memcpy(row + 1, this->values, this->n_shown * sizeof *row);
         rows->n++;
-        if (now() >= due) break;
+        if (--unasked == 0) {
+            const double present = now();
+            if (present >= due) break;
+            unasked = present - last < patience / MANY ? FEW : 1;
+            last = present;
+        }
     }
     return DUE;
 }

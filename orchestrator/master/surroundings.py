@@ -31,7 +31,7 @@ class Surroundings:
         self._is_ours = threading.current_thread() is threading.main_thread()
         self._modules = [(vars(module), dict(vars(module))) for module in _MODULES]
         self._streams = sys.stdin, sys.stdout, sys.stderr
-        self._folder, self._status = Path(), Path().stat()
+        self._folder, self._status = Path(), os.stat(".")  # noqa: PTH116  # a third of the time
         # It may have been deleted: there is none to go back to then.
         with suppress(OSError):
             self._folder = Path.cwd()
@@ -74,7 +74,7 @@ class Surroundings:
     def _left(self) -> Path | None:
         """Go back to the folder of before; gives the one that is left, if it is another."""
         with suppress(OSError):
-            if not os.path.samestat(Path().stat(), self._status):
+            if not os.path.samestat(os.stat("."), self._status):  # noqa: PTH116
                 folder = Path.cwd()
                 os.chdir(self._folder)
                 return folder
