@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +88,8 @@ def _plot(options: argparse.Namespace) -> int:
     names = [name for name, _ in runs]
     labels = names if len(set(names)) == len(names) else list(map(str, paths))
     figure = plot(list(zip(labels, (table for _, table in runs), strict=True)), patterns)
-    _write(options, options.out, lambda unfinished: save(figure, unfinished))
+    with _written(options.out, options.force) as file:
+        save(figure, file)
     return OK
 
 
@@ -117,7 +118,8 @@ def _view(options: argparse.Namespace) -> int:
         text = page(title, table)
     except InputError as error:
         raise InputError(f"{options.result}: {error}") from error
-    _write(options, out, lambda unfinished: unfinished.write_text(text, encoding="utf-8"))
+    with _written(out, options.force) as unfinished:
+        unfinished.write_text(text, encoding="utf-8")
     return OK
 
 
@@ -128,22 +130,24 @@ def _animate(options: argparse.Namespace) -> int:
     prepared = prepare(scenario, system, request(options))
     seen = VisibleRows()
     observers: list[Observer] = [seen, Progress(scenario.name)]
-    ending = simulate(
-        prepared.system,
-        prepared.experiment,
-        observers,
-        loop=prepared.loop,
-        attendants=prepared.attendants(),
-    )
-    if missing := seen.missing(*CONTROL_POINT):
-        raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
     title = scenario.title or scenario.name
-    _write(options, out, lambda unfinished: animate(title, seen, unfinished, options.fps))
+    with _written(out, options.force) as file:
+        ending = simulate(
+            prepared.system,
+            prepared.experiment,
+            observers,
+            loop=prepared.loop,
+            attendants=prepared.attendants(),
+        )
+        if missing := seen.missing(*CONTROL_POINT):
+            raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
+        animate(title, seen, file, options.fps)
     return status(scenario.name, ending)
 
 
-def _write(options: argparse.Namespace, path: Path, write: Callable[[Path], object]) -> None:
-    """Write a file whole or not at all, and say where it is."""
-    with replaced(path.parent, [path.name], force=options.force) as unfinished:
-        write(unfinished / path.name)
+@contextmanager
+def _written(path: Path, force: bool) -> Iterator[Path]:
+    """A file to write instead of another, whole or not at all; says where that is."""
+    with replaced(path.parent, [path.name], force=force) as unfinished:
+        yield unfinished / path.name
     show(path)
