@@ -87,6 +87,22 @@ def opened(folder: Path, force: bool = False) -> Iterator[Ledger]:
                 folder.rmdir()
 
 
+def inner(folder: Path, *names: str) -> Path:
+    """A folder in another one.
+
+    Raises:
+        InputError: a link leads to it, which could lead anywhere.
+
+    """
+    for name in names:
+        folder /= name
+        if folder.is_symlink():
+            raise InputError(
+                f"{folder}: is a link; remove it, or choose another folder (--out DIR)"
+            )
+    return folder
+
+
 def publish(ledger: Ledger) -> Path:
     """Have what was written into a folder take its place, which is given back."""
     unfinished, folder = ledger.unfinished, ledger.folder

@@ -21,7 +21,7 @@ from orchestrator.analysis.signals import CONTROLLER, THETA_HAT
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError, reason
 from orchestrator.experiments.checkpoints import FOLDER, checkpoints_of, leave
-from orchestrator.experiments.folder import INCOMPLETE, place_of, publish, replaced
+from orchestrator.experiments.folder import INCOMPLETE, inner, place_of, publish, replaced
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.experiments.record import METRICS, Clock, write_metrics, write_record
 from orchestrator.experiments.scenario import Scenario
@@ -164,7 +164,7 @@ def run_into(
     ):
         kept = checkpoints_of(
             runs,
-            _places([folder / FOLDER / below for below in folders]),
+            [inner(folder, FOLDER, *filter(None, [below])) for below in folders],
             files.checkpoint_every,
             files.resume,
             files.force,
@@ -333,19 +333,6 @@ def _draw(
         for name in figure_files(scenario.figure, scenario.stem):
             (folder / name).unlink(missing_ok=True)
         raise
-
-
-def _places(checkpoints: list[Path]) -> list[Path]:
-    """The folders of checkpoints.
-
-    Raises:
-        InputError: one is a link, which could lead anywhere.
-
-    """
-    for place in checkpoints:
-        if place.is_symlink():
-            raise InputError(f"{place}: is a link; remove it, or choose another folder (--out)")
-    return checkpoints
 
 
 def _folders(runs: Sequence[Prepared], figures: Sequence[str]) -> list[str]:

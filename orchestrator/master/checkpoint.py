@@ -30,7 +30,7 @@ from orchestrator.master.log import Log
 from orchestrator.master.observer import Ending, Header, NotKept
 from orchestrator.master.spool import Spool, begins
 from orchestrator.system.atomic import to_disk
-from orchestrator.system.ledger import moved_aside
+from orchestrator.system.ledger import moved_aside, write_new
 from orchestrator.system.sealed import sealed, unsealed
 from orchestrator.system.structure import System
 
@@ -241,7 +241,8 @@ class Checkpoints:
     def _store(self, content: _Stored) -> None:
         # Under a name that nobody else has: what a killed process left there is ours.
         partial = self._partial
-        partial.write_text(sealed(content._asdict()), encoding="utf-8")
+        partial.unlink(missing_ok=True)
+        write_new(partial, sealed(content._asdict()))
         to_disk(partial)
         partial.replace(self.folder / _STATE)
         to_disk(self.folder)

@@ -12,7 +12,7 @@ from typing import Any
 
 from orchestrator.analysis import gains
 from orchestrator.experiments.bundle import PYTHON, current_fmus
-from orchestrator.experiments.folder import replaced
+from orchestrator.experiments.folder import inner, replaced
 from orchestrator.experiments.record import PACKAGES, Clock, write_files
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.paper import errata, printed_table, readings, studies
@@ -89,8 +89,8 @@ def write_report(
     # Built before there are processes that would each build them.
     fmus = current_fmus(kind)
     chapters = sections(scenarios, kind)
-    outcomes = Outcomes(folder / _RUNS, stop_time, kind, force)
-    made = studies.make_studies(ready, folder / _STUDIES, kind, command, force)
+    outcomes = Outcomes(inner(folder, _RUNS), stop_time, kind, force)
+    made = studies.make_studies(ready, inner(folder, _STUDIES), kind, command, force)
     with replaced(folder, (*_NAMES, RECORD), force=force) as unfinished:
         with workers() as crew:
             outcomes.make(

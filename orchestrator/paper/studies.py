@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from orchestrator.experiments.folder import inner
 from orchestrator.paper.formatting import picture, plain
 from orchestrator.studies.study import Study, read_study, ready_studies
 from orchestrator.studies.sweep import Means, swept
@@ -36,7 +37,8 @@ def make_studies(
     """
     studies = [read_study(name) for name in names]
     for study in studies:
-        swept(study, Means(kind=kind, force=force), folder / study.stem, command, progress=True)
+        place = inner(folder, study.stem)
+        swept(study, Means(kind=kind, force=force), place, command, progress=True)
     return studies
 
 

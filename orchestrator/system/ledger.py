@@ -224,7 +224,8 @@ class Ledger:
     def _read(self) -> _Content | None:
         path = self.folder / LEDGER
         found = _content(path)
-        if found is None and os.path.lexists(path):
+        # One without a byte was about to be written.
+        if found is None and os.path.lexists(path) and path.lstat().st_size:
             if not self._force:
                 raise Taken(
                     f"{path} is damaged, or not by auv-fmu: which files it wrote cannot be told; "
@@ -234,11 +235,14 @@ class Ledger:
         return found
 
     def _write(self) -> None:
-        partial = self._partial
+        path, partial = self.folder / LEDGER, self._partial
+        partial.unlink(missing_ok=True)
         content = _Content(self.identity, self._files, self._moving, self._leaving)
-        partial.write_text(sealed(content._asdict()), encoding="utf-8")
-        to_disk(partial)
-        partial.replace(self.folder / LEDGER)
+        # Nobody knows the identity yet under which the first one could be written.
+        write_new(partial if os.path.lexists(path) else path, sealed(content._asdict()))
+        if partial.exists():
+            to_disk(partial)
+            partial.replace(path)
         to_disk(self.folder)
         self._is_there = True
 
@@ -331,6 +335,17 @@ def _is_plain(folder: Path, name: str) -> bool:
         if path.is_symlink():
             return False
     return path.is_file()
+
+
+def write_new(path: Path, text: str) -> None:
+    """Write a text into a file that is not there yet; nor may a link be, which could lead anywhere.
+
+    Raises:
+        OSError: it is there, or cannot be written.
+
+    """
+    with path.open("x", encoding="utf-8") as file:
+        file.write(text)
 
 
 def moved_aside(path: Path) -> Path:

@@ -145,3 +145,22 @@ def test_what_the_user_changed_is_the_users(capsys):
     Path("r/result.csv").write_bytes(changed.removesuffix(b"mine").replace(b"0.02,", b"0.03,", 1))
     assert main(["plot", "r", "--out", "plot.png"]) == 0
     assert "warning: r/result.csv was changed since the run wrote it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [
+        ("checkpoint", [*RUN, "--checkpoint-every", "0.1"]),
+        ("runs", ["report", "--out", "r"]),
+        ("fig3b", ["run", "both.toml", "--no-figures", "--out", "r"]),
+    ],
+)
+def test_a_folder_that_is_a_link_is_refused(name, command, capsys):
+    """It may lead out of the folder."""
+    mine = put("home/letter", "r/notes")
+    Path("both.toml").write_text('compare = "fig3b"\nstop_time = 0.2\n')
+    Path("r", name).symlink_to("../home")
+    assert main(command) == 2
+    assert f"r/{name}" in capsys.readouterr().err
+    found = contents(Path())
+    assert {k: found[k] for k in found if k.startswith(("home", "r"))} == mine

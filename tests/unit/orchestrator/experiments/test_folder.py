@@ -176,8 +176,8 @@ def test_everything_is_on_the_disk_before_it_counts(tmp_path: Path, monkeypatch)
     monkeypatch.setattr(os, "replace", recorded_replace)
     write(tmp_path / "r", "a.csv", "below/b.csv")
     names = [(call, Path(path).name) for call, path in calls]
-    # The second ledger is the one that says that the files take their places.
-    said = [i for i, name in enumerate(names) if name == ("replace", LEDGER)][1]
+    # The first new ledger is the one that says that the files take their places.
+    said = names.index(("replace", LEDGER))
     assert {("fsync", name) for name in ("a.csv", "b.csv", "below", RECORD)} < set(names[:said])
     assert names[said + 1] == ("fsync", "r")
     moved = [name for call, name in names[said + 1 :] if call == "replace"]

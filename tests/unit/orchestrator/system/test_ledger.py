@@ -113,6 +113,18 @@ def test_a_forged_ledger_moves_nothing_from_elsewhere(tmp_path: Path, link):
     assert not (folder / "below" / "key").exists()
 
 
+def test_no_link_is_written_through(tmp_path: Path):
+    """The identity of a ledger that somebody brings is known to that somebody."""
+    (tmp_path / "precious").write_text("mine")
+    (tmp_path / "r").mkdir()
+    content = {"identity": "0" * 32, "files": {}, "moving": {}, "leaving": []}
+    (tmp_path / "r" / LEDGER).write_text(sealed(content))
+    (tmp_path / "r" / (".auv-fmu-" + "0" * 32 + ".json")).symlink_to("../precious")
+    write(tmp_path / "r", "ours", "a")
+    assert (tmp_path / "precious").read_text() == "mine"
+    assert (tmp_path / "r" / "a").read_text() == "ours"
+
+
 def test_no_bit_of_a_ledger_is_changed_unseen(tmp_path: Path):
     write(tmp_path, "ours", "a")
     text = (tmp_path / LEDGER).read_bytes()
