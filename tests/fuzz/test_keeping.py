@@ -278,6 +278,9 @@ def test_every_file_of_the_users_stays(here: Path, name: str):
                     file.write("mine")
             fill(out, outside, what)
             before = {k: v for k, v in snapshot(out).items() if ours.get(k) != v}
+            if before.get(LEDGER) == b"":
+                # Has no byte to lose: as a process leaves it that is killed when it begins one.
+                del before[LEDGER]
             elsewhere = snapshot(outside) | snapshot(here)
             arguments = [part.format(out=out, here=here) for part in COMMANDS[name]]
             if what.force and name != "new":
