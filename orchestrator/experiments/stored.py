@@ -95,6 +95,8 @@ def read_record(table: Path) -> dict[str, Any]:
             frozenset(record.get("texts", []))
         except (KeyError, TypeError, AttributeError):
             raise ValueError("it lacks what a run writes") from None
+        except InputError as error:
+            raise ValueError(str(error)) from None
         if not all(map(_is_value, header.parameters.values())):
             raise ValueError("it holds parameters that no run has")
     return dict(record)

@@ -17,7 +17,6 @@ import signal
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
-from importlib import import_module
 from importlib.util import find_spec
 from io import StringIO
 from math import modf
@@ -198,9 +197,10 @@ def quick(here: Path) -> Iterator[None]:
             (report, "CLAIMS", ()),
             (report, "EFFECTS", ()),
             (paper, "names", lambda: ["fig3a"]),
-            *([(import_module("orchestrator.studies.cluster"), "making", making)] * STUDIES),
         ):
             stack.enter_context(patch.object(what, name, instead))
+        if STUDIES:
+            stack.enter_context(patch("orchestrator.studies.cluster.making", making))
         yield
 
 
@@ -335,7 +335,7 @@ READERS = {
         stop_after(1, Checkpoints, "_write"),
         [*RUN, "--resume", "--out", "{out}"],
     ),
-    "result": ([*RUN, "--out", "{out}"], None, ["view", "{out}"]),
+    "result": ([*RUN, "--out", "{out}"], None, ["plot", "{out}", "--out", "{out}/plot.png"]),
     "report": (COMMANDS["report"], None, COMMANDS["report"]),
 }
 if STUDIES:
