@@ -219,6 +219,7 @@ class Ledger:
             if os.path.lexists(self.folder / name)
         }
         self.remove(leaving)
+        self._discard()
         to_disk(self.folder)
 
     def _read(self) -> _Content | None:

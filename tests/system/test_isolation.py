@@ -232,7 +232,7 @@ def test_nobody_hangs_where_the_keeper_is_killed(c_fmu: Path, mark: str):
                     os.kill(int(process.name), signal.SIGKILL)
 
     table = Kills()
-    simulate(foreign_system(c_fmu), Experiment(0.5, STEP), [table], Isolation(20.0))
+    simulate(foreign_system(c_fmu), Experiment(50.0, STEP), [table], Isolation(20.0))
     assert table.failure is not None
     assert "its process was ended by SIGKILL" in table.failure
     assert left_over(mark) == []
