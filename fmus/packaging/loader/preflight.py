@@ -48,6 +48,10 @@ def refusal(resources: str, guid: str) -> str:
     return ""
 
 
+#: How often a module is looked for, where other threads change where to look.
+_TRIES = 10
+
+
 def forget(resources: str) -> None:
     """Take a folder off sys.path."""
     with suppress(ValueError):
@@ -102,12 +106,19 @@ def _content(path: Path) -> bytes:
 
 
 def _imported(script: str, resources: str) -> ModuleType:
-    importlib.invalidate_caches()
-    sys.path.insert(0, resources)
-    try:
-        return importlib.import_module(script)
-    finally:
-        forget(resources)
+    left = _TRIES
+    while True:
+        importlib.invalidate_caches()
+        sys.path.insert(0, resources)
+        try:
+            return importlib.import_module(script)
+        except ModuleNotFoundError as error:
+            # Its file is there: another thread took a folder off, and the search skipped one.
+            left -= 1
+            if error.name != script or not left:
+                raise
+        finally:
+            forget(resources)
 
 
 def _has_slave(module: ModuleType) -> bool:
