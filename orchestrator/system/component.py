@@ -125,12 +125,13 @@ class Component:
     @cached_property
     def _feedthrough(self) -> frozenset[str]:
         """An FMU that does not say must be taken to have it (FMI 2.0.4, section 2.2.8)."""
-        return frozenset(
+        free = {
             unknown.variable.name
             for unknown in self.description.outputs
-            if unknown.dependencies is None
-            or any(variable.causality == "input" for variable in unknown.dependencies)
-        )
+            if unknown.dependencies is not None
+            and not any(variable.causality == "input" for variable in unknown.dependencies)
+        }
+        return frozenset(variable.name for variable in self.having("output")) - free
 
 
 def read_component(

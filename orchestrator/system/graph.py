@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 from orchestrator.system.structure import Connection, System
+
+#: What each component waits for: the components whose direct feedthrough feeds it.
+_Sources = Mapping[str, Collection[str]]
 
 
 def has_feedthrough(system: System, connection: Connection) -> bool:
@@ -13,67 +16,101 @@ def has_feedthrough(system: System, connection: Connection) -> bool:
     return system.components[source.component].has_feedthrough(source.port)
 
 
-def derived_order(system: System) -> list[str]:
+def rings(system: System, among: Collection[str] | None = None) -> list[list[str]]:
+    """The rings of direct feedthroughs: components of which each waits for all others, or itself.
+
+    Args:
+        system: whose connections are looked at.
+        among: components that count; None: all.
+
+    Returns:
+        Each ring in the order in which :func:`derived_order` opens it.
+
+    """
+    sources = _sources(system, among)
+    place = {name: i for i, name in enumerate(sources)}
+    return [
+        _opened(part, sources, place)
+        for part in _strongly_connected(sources, sources)
+        if len(part) > 1 or part[0] in sources[part[0]]
+    ]
+
+
+def derived_order(system: System, solved: Iterable[Sequence[str]] = ()) -> list[str]:
     """All components: one with direct feedthrough comes before those that it feeds.
 
     No order does that for every connection of a ring. The component of the ring that stands first
-    in the system then comes first, and takes one step late what feeds it: see :func:`delayed`.
+    in the system then comes first, and takes one step late what feeds it; where the others are a
+    ring still, it is opened in the same way: see :func:`delayed`.
+
+    Args:
+        system: that is stepped.
+        solved: rings that are stepped as one component each; their components stay together.
+
     """
-    waiting: dict[str, set[str]] = {name: set() for name in system.components}
-    for connection in system.connections:
-        if has_feedthrough(system, connection):
-            waiting[connection.target.component].add(connection.source.component)
-    order: list[str] = []
-    while waiting:
-        ready = [name for name, sources in waiting.items() if not sources & waiting.keys()]
-        # A ring that waits for no other one is all that its components wait for.
-        chosen = ready or [min(waiting, key=lambda name: len(_upstream(waiting, name)))]
-        for name in chosen:
-            del waiting[name]
-        order += chosen
-    return order
+    ring_of = {name: ring for ring in solved for name in ring}
+    # A ring stands where the first of its components stands.
+    place = {name: i for i, name in enumerate(system.components)}
+    lead = {name: min(ring, key=place.__getitem__) for name, ring in ring_of.items()}
+    sources: dict[str, set[str]] = {lead.get(name, name): set() for name in system.components}
+    for name, feeding in _sources(system).items():
+        own = lead.get(name, name)
+        sources[own] |= {lead.get(source, source) for source in feeding}
+        if name in lead:
+            sources[own].discard(own)
+    order = _in_levels(_without_rings(sources))
+    return [member for name in order for member in ring_of.get(name, (name,))]
 
 
-def _upstream(sources: Mapping[str, set[str]], component: str) -> set[str]:
-    """What a component waits for, directly or through others."""
-    found: set[str] = set()
-    ahead = [component]
-    while ahead:
-        new = (sources[ahead.pop()] & sources.keys()) - found
-        found |= new
-        ahead += new
-    return found
-
-
-def delayed(system: System, order: Sequence[str]) -> list[Connection]:
+def delayed(
+    system: System, order: Sequence[str], solved: Iterable[Sequence[str]] = ()
+) -> list[Connection]:
     """The connections with direct feedthrough that an order makes one step late.
 
     Args:
         system: that is stepped.
         order: all its components, one stepped after the other.
+        solved: rings that are stepped as one component each.
 
     """
     place = {name: i for i, name in enumerate(order)}
+    ring_of = {name: i for i, ring in enumerate(solved) for name in ring}
     return [
         connection
         for connection in system.connections
         if has_feedthrough(system, connection)
-        and place[connection.source.component] >= place[connection.target.component]
+        and place[source := connection.source.component]
+        >= place[target := connection.target.component]
+        and not (source in ring_of and ring_of[source] == ring_of.get(target))
     ]
 
 
-def in_stages(system: System, order: Sequence[str]) -> list[list[str]]:
-    """An order in stages: no component takes what another one of its stage has just computed."""
-    late = set(delayed(system, order))
+def in_stages(
+    system: System, order: Sequence[str], solved: Sequence[Sequence[str]] = ()
+) -> list[list[str]]:
+    """An order in stages: no component takes what another one of its stage has just computed.
+
+    A solved ring is a stage by itself, in the place of its component that comes first.
+    """
+    ring_of = {name: list(ring) for ring in solved for name in ring}
+    units: dict[str, list[str]] = {}
+    for name in order:
+        ring = ring_of.get(name, [name])
+        units.setdefault(ring[0], ring)
+    late = set(delayed(system, [name for unit in units.values() for name in unit], solved))
     feeding: dict[str, set[str]] = {name: set() for name in order}
     for connection in system.connections:
         if has_feedthrough(system, connection) and connection not in late:
             feeding[connection.target.component].add(connection.source.component)
-    stages: list[list[str]] = [[]]
-    for name in order:
-        if feeding[name].intersection(stages[-1]):
+    stages: list[list[str]] = []
+    stage_of: dict[str, int] = {}
+    for first, unit in units.items():
+        present = len(stages) - 1
+        alone = first in ring_of or (stages and stages[-1][0] in ring_of)
+        if alone or not stages or any(stage_of.get(name) == present for name in feeding[first]):
             stages.append([])
-        stages[-1].append(name)
+        stages[-1] += unit
+        stage_of |= dict.fromkeys(unit, len(stages) - 1)
     return stages
 
 
@@ -88,11 +125,112 @@ def reaching(system: System, component: str, until: set[str]) -> Iterator[Connec
     """
     seen, waiting = {component}, [component]
     while waiting:
-        name = waiting.pop()
-        for connection in system.connections:
-            if connection.target.component == name:
-                yield connection
-                source = connection.source.component
-                if source not in seen | until:
-                    seen.add(source)
-                    waiting.append(source)
+        for connection in system.feeding[waiting.pop()]:
+            yield connection
+            source = connection.source.component
+            if source not in seen | until:
+                seen.add(source)
+                waiting.append(source)
+
+
+def _sources(system: System, among: Collection[str] | None = None) -> dict[str, set[str]]:
+    counted = {name for name in system.components if among is None or name in among}
+    found: dict[str, set[str]] = {name: set() for name in system.components if name in counted}
+    for connection in system.connections:
+        source, target = connection.source.component, connection.target.component
+        if source in counted and target in counted and has_feedthrough(system, connection):
+            found[target].add(source)
+    return found
+
+
+def _without_rings(sources: _Sources) -> dict[str, set[str]]:
+    """What each waits for once all rings are opened: in a ring, for the one before it."""
+    place = {name: i for i, name in enumerate(sources)}
+    found: dict[str, set[str]] = {}
+    for part in _strongly_connected(sources, sources):
+        before: set[str] = set()
+        for name in _opened(part, sources, place):
+            found[name] = set(sources[name]).difference(part) | before
+            before = {name}
+    return {name: found[name] for name in sources}
+
+
+def _in_levels(sources: _Sources) -> list[str]:
+    """The components of a graph without rings: first those that wait for nothing, and so on."""
+    missing = {name: len(feeding) for name, feeding in sources.items()}
+    fed: dict[str, list[str]] = {name: [] for name in sources}
+    for name, feeding in sources.items():
+        for source in feeding:
+            fed[source].append(name)
+    place = {name: i for i, name in enumerate(sources)}
+    order: list[str] = []
+    level = [name for name, n in missing.items() if n == 0]
+    while level:
+        order += level
+        following = []
+        for target in (target for name in level for target in fed[name]):
+            missing[target] -= 1
+            if missing[target] == 0:
+                following.append(target)
+        level = sorted(following, key=place.__getitem__)
+    return order
+
+
+def _opened(ring: Sequence[str], sources: _Sources, place: Mapping[str, int]) -> list[str]:
+    """A ring in the order in which it is opened: its first, then what is left, part by part."""
+    order: list[str] = []
+    parts: list[Sequence[str]] = [ring]
+    while parts:
+        part = parts.pop()
+        first = min(part, key=place.__getitem__)
+        order.append(first)
+        rest = [name for name in part if name != first]
+        parts += reversed(_strongly_connected(rest, sources))
+    return order
+
+
+def _strongly_connected(names: Iterable[str], sources: _Sources) -> list[list[str]]:
+    """Components in parts of which each waits for all others of its part (Tarjan 1972).
+
+    Returns:
+        The parts; one comes after those that it waits for.
+
+    """
+    names = dict.fromkeys(names)
+    number: dict[str, int] = {}
+    lowest: dict[str, int] = {}
+    open_: dict[str, None] = {}
+    parts: list[list[str]] = []
+    for root in names:
+        if root in number:
+            continue
+        path: list[tuple[str, Iterator[str]]] = []
+        following: str | None = root
+        while following is not None or path:
+            if following is not None:
+                number[following] = lowest[following] = len(number)
+                open_[following] = None
+                path.append((following, iter(sources[following])))
+            name, ahead = path[-1]
+            following = None
+            for source in ahead:
+                if source not in names:
+                    continue
+                if source not in number:
+                    following = source
+                    break
+                if source in open_:
+                    lowest[name] = min(lowest[name], number[source])
+            if following is not None:
+                continue
+            path.pop()
+            if path:
+                above = path[-1][0]
+                lowest[above] = min(lowest[above], lowest[name])
+            if lowest[name] == number[name]:
+                part: list[str] = []
+                while not part or part[-1] != name:
+                    last, _ = open_.popitem()
+                    part.append(last)
+                parts.append(part)
+    return parts

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from sys import float_info
 
@@ -99,11 +100,22 @@ class System:
 
     def parameters_of(self, component: str) -> dict[str, Value]:
         """Values that this system sets in one component, by the names of its variables."""
-        return {
-            target.port: value
-            for target, value in self.parameters.items()
-            if target.component == component
-        }
+        return dict(self._parameters.get(component, {}))
+
+    @cached_property
+    def _parameters(self) -> dict[str, dict[str, Value]]:
+        found: dict[str, dict[str, Value]] = {}
+        for target, value in self.parameters.items():
+            found.setdefault(target.component, {})[target.port] = value
+        return found
+
+    @cached_property
+    def feeding(self) -> dict[str, list[Connection]]:
+        """The connections that end at each component."""
+        found: dict[str, list[Connection]] = {name: [] for name in self.components}
+        for connection in self.connections:
+            found.setdefault(connection.target.component, []).append(connection)
+        return found
 
     def fmus(self, *taken: str) -> dict[Path, str]:
         """All FMUs, each with a file name that no other has, nor any file that is taken."""
@@ -112,11 +124,12 @@ class System:
 
     def open_inputs(self, component: str) -> list[str]:
         """Inputs of one component that nothing feeds, and for which no value is set."""
-        taken = {connection.target for connection in self.connections} | self.parameters.keys()
+        taken = {connection.target.port for connection in self.feeding[component]}
+        taken |= self.parameters_of(component).keys()
         return [
             variable.name
             for variable in self.components[component].having("input")
-            if PortName(component, variable.name) not in taken
+            if variable.name not in taken
         ]
 
     def value(self, name: PortName) -> Value | None:
