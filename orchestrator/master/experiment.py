@@ -16,6 +16,10 @@ ORDERS = GAUSS_SEIDEL, JACOBI = "gauss-seidel", "jacobi"
 #: One of these, or the names of all components, one stepped after the other.
 Order: TypeAlias = str | Sequence[str]
 
+#: How rings of direct feedthroughs are closed: solved, opened by a delay of a step, or solved with
+#: inputs that change linearly from one communication point to the next.
+COUPLINGS = SOLVE, DELAY, LINEAR = "solve", "delay", "linear"
+
 #: A rest shorter than this share of the run, and than that of a step, is a rounding error.
 ROUNDING, _MOST_OF_A_STEP = 1e-9, 1e-3
 
@@ -42,6 +46,8 @@ class Experiment:
         step: communication step [s].
         order: in which components are stepped, one of :data:`ORDERS` or the names of all of them.
         start_time: begin [s].
+        coupling: one of :data:`COUPLINGS`; None: rings are solved where their FMUs allow it, and
+            else delayed.
 
     """
 
@@ -49,6 +55,7 @@ class Experiment:
     step: float
     order: Order = ORDERS[0]
     start_time: float = 0.0
+    coupling: str | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be run."""
@@ -71,6 +78,8 @@ class Experiment:
             raise InputError(
                 f"{self._length:g} s in steps of {self.step:g} s are more than {MOST_STEPS:,} steps"
             )
+        if self.coupling not in (None, *COUPLINGS):
+            raise InputError(f"coupling {self.coupling!r}: use one of {', '.join(COUPLINGS)}")
         if not isinstance(self.order, str):
             object.__setattr__(self, "order", tuple(self.order))
         elif self.order not in ORDERS:

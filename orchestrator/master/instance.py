@@ -61,11 +61,13 @@ class Instance(Protocol):
     Attributes:
         name: of the component.
         is_here: whether its FMU is in this process, so that there are pointers to its functions.
+        gives_derivatives: whether its FMU can say how outputs change with inputs.
 
     """
 
     name: str
     is_here: bool
+    gives_derivatives: bool
     set_inputs: list[Callable[[], int]]
     get_outputs: list[Callable[[], int]]
 
@@ -108,6 +110,14 @@ class Instance(Protocol):
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
 
+    def derivatives(self, outputs: Sequence[int], of: int) -> Sequence[float]:
+        """How some outputs change with one input at the same time, by their value references.
+
+        Raises:
+            ComponentFailed: the FMU does not say it.
+
+        """
+
     def read(self, ports: Sequence[str]) -> dict[str, Value]:
         """Values of some variables, as the FMU holds them."""
 
@@ -116,6 +126,15 @@ class Instance(Protocol):
 
     def reset(self) -> None:
         """Be what it was before the initialisation, which can then be entered again."""
+
+    def keep(self) -> None:
+        """Keep the state of now, to go back to it."""
+
+    def go_back(self) -> None:
+        """Go back to the state that was kept; what the row holds is left as it is."""
+
+    def let_change(self, inputs: Sequence[int], slopes: Sequence[float]) -> None:
+        """Let some inputs, by their value references, change linearly in the steps from now on."""
 
     def state(self) -> bytes:
         """The FMU's whole state between two steps, from which another instance can go on.

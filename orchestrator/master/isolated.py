@@ -120,6 +120,7 @@ class IsolatedInstance:
 
         """
         self.name, self._component = component.name, component
+        self.gives_derivatives = component.gives_derivatives
         self.set_inputs: list[Callable[[], int]] = []
         self.get_outputs: list[Callable[[], int]] = [self._take_outputs]
         self._status, self._log = status, log
@@ -177,6 +178,15 @@ class IsolatedInstance:
         self._ask("exchange")
         self._read_outputs()
 
+    def derivatives(self, outputs: Sequence[int], of: int) -> Sequence[float]:
+        """How some outputs change with one input at the same time, by their value references."""
+        found = self._ask("derivatives", list(outputs), of)
+        if not (isinstance(found, list) and len(found) == len(outputs)):
+            raise self._nonsense()
+        if not all(type(value) is float for value in found):
+            raise self._nonsense()
+        return found
+
     def read(self, ports: Sequence[str]) -> dict[str, Value]:
         """Values of some variables, as the FMU holds them."""
         if not ports:
@@ -196,6 +206,18 @@ class IsolatedInstance:
     def reset(self) -> None:
         """Be what it was before the initialisation."""
         self._ask("reset")
+
+    def keep(self) -> None:
+        """Keep the state of now, to go back to it."""
+        self._ask("keep")
+
+    def go_back(self) -> None:
+        """Go back to the state that was kept."""
+        self._ask("go_back")
+
+    def let_change(self, inputs: Sequence[int], slopes: Sequence[float]) -> None:
+        """Let some inputs change linearly in the steps from now on."""
+        self._ask("let_change", list(inputs), list(slopes))
 
     def state(self) -> bytes:
         """The FMU's whole state between two steps."""

@@ -27,6 +27,7 @@ from fmpy.fmi2 import (
     fmi2DoStepStatus,
     fmi2Error,
     fmi2Fatal,
+    fmi2FMUstate,
     fmi2LastSuccessfulTime,
     fmi2OK,
     fmi2Pending,
@@ -84,11 +85,13 @@ class LoadedInstance:
         self._outputs: list[Block] = []
         self._variables = component.variables
         self._gives_state = component.gives_state
+        self.gives_derivatives = component.gives_derivatives
         self._logged = [
             category.name
             for category in component.description.logCategories
             if category.name in _LOGGED
         ]
+        self._kept = fmi2FMUstate()
         self._library = library
         self._listener = listener
         self._complaints: deque[str] = deque(maxlen=_MOST_COMPLAINTS)
@@ -203,6 +206,11 @@ class LoadedInstance:
                 raise self.failed(status, "exchanging values")
         put_back()
 
+    def derivatives(self, outputs: Sequence[int], of: int) -> Sequence[float]:
+        """How some outputs change with one input at the same time, by their value references."""
+        found: list[float] = self._call("getDirectionalDerivative", outputs, [of], [1.0])
+        return found
+
     def read(self, ports: Sequence[str]) -> dict[str, Value]:
         """Values of some variables, as the FMU holds them."""
         return {port: self._get(self._variables[port]) for port in ports}
@@ -214,6 +222,19 @@ class LoadedInstance:
     def reset(self) -> None:
         """Be what it was before the initialisation."""
         self._call("reset")
+
+    def keep(self) -> None:
+        """Keep the state of now, to go back to it."""
+        self._call("fmi2GetFMUstate", self._fmu.component, ctypes.byref(self._kept))
+
+    def go_back(self) -> None:
+        """Go back to the state that was kept."""
+        self._call("setFMUstate", self._kept)
+
+    def let_change(self, inputs: Sequence[int], slopes: Sequence[float]) -> None:
+        """Let some inputs change linearly in the steps from now on."""
+        if inputs:
+            self._call("setRealInputDerivatives", inputs, [1] * len(inputs), slopes)
 
     def state(self) -> bytes:
         """The FMU's whole state between two steps."""
@@ -253,6 +274,9 @@ class LoadedInstance:
         if self._library.corrupted:
             # What it was given by us must stay where it is, too.
             return
+        if self._kept:
+            with suppress(FMICallException):
+                self._fmu.freeFMUstate(self._kept)
         # FMU2Slave.freeInstance would unload the library as well.
         self._fmu.fmi2FreeInstance(self._fmu.component)
         del _instances[self._environment]

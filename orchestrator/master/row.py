@@ -92,7 +92,11 @@ class Row:
         for component, instance in instances.items():
             part = self.values[firsts.get(component, 0) :]
             instance.tie(part, parts[component], self.texts)
+        self._hiding = {name: self.hidden(self._outputs(name)) for name in hidden}
         self.enter(system.parameters)
+
+    def _outputs(self, component: str) -> list[PortName]:
+        return [port for port, causality, _ in self._ports[component] if causality == "output"]
 
     def enter(self, values: Mapping[PortName, Value]) -> None:
         """Take values of ports, but for those that are no finite numbers."""
@@ -155,10 +159,11 @@ class Row:
             np.array([self._hidden[port] for port in known], dtype=np.intp),
         )
 
-    def show(self) -> None:
-        """Copy all that is hidden into its columns."""
-        targets, sources = self.hidden(list(self._hidden))
-        self.values[targets] = self.values[sources]
+    def show(self, component: str) -> None:
+        """Copy what is hidden of a component into its columns."""
+        if component in self._hiding:
+            targets, sources = self._hiding[component]
+            self.values[targets] = self.values[sources]
 
 
 def _hides(component: str, causality: str, hidden: Collection[str]) -> bool:

@@ -6,9 +6,13 @@ outputs of a component are read as soon as it was stepped.
 - `jacobi`: one stage. All inputs are outputs of t_k.
 - `gauss-seidel`: a component whose output has direct feedthrough is stepped in an earlier
   stage than those it feeds, so they receive without delay what follows from t_k. Outputs
-  without feedthrough are states: everybody takes them at t_k. A ring is opened before the one of
-  its components that stands first in the system, which takes what feeds it at t_k.
+  without feedthrough are states: everybody takes them at t_k.
 - the names of all components: the same in the order that they stand in.
+
+A ring of feedthroughs that is solved is a stage by itself: it is closed before its components are
+stepped, with their states of t_k, and after that with those of t_k+1. One that is not solved is
+opened before the one of its components that stands first in the system, which takes what feeds it
+at t_k.
 
 A component may take n communication steps in one of its own. It is stepped at every n-th t_k, with
 the inputs of that time, which it holds. What it computes waits in hidden columns of the row: from
@@ -19,22 +23,38 @@ is `jacobi`; all others when the time has come that they belong to.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from ctypes import c_double
-from typing import NamedTuple
+from ctypes import CFUNCTYPE, c_double, c_int, c_void_p, cast
+from functools import partial
+from typing import NamedTuple, Protocol
 
-from fmpy.fmi2 import fmi2OK, fmi2Warning
+from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
 
 from orchestrator.errors import InputError, shortened
-from orchestrator.master.experiment import JACOBI, Experiment, Order
+from orchestrator.master import layout
+from orchestrator.master.experiment import JACOBI, ORDERS, Experiment, Order
 from orchestrator.master.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
 from orchestrator.master.mode import PRODUCT, A, B, C, put_back
 from orchestrator.master.paces import paces
+from orchestrator.master.ring import Ring
 from orchestrator.master.row import Row
 from orchestrator.master.signals import Gathering
 from orchestrator.system.component import Component
 from orchestrator.system.graph import delayed, derived_order, has_feedthrough, in_stages
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
+
+#: FMI's doStep, as the compiled loop calls it.
+_CALLBACK = CFUNCTYPE(c_int, c_void_p, c_double, c_double, c_int)
+
+
+class Steppable(Protocol):
+    """What a loop asks of a member besides its calls."""
+
+    def pointers(self) -> layout.Member:
+        """The same calls as pointers."""
+
+    def failed(self, status: int, function: str) -> Exception:
+        """What to raise after a call that has ended with a status."""
 
 
 class Member(NamedTuple):
@@ -43,7 +63,50 @@ class Member(NamedTuple):
     set_inputs: list[Callable[[], int]]
     do_step: Callable[[c_double, c_double, int], int]
     get_outputs: list[Callable[[], int]]
-    instance: Instance
+    instance: Steppable
+
+
+class Action:
+    """A member of a stage that acts in the place of a step."""
+
+    def __init__(self, act: Callable[[float, float], None]) -> None:
+        """Do something in every step.
+
+        Args:
+            act: what to do, with the time and the length of the step.
+
+        """
+        self._act = act
+        self._error: Exception | None = None
+        self._called_back = _CALLBACK(lambda _, t, h, __: self._tried(t, h))
+
+    @property
+    def member(self) -> Member:
+        """As the loops know it."""
+        return Member([], self.do_step, [], self)
+
+    def do_step(self, t: c_double, h: c_double, _: int) -> int:
+        """Act; the status says whether it went well."""
+        return self._tried(t.value, h.value)
+
+    def failed(self, status: int, function: str) -> Exception:
+        """What it has raised."""
+        assert self._error is not None
+        return self._error
+
+    def pointers(self) -> layout.Member:
+        """The same for the compiled loop."""
+        nothing = (layout.Move * 0)()
+        return layout.Member(None, cast(self._called_back, c_void_p).value, nothing, nothing, 0, 0)
+
+    def _tried(self, t: float, h: float) -> int:
+        try:
+            self._act(t, h)
+        except Exception as error:
+            # No exception can leave through the compiled loop.
+            self._error = error
+            return int(fmi2Error)
+        return int(fmi2OK)
 
 
 class Pace(NamedTuple):
@@ -80,19 +143,26 @@ class Stage(NamedTuple):
     pace: Pace | None = None
 
 
-def stages(system: System, order: Order) -> list[list[str]]:
+def stages(system: System, order: Order, solved: Sequence[Sequence[str]] = ()) -> list[list[str]]:
     """Components in the order in which they are stepped; those of one stage are independent.
+
+    Args:
+        system: that is stepped.
+        order: of its components.
+        solved: rings of them that are stepped as one, each a stage by itself.
 
     Raises:
         InputError: an order that does not name each component once.
 
     """
     if order == JACOBI:
-        return [list(system.components)]
+        ringed = {name for ring in solved for name in ring}
+        others = [name for name in system.components if name not in ringed]
+        return [others, *map(list, solved)] if others else list(map(list, solved))
     if isinstance(order, str):
-        return in_stages(system, derived_order(system))
+        return in_stages(system, derived_order(system, solved), solved)
     _check_names(system, order)
-    return in_stages(system, order)
+    return in_stages(system, order, solved)
 
 
 def _check_names(system: System, order: Sequence[str]) -> None:
@@ -108,36 +178,60 @@ def _check_names(system: System, order: Sequence[str]) -> None:
             )
 
 
-def delays(system: System, order: Order) -> list[str]:
-    """Where an order that follows from the feedthroughs opens a ring of them, in words."""
+def delays(
+    system: System,
+    order: Order,
+    solved: Sequence[Sequence[str]] = (),
+    reasons: Mapping[str, str] | None = None,
+) -> list[str]:
+    """Where an order that follows from the feedthroughs opens a ring of them, in words.
+
+    Args:
+        system: that is stepped.
+        order: of its components.
+        solved: rings that are solved.
+        reasons: why components are in none of these.
+
+    """
     if not isinstance(order, str) or order == JACOBI:
         return []
-    late = delayed(system, derived_order(system))
-    return [
-        f"{name} takes {shortened(', '.join(str(c.source) for c in late if _feeds(c, name)))} one "
-        "step late: direct feedthroughs form a ring"
-        for name in dict.fromkeys(connection.target.component for connection in late)
-    ]
+    late: dict[str, list[PortName]] = {}
+    for connection in delayed(system, derived_order(system, solved), solved):
+        late.setdefault(connection.target.component, []).append(connection.source)
+    found = []
+    for name, sources in late.items():
+        text = f"{name} takes {shortened(', '.join(map(str, sources)))} one step late: "
+        concerned = (name, *(source.component for source in sources))
+        why = next((reasons[one] for one in concerned if one in reasons), "") if reasons else ""
+        found.append(f"{text}direct feedthroughs form a ring{why and f'; {why}'}")
+    return found
 
 
-def _feeds(connection: Connection, component: str) -> bool:
-    return connection.target.component == component
-
-
-def gathered(system: System, plan: Sequence[Sequence[str]]) -> list[list[Connection]]:
+def gathered(
+    system: System,
+    plan: Sequence[Sequence[str]],
+    solved: Sequence[Sequence[str]] = (),
+    order: Order = ORDERS[0],
+) -> list[list[Connection]]:
     """The connections along which values are gathered before each stage.
 
     Args:
         system: whose connections say what feeds what.
         plan: its components in :func:`stages`.
+        solved: rings among them, which gather by themselves what they feed themselves.
+        order: of the stages.
 
     """
     stage_of = {name: i for i, names in enumerate(plan) for name in names}
+    ring_of = {name: i for i, ring in enumerate(solved) for name in ring}
     found: list[list[Connection]] = [[] for _ in plan]
     for connection in system.connections:
-        source, target = (stage_of[end.component] for end in (connection.source, connection.target))
+        start, end = connection.source.component, connection.target.component
+        if start in ring_of and ring_of[start] == ring_of.get(end):
+            continue
+        source, target = stage_of[start], stage_of[end]
         # What is no feedthrough is a state, and must be taken before anybody advances.
-        late = has_feedthrough(system, connection) and source < target
+        late = order != JACOBI and has_feedthrough(system, connection) and source < target
         found[target if late else 0].append(connection)
     return found
 
@@ -148,6 +242,7 @@ def schedule(
     plan: Sequence[Sequence[str]],
     instances: Mapping[str, Instance],
     row: Row,
+    rings: Sequence[Ring] = (),
 ) -> list[Stage]:
     """The stages of every step.
 
@@ -157,12 +252,16 @@ def schedule(
         plan: its components in :func:`stages`.
         instances: of all components.
         row: that they are tied to.
+        rings: that are solved, each a stage of the plan.
 
     """
     pace = paces(system, experiment.step)
+    closing = {ring.names[0]: [Action(partial(_close, ring)).member] for ring in rings}
     found: list[Stage] = []
     shown: list[Stage] = []
-    for names, connections in zip(plan, gathered(system, plan), strict=True):
+    nothing = Gathering.along(row, ())
+    gathers = gathered(system, plan, [ring.names for ring in rings], experiment.order)
+    for names, connections in zip(plan, gathers, strict=True):
         taken: dict[int, list[Connection]] = {1: []}
         for connection in connections:
             taken.setdefault(pace[connection.target.component], []).append(connection)
@@ -172,10 +271,13 @@ def schedule(
         )
         # All inputs are gathered before anybody is stepped.
         found += [Stage(Gathering.along(row, some), [], Pace(n)) for n, some in taken.items()]
-        found.append(fast)
+        if names[0] in closing:
+            close = Stage(nothing, closing[names[0]])
+            found += [Stage(fast.gather, close.members), Stage(nothing, fast.members), close]
+        else:
+            found.append(fast)
         for name in names:
             if (n := pace[name]) > 1:
-                nothing = Gathering.along(row, ())
                 early, later = (
                     Gathering(*row.hidden(ports))
                     for ports in _shown(system.components[name], experiment.order)
@@ -186,6 +288,10 @@ def schedule(
                 ]
                 shown.append(Stage(later, [], Pace(n, at_end=True)))
     return [stage for stage in found + shown if stage.members or len(stage.gather.targets)]
+
+
+def _close(ring: Ring, _t: float, _h: float) -> None:
+    ring.close()
 
 
 def _shown(component: Component, order: Order) -> tuple[list[PortName], list[PortName]]:
@@ -203,15 +309,22 @@ def member(instance: Instance) -> Member:
     return Member(instance.set_inputs, instance.do_step, instance.get_outputs, instance)
 
 
-def step(members: Sequence[Member], t: float, h: float) -> None:
-    """Step the components of a stage, which may run side by side until their outputs are asked."""
+def step(members: Sequence[Member], t: float, h: float, is_final: bool = True) -> None:
+    """Step the components of a stage, which may run side by side until their outputs are asked.
+
+    Args:
+        members: the components.
+        t, h: beginning and length of the step [s].
+        is_final: whether nobody will go back to its beginning.
+
+    """
     # Converted once for all of them.
     time, length = c_double(t), c_double(h)
     for set_inputs, do_step, _, instance in members:
         for call in set_inputs:
             if (status := call()) != fmi2OK and status != fmi2Warning:
                 raise instance.failed(status, SET_INPUTS)
-        if (status := do_step(time, length, 1)) != fmi2OK and status != fmi2Warning:
+        if (status := do_step(time, length, is_final)) != fmi2OK and status != fmi2Warning:
             raise instance.failed(status, DO_STEP)
         # To call a function that looks costs more than to look.
         if A * B * C != PRODUCT:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from math import lcm
@@ -10,28 +10,30 @@ from time import monotonic
 
 import numpy as np
 
-from orchestrator.errors import InputError, StartError, reason, shortened, unforeseen
+from orchestrator.errors import InputError, StartError, reason, unforeseen
 from orchestrator.master.attendant import Attendance, Attendant, Run
-from orchestrator.master.experiment import Experiment
+from orchestrator.master.experiment import DELAY, GAUSS_SEIDEL, LINEAR, SOLVE, Experiment
+from orchestrator.master.growth import Growth, delayed_ports
 from orchestrator.master.instance import ComponentFailed, Ended, Instance
 from orchestrator.master.interrupts import held_interrupts
 from orchestrator.master.isolated import Isolation
+from orchestrator.master.linear import LinearSteps, check_linear
 from orchestrator.master.log import Log
 from orchestrator.master.loop import PYTHON_LOOP, Loop
 from orchestrator.master.mode import default_mode
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.paces import paces
 from orchestrator.master.placing import placed
+from orchestrator.master.ring import Ring
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import delays, schedule, stages
+from orchestrator.master.schedule import Action, Stage, delays, schedule, stages
+from orchestrator.master.settling import Settling
 from orchestrator.master.signals import Gathering, Signals
 from orchestrator.master.surroundings import Surroundings
+from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import literal, same
-
-#: In a ring initial values are exchanged so often, until they rest.
-_MOST_ROUNDS = 1000
 
 
 # What overflows on its way is named as the value of a port.
@@ -64,11 +66,11 @@ def simulate(
 
     """
     system.check()
-    plan = stages(system, experiment.order)
+    stages(system, experiment.order)
+    if experiment.coupling == LINEAR:
+        check_linear(system)
     slow = {name for name, n in paces(system, experiment.step).items() if n > 1}
     log = Log()
-    for delay in delays(system, experiment.order):
-        log.remark(delay)
     experiment = _whole_steps(system, experiment, log)
     with held_interrupts() as interrupts, Surroundings() as surroundings, ExitStack() as stack:
         with _explained():
@@ -77,17 +79,19 @@ def simulate(
             stack.enter_context(surroundings)
             loop = _possible_loop(loop, instances, log)
             row = Row(system, instances, slow)
-            _initialise(system, instances, row, experiment, log)
+            solved = _initialise(system, instances, row, experiment, slow, log)
             names = tuple(map(str, row.columns))
             parameters = _parameters(system, instances, log)
             texts = dict.fromkeys(map(str, row.text_ports), row.texts)
             header = Header(names, experiment, parameters, loop.name, texts)
-        scheduled = schedule(system, experiment, plan, instances, row)
+        scheduled, gatherings = _scheduled(system, experiment, instances, row, solved)
+        if watched := delayed_ports(system, [ring.names for ring in solved]):
+            observers = [*observers, Growth(watched)]
         with _told(header, observers, surroundings) as tell:
             blocks = Blocks(len(row.shown), observers, surroundings.ours)
             interrupts.hand_over = blocks.hand_over
             blocks.append(experiment.start_time, row.shown)
-            signals = Signals(row, [stage.gather for stage in scheduled], system.connections)
+            signals = Signals(row, gatherings, system.connections)
             run = Run(
                 system,
                 experiment,
@@ -100,6 +104,7 @@ def simulate(
                 interrupts,
                 attendants,
             )
+            plan = stages(system, experiment.order, [ring.names for ring in solved])
             order = [name for names in plan for name in names]
             remark = None
             try:
@@ -172,9 +177,13 @@ def _initialise(
     instances: Mapping[str, Instance],
     row: Row,
     experiment: Experiment,
+    slow: Collection[str],
     log: Log,
-) -> None:
+) -> list[Ring]:
     """Set parameters, exchange values in initialisation mode until they rest, leave that mode.
+
+    Returns:
+        The rings that are solved in every step.
 
     Raises:
         InputError: the values do not come to rest, or an FMU refused a value.
@@ -185,33 +194,75 @@ def _initialise(
         instance.enter_initialization(system.parameters_of(name), experiment.start_time)
         held = instance.read(system.open_inputs(name))
         row.enter({PortName(name, port): value for port, value in held.items()})
-    values = row.values
-    gather = Gathering.along(row, system.connections)
-    # Through a chain of all, once more for what its end feeds, and once to see it at rest.
-    for _ in range(max(len(instances) + 2, _MOST_ROUNDS)):
-        before = values.copy()
-        gather(values)
-        _exchange(instances, row, experiment)
-        if np.array_equal(before, values):
-            break
-    else:
-        if restless := row.moving(before):
-            raise InputError(
-                f"initial values do not come to rest: {shortened(', '.join(map(str, restless)))} "
-                "in an algebraic loop"
-            )
+    whole = [Ring(names, system, instances, row) for names in rings(system)]
+    _settling(system, instances, row, whole).begin()
+    _check_finite(instances, row, experiment)
     for instance in instances.values():
         instance.exit_initialization()
-    gather(values)
-    _exchange(instances, row, experiment)
+    solved = _solvable(system, instances, row, whole, experiment, slow, log)
+    _settling(system, instances, row, solved).hand_on(everything=True)
+    _check_finite(instances, row, experiment)
     if log.refusals:
         raise InputError("; ".join(log.refusals))
+    return solved
 
 
-def _exchange(instances: Mapping[str, Instance], row: Row, experiment: Experiment) -> None:
-    for instance in instances.values():
-        instance.exchange()
-    row.show()
+def _settling(
+    system: System, instances: Mapping[str, Instance], row: Row, solved: Sequence[Ring]
+) -> Settling:
+    plan = stages(system, GAUSS_SEIDEL, [ring.names for ring in solved])
+    return Settling(system, instances, row, plan, solved)
+
+
+def _solvable(
+    system: System,
+    instances: Mapping[str, Instance],
+    row: Row,
+    whole: Sequence[Ring],
+    experiment: Experiment,
+    slow: Collection[str],
+    log: Log,
+) -> list[Ring]:
+    """The rings that can be solved in every step, as far as that is wanted.
+
+    Raises:
+        InputError: it is wanted of all, and one cannot be.
+
+    """
+    reasons = {name: f"{name} takes longer steps" for name in slow}
+    if experiment.coupling == DELAY:
+        reasons = dict.fromkeys(system.components, "")
+    else:
+        for ring in whole:
+            reasons |= ring.unsolved()
+    solved = rings(system, system.components.keys() - reasons.keys())
+    if experiment.coupling in (SOLVE, LINEAR):
+        for delay in delays(system, GAUSS_SEIDEL, solved, reasons):
+            raise InputError(f"coupling {experiment.coupling}: {delay}")
+    for delay in delays(system, experiment.order, solved, reasons):
+        log.remark(delay)
+    return [Ring(names, system, instances, row) for names in solved]
+
+
+def _scheduled(
+    system: System,
+    experiment: Experiment,
+    instances: Mapping[str, Instance],
+    row: Row,
+    solved: Sequence[Ring],
+) -> tuple[list[Stage], list[Gathering]]:
+    """The stages of every step, and all that is gathered in one."""
+    if experiment.coupling == LINEAR:
+        settling = _settling(system, instances, row, solved)
+        steps = LinearSteps(system, instances, row, settling)
+        return [Stage(Gathering.along(row, ()), [Action(steps.step).member])], settling.gatherings
+    plan = stages(system, experiment.order, [ring.names for ring in solved])
+    found = schedule(system, experiment, plan, instances, row, solved)
+    inner = [gather for ring in solved for gather in ring.gatherings]
+    return found, [stage.gather for stage in found] + inner
+
+
+def _check_finite(instances: Mapping[str, Instance], row: Row, experiment: Experiment) -> None:
     if wrong := row.wrong(instances):
         raise StartError(f"stopped at t = {experiment.start_time:g} s: {wrong}")
 

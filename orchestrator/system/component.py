@@ -63,6 +63,17 @@ class Component:
         return bool(self.description.coSimulation.canHandleVariableCommunicationStepSize)
 
     @property
+    def gives_derivatives(self) -> bool:
+        """Whether it can say how outputs change with inputs."""
+        return bool(self.description.coSimulation.providesDirectionalDerivative)
+
+    @property
+    def takes_linear_inputs(self) -> bool:
+        """Whether it can go back to the beginning of a step, and its inputs change in one."""
+        of = self.description.coSimulation
+        return bool(of.canGetAndSetFMUstate and of.canInterpolateInputs)
+
+    @property
     def gives_state(self) -> bool:
         """Whether its whole state can be had as bytes, and taken on from them."""
         of = self.description.coSimulation
@@ -117,6 +128,11 @@ class Component:
         return variable.causality == "input" or (
             variable.variability != "constant" and variable.initial in ("exact", "approx")
         )
+
+    def is_continuous(self, name: str) -> bool:
+        """Whether a variable may change at any time (FMI 2.0.4, section 2.2.7)."""
+        variable = self.variable(name)
+        return variable.type == "Real" and variable.variability in (None, "continuous")
 
     def has_feedthrough(self, output: str) -> bool:
         """Whether an output depends on an input of the same instant."""

@@ -96,7 +96,7 @@ def test_any_system_in_any_order_is_what_a_few_lines_make(folder, arguments, n, 
     if not isinstance(order, str):
         order = [name for name in order if name in system.components]
     clock = Clock(start, H, n, start + (n + rest) * H if rest else None)
-    experiment = Experiment(start + (n + rest) * H, H, order, start)
+    experiment = Experiment(start + (n + rest) * H, H, order, start, "delay")
     table, compiled = (run(system, experiment, loop) for loop in LOOPS)
     assert compiled.rows.tobytes() == table.rows.tobytes()
     flat = (
@@ -124,7 +124,7 @@ def ring(folder: Path, declares: bool = True, gain: float = 0.5, **others: objec
 @pytest.mark.parametrize("declares", [True, False])
 def test_a_ring_is_opened_before_its_first_component_and_one_line_says_so(folder, declares):
     system, table = ring(folder, declares), Table()
-    ending = simulate(system, Experiment(3 * H, H), [table])
+    ending = simulate(system, Experiment(3 * H, H, coupling="delay"), [table])
     line = "a takes c.g one step late: direct feedthroughs form a ring"
     assert ending.messages == (line, *(f"{name}: initialises" for name in "abc"))
     assert stages(system, "gauss-seidel") == [["a"], ["b"], ["c"]]

@@ -1,0 +1,275 @@
+"""Rings of direct feedthroughs: the algebraic loops that FMUs form, solved at one time.
+
+A ring is closed when every input that one of its components feeds has what arrives there. Values
+first go round it once; what then still differs is found by Newton's method on the inputs that are
+Reals, by setting inputs and getting outputs at the same time. No step is made or taken back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from math import inf
+
+import numpy as np
+from fmpy.model_description import ModelVariable
+
+from orchestrator.errors import shortened
+from orchestrator.master.instance import ComponentFailed, Instance
+from orchestrator.master.row import Row
+from orchestrator.master.signals import Gathering
+from orchestrator.system.structure import Connection, System
+from orchestrator.system.values import real
+
+#: A ring is at rest where what arrives at each input differs by no more than this, relatively or
+#: absolutely; what brings it nearer is done until it is within rounding.
+_REST, _ROUNDING = (1e-10, 1e-12), (1e-14, 1e-14)
+
+#: How often discrete values go round, how many steps Newton's method makes, and how often one of
+#: them is halved.
+_MOST_ROUNDS, _MOST_STEPS, _MOST_HALVINGS = 1000, 50, 10
+
+#: A derivative is used again while each step leaves at most this share of the difference.
+_GOOD_STEP = 0.1
+
+#: Share of an input, or of its nominal value, by which it is changed to see what follows.
+_CHANGE = 1e-7
+
+#: More inputs than this are not solved for: their matrix would take more than 128 MB.
+_MOST_INPUTS = 4000
+
+
+class _Part:
+    """One component of a ring.
+
+    Attributes:
+        gather: what others of the ring, or it itself, feed it.
+        unknowns: its inputs that they feed, as places among those of the ring.
+        feeds: the inputs that it feeds with Reals, as places among those of the ring.
+
+    """
+
+    def __init__(
+        self,
+        instance: Instance,
+        gather: Gathering,
+        unknowns: list[int],
+        feeds: list[int],
+        references: tuple[list[int], list[int]],
+        nominals: list[float],
+    ) -> None:
+        self.instance, self.gather = instance, gather
+        self.unknowns, self.feeds = unknowns, feeds
+        self._outputs, self._inputs = references
+        self._nominals = nominals
+
+    def changes(self, values: np.ndarray, targets: np.ndarray, sources: np.ndarray) -> np.ndarray:
+        """How its outputs change with its inputs, by differences: (feeds, unknowns)."""
+        places = sources[self.feeds]
+        found = np.zeros((len(self.feeds), len(self.unknowns)))
+        here = values[places]
+        for column, (unknown, nominal) in enumerate(
+            zip(self.unknowns, self._nominals, strict=True)
+        ):
+            target = targets[unknown]
+            held = values[target]
+            values[target] = held + _CHANGE * max(abs(held), nominal)
+            self.instance.exchange()
+            found[:, column] = (values[places] - here) / (values[target] - held)
+            values[target] = held
+        self.instance.exchange()
+        return found
+
+    def derivatives(
+        self, values: np.ndarray, targets: np.ndarray, sources: np.ndarray
+    ) -> np.ndarray:
+        """How its outputs change with its inputs, as the FMU says it, or by differences."""
+        if self.feeds and self.instance.gives_derivatives:
+            with suppress(ComponentFailed):
+                columns = [self.instance.derivatives(self._outputs, i) for i in self._inputs]
+                return np.array(columns).reshape(len(self.unknowns), len(self.feeds)).T
+        return self.changes(values, targets, sources)
+
+
+class Ring:
+    """A ring of components that are stepped as one.
+
+    Attributes:
+        names: of its components, in the order in which values go round.
+        gatherings: of what they feed each other.
+
+    """
+
+    def __init__(
+        self, names: Sequence[str], system: System, instances: Mapping[str, Instance], row: Row
+    ) -> None:
+        """Tie a ring to the row of all values.
+
+        Args:
+            names: of its components.
+            system: that it belongs to.
+            instances: of its components.
+            row: that they are tied to.
+
+        """
+        self.names = list(names)
+        self._values = row.values
+        inner = {name: _within(system, name, names) for name in names}
+        connections = [connection for name in names for connection in inner[name]]
+        self._targets, self._sources = row.places(connections)
+        self._ports = [connection.target for connection in connections]
+        real = [_is_real(system, c) for c in connections]
+        self._real = np.array(real, dtype=bool)
+        self._parts: list[_Part] = []
+        for name in names:
+            variables = system.components[name].variables
+            unknowns = [
+                i for i, c in enumerate(connections) if real[i] and c.target.component == name
+            ]
+            feeds = [i for i, c in enumerate(connections) if real[i] and c.source.component == name]
+            outputs = [variables[connections[i].source.port].valueReference for i in feeds]
+            inputs = [variables[connections[i].target.port] for i in unknowns]
+            self._parts.append(
+                _Part(
+                    instances[name],
+                    Gathering.along(row, inner[name]),
+                    unknowns,
+                    feeds,
+                    (outputs, [variable.valueReference for variable in inputs]),
+                    [_nominal(variable) for variable in inputs],
+                )
+            )
+
+    @property
+    def gatherings(self) -> list[Gathering]:
+        """Of what its components feed each other."""
+        return [part.gather for part in self._parts]
+
+    def unsolved(self) -> dict[str, str]:
+        """Its components that cannot be solved for between steps, and why."""
+        if len(self._targets) > _MOST_INPUTS:
+            return dict.fromkeys(self.names, f"it has more than {_MOST_INPUTS} inputs")
+        return {
+            name: f"no output of {name} follows an input of it between steps"
+            for name, part in zip(self.names, self._parts, strict=True)
+            if not part.changes(self._values, self._targets, self._sources).any()
+        }
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether each input has what arrives there."""
+        return not _differ(*self._looked(), _REST).any()
+
+    def close(self) -> None:
+        """Let each input have what arrives there.
+
+        Raises:
+            ComponentFailed: they do not come to rest, or a component fails.
+
+        """
+        self._go_round()
+        derivative, steps = None, 0
+        for _ in range(_MOST_ROUNDS):
+            held, arriving = self._looked()
+            moving = _differ(held, arriving, _ROUNDING)
+            if not moving.any():
+                return
+            if moving[~self._real].any() or not np.isfinite(arriving).all():
+                self._go_round()
+                derivative = None
+                continue
+            steps += 1
+            if derivative is None:
+                derivative = self._derivative()
+            near = not _differ(held, arriving, _REST).any()
+            left = self._step(held, arriving, derivative, 1 if near else _MOST_HALVINGS)
+            if left >= 1.0 or steps == _MOST_STEPS:
+                break
+            if left > _GOOD_STEP:
+                derivative = None
+        moving = _differ(*self._looked(), _REST)
+        if moving.any():
+            ports = ", ".join(str(self._ports[i]) for i in np.flatnonzero(moving))
+            raise ComponentFailed(
+                f"values do not come to rest: {shortened(ports)} in an algebraic loop; start "
+                "values nearer to a solution may help"
+            )
+
+    def _go_round(self) -> None:
+        for part in self._parts:
+            part.gather(self._values)
+            part.instance.exchange()
+
+    def _looked(self) -> tuple[np.ndarray, np.ndarray]:
+        """What the inputs have, and what arrives there."""
+        values, targets = self._values, self._targets
+        held = values[targets]
+        for gather in self.gatherings:
+            gather(values)
+        arriving = values[targets]
+        values[targets] = held
+        return held, arriving
+
+    def _derivative(self) -> np.ndarray:
+        """Of what the inputs that are Reals have, less what arrives there."""
+        n = len(self._targets)
+        found = np.zeros((n, n))
+        factors = np.concatenate([gather.factors for gather in self.gatherings])
+        for part in self._parts:
+            found[np.ix_(part.feeds, part.unknowns)] = part.derivatives(
+                self._values, self._targets, self._sources
+            )
+        real = np.ix_(self._real, self._real)
+        return np.asarray((np.eye(n) - factors[:, np.newaxis] * found)[real])
+
+    def _step(
+        self, held: np.ndarray, arriving: np.ndarray, derivative: np.ndarray, tries: int
+    ) -> float:
+        """Make a step of Newton's method, half of it where that brings nothing, and so on.
+
+        Returns:
+            The share of the difference that is left.
+
+        """
+        try:
+            change = np.linalg.solve(derivative, (arriving - held)[self._real])
+        except np.linalg.LinAlgError:
+            return inf
+        targets = self._targets[self._real]
+        scale = np.maximum(np.abs(held), 1.0)
+        before = np.linalg.norm((arriving - held) / scale)
+        left = inf
+        for halvings in range(tries):
+            self._values[targets] = held[self._real] + change / 2**halvings
+            for part in self._parts:
+                part.instance.exchange()
+            now, then = self._looked()
+            left = float(np.linalg.norm((then - now) / scale) / before)
+            if left < 1.0:
+                break
+        return left
+
+
+def _differ(held: np.ndarray, arriving: np.ndarray, by: tuple[float, float]) -> np.ndarray:
+    near: np.ndarray = np.isclose(arriving, held, *by, equal_nan=True)
+    return ~near
+
+
+def _within(system: System, name: str, names: Sequence[str]) -> list[Connection]:
+    """The connections that end at a component and begin within its ring."""
+    return [c for c in system.feeding[name] if c.source.component in names]
+
+
+def _is_real(system: System, connection: Connection) -> bool:
+    """Whether a connection goes from a Real to a Real."""
+    return all(
+        system.components[end.component].variables[end.port].type == "Real"
+        for end in (connection.source, connection.target)
+    )
+
+
+def _nominal(variable: ModelVariable) -> float:
+    """The nominal value of a variable, one where it names none."""
+    with suppress(ValueError):
+        return abs(real(variable.nominal or "1")) or 1.0
+    return 1.0
