@@ -12,8 +12,8 @@ from orchestrator.experiments.preparation import Request, loaded, prepare
 from orchestrator.experiments.waypoints import impossible_paths
 from orchestrator.findings import Findings
 from orchestrator.master.binary import check_binary
-from orchestrator.master.schedule import delays
 from orchestrator.system.examination import examine, surprises
+from orchestrator.system.graph import rings
 
 #: How long a run could last that nobody makes [s].
 _SOME_TIME = 1.0
@@ -74,5 +74,9 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
         prepared = prepare(scenario, system, request)
         for text in impossible_paths(prepared.system):
             findings.problem(text)
-        to_know += delays(prepared.system, prepared.experiment.order)
+        to_know += [
+            f"{', '.join(ring)}: a ring of direct feedthroughs, which is solved where the FMUs "
+            "compute their outputs between steps, and else delayed by a step"
+            for ring in rings(prepared.system)
+        ]
     return to_know

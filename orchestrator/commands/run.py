@@ -29,6 +29,7 @@ from orchestrator.experiments.inputs import inputs_of
 from orchestrator.experiments.preparation import prepare, with_companion
 from orchestrator.experiments.run import Files, run_into
 from orchestrator.experiments.scenario import read_scenario
+from orchestrator.master.experiment import COUPLINGS
 from orchestrator.master.files import FORMATS
 from orchestrator.master.interrupts import Interrupts, held_interrupts
 from orchestrator.master.isolated import STEP_TIMEOUT, isolation_of
@@ -87,6 +88,13 @@ def add_to(commands: Any) -> None:
         metavar="FACTOR",
         help="go no faster than FACTOR simulated seconds in a second",
     )
+    run.add_argument(
+        "--coupling",
+        choices=COUPLINGS,
+        help="how rings of direct feedthroughs are closed: solved, delayed by a step, or solved "
+        "with inputs that change linearly during a step; default: the scenario's, else solved "
+        "where the FMUs allow it",
+    )
     add_loop(run)
     run.add_argument(
         "--events",
@@ -111,6 +119,7 @@ def _run(options: argparse.Namespace) -> int:
         real_time=options.real_time,
         events=None if options.events is None else read_scenario(options.events).events,
         inputs=inputs_of(options.inputs),
+        coupling=options.coupling,
     )
     runs = with_companion(prepare(*read(options), wanted), wanted)
     folder = options.out or Path("results", runs[0].scenario.stem)

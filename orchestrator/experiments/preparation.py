@@ -20,14 +20,15 @@ from orchestrator.experiments.wiring import closed_loop
 from orchestrator.findings import Findings
 from orchestrator.master.attendant import Attendant
 from orchestrator.master.events import Event, Events
-from orchestrator.master.experiment import ORDERS, Experiment, Order
+from orchestrator.master.experiment import GAUSS_SEIDEL, LINEAR, ORDERS, SOLVE, Experiment, Order
 from orchestrator.master.isolated import Isolation
+from orchestrator.master.linear import check_linear
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
 from orchestrator.master.observer import Ending
 from orchestrator.master.paces import paces, with_common_step
 from orchestrator.master.playback import Course, Playback
 from orchestrator.master.real_time import check_factor
-from orchestrator.master.schedule import delays, stages
+from orchestrator.master.schedule import stages
 from orchestrator.system.component import RUNNABLE, WRITABLE
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.reading import read_ssp
@@ -55,6 +56,7 @@ class Request:
         real_time: simulated seconds in a second; None: as many as can be had.
         events: in the place of the scenario's, as a scenario file writes them; None: its own.
         inputs: in the place of the scenario's.
+        coupling: one of :data:`orchestrator.master.experiment.COUPLINGS`; None: the scenario's.
 
     """
 
@@ -70,6 +72,7 @@ class Request:
     real_time: float | None = None
     events: Sequence[Mapping[str, Any]] | None = None
     inputs: Inputs | None = None
+    coupling: str | None = None
 
 
 @dataclass(frozen=True)
@@ -222,13 +225,16 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
         step = _first_given(system.step, DEFAULT_STEP)
         assert step is not None
     order = request.order or scenario.order or ORDERS[0]
-    experiment = Experiment(stop_time, step, order, system.start_time or 0.0)
+    coupling = _first_given(request.coupling, scenario.coupling)
+    if request.strict and coupling is None and order == GAUSS_SEIDEL:
+        coupling = SOLVE
+    experiment = Experiment(stop_time, step, order, system.start_time or 0.0, coupling)
+    if coupling == LINEAR:
+        check_linear(system)
     paces(system, step)
     stages(system, order)
     with findings.collecting():
         happening = read_events(scenario.name, events, replace(system, step=step))
-    for delay in delays(system, order):
-        findings.note(delay)
     findings.refuse()
     loop = chosen(request.loop, experiment, request.isolation)
     if request.real_time is not None:
@@ -277,6 +283,7 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         stop_time=scenario.stop_time,
         step=scenario.step,
         order=scenario.order,
+        coupling=scenario.coupling,
         events=shared_events(events, system),
         inputs=companion.inputs or scenario.inputs,
     )

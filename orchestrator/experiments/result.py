@@ -207,6 +207,7 @@ def simulate(
     steps: Mapping[str, float] | None = None,
     events: Sequence[Mapping[str, Any]] | None = None,
     inputs: str | Path | None = None,
+    coupling: str | None = None,
     checkpoint: str | Path | None = None,
     checkpoint_every: float | None = None,
     resume: bool = False,
@@ -241,6 +242,9 @@ def simulate(
             scenario file has them, such as `{"at": 20.0, "lose": "controller.tau.r"}`.
         inputs: a table of inputs over time, in the place of the scenario's own: a .csv or .parquet
             file.
+        coupling: how rings of direct feedthroughs are closed: `solve`, at every communication
+            point, `delay`, by a delay of one step, or `linear`, solved, with inputs that change
+            linearly during a step; None: the scenario's own, else `solve` where the FMUs allow it.
         checkpoint: folder for what it takes to go on after the process has ended, whatever ended
             it; removed when the run has come to its end.
         checkpoint_every: how often that is written, in simulated seconds; None: as often as
@@ -283,6 +287,7 @@ def simulate(
         steps or {},
         events=events,
         inputs=inputs_of(inputs),
+        coupling=coupling,
     )
     prepared = prepare(scenario, system, request)
     result = Result(prepared)

@@ -26,7 +26,7 @@ from orchestrator.experiments.named import names_in, path_of
 from orchestrator.experiments.waypoints import ENTRIES as PATH
 from orchestrator.experiments.waypoints import PLANNER, path_parameters
 from orchestrator.findings import Findings
-from orchestrator.master.experiment import Order
+from orchestrator.master.experiment import COUPLINGS, Order
 from orchestrator.reading import explained, text_of
 from orchestrator.system.names import PortName, file_name, port_name
 
@@ -55,6 +55,7 @@ class Scenario:
     step: float | None = None
     steps: Mapping[str, float] = field(default_factory=dict)
     order: Order | None = None
+    coupling: str | None = None
     only: Sequence[str] = ()
     remark: str = ""
     components: Mapping[str, str] = field(default_factory=dict)
@@ -129,6 +130,12 @@ ENTRIES: dict[str, Entry] = {
         lambda value: is_text(value) or are_names(value),
         "In which components are stepped: `gauss-seidel`, `jacobi`, or the names of all of them.",
         "`gauss-seidel`",
+    ),
+    "coupling": Entry(
+        "name",
+        lambda value: value in COUPLINGS,
+        "How rings of direct feedthroughs are closed: `solve`, `delay` or `linear`.",
+        "`solve` where the FMUs allow it, else `delay`",
     ),
     "only": Entry(
         "list of names",

@@ -80,6 +80,8 @@ class Experiment:
             )
         if self.coupling not in (None, *COUPLINGS):
             raise InputError(f"coupling {self.coupling!r}: use one of {', '.join(COUPLINGS)}")
+        if self.coupling == LINEAR and not isinstance(self.order, str):
+            raise InputError("coupling linear steps all components at once: leave the order out")
         if not isinstance(self.order, str):
             object.__setattr__(self, "order", tuple(self.order))
         elif self.order not in ORDERS:

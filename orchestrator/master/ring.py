@@ -96,7 +96,7 @@ class Ring:
 
     Attributes:
         names: of its components, in the order in which values go round.
-        gatherings: of what they feed each other.
+        outer: gathers what others feed them.
 
     """
 
@@ -114,7 +114,10 @@ class Ring:
         """
         self.names = list(names)
         self._values = row.values
-        inner = {name: _within(system, name, names) for name in names}
+        inner = {name: _from(names, system.feeding[name]) for name in names}
+        feeding = [connection for name in names for connection in system.feeding[name]]
+        outer = [c for c in feeding if c.source.component not in names]
+        self.outer = Gathering.along(row, outer)
         connections = [connection for name in names for connection in inner[name]]
         self._targets, self._sources = row.places(connections)
         self._ports = [connection.target for connection in connections]
@@ -142,7 +145,11 @@ class Ring:
 
     @property
     def gatherings(self) -> list[Gathering]:
-        """Of what its components feed each other."""
+        """All that its components take."""
+        return [self.outer, *self._inner]
+
+    @property
+    def _inner(self) -> list[Gathering]:
         return [part.gather for part in self._parts]
 
     def unsolved(self) -> dict[str, str]:
@@ -159,6 +166,31 @@ class Ring:
     def is_closed(self) -> bool:
         """Whether each input has what arrives there."""
         return not _differ(*self._looked(), _REST).any()
+
+    def check(self) -> None:
+        """Close the ring where something about its components has changed."""
+        self._exchange()
+        if not self.is_closed:
+            self.close()
+
+    def renew(self, always: bool = False) -> bool:
+        """Take what others feed it now, and close it.
+
+        Args:
+            always: also where nothing has changed.
+
+        Returns:
+            Whether something has.
+
+        """
+        values, targets = self._values, self.outer.targets
+        before = values[targets]
+        self.outer(values)
+        as_before = np.array_equal(before, values[targets], equal_nan=True)
+        if not always and as_before and self.is_closed:
+            return False
+        self.close()
+        return True
 
     def close(self) -> None:
         """Let each input have what arrives there.
@@ -195,6 +227,10 @@ class Ring:
                 "values nearer to a solution may help"
             )
 
+    def _exchange(self) -> None:
+        for part in self._parts:
+            part.instance.exchange()
+
     def _go_round(self) -> None:
         for part in self._parts:
             part.gather(self._values)
@@ -204,7 +240,7 @@ class Ring:
         """What the inputs have, and what arrives there."""
         values, targets = self._values, self._targets
         held = values[targets]
-        for gather in self.gatherings:
+        for gather in self._inner:
             gather(values)
         arriving = values[targets]
         values[targets] = held
@@ -214,7 +250,7 @@ class Ring:
         """Of what the inputs that are Reals have, less what arrives there."""
         n = len(self._targets)
         found = np.zeros((n, n))
-        factors = np.concatenate([gather.factors for gather in self.gatherings])
+        factors = np.concatenate([gather.factors for gather in self._inner])
         for part in self._parts:
             found[np.ix_(part.feeds, part.unknowns)] = part.derivatives(
                 self._values, self._targets, self._sources
@@ -241,8 +277,7 @@ class Ring:
         left = inf
         for halvings in range(tries):
             self._values[targets] = held[self._real] + change / 2**halvings
-            for part in self._parts:
-                part.instance.exchange()
+            self._exchange()
             now, then = self._looked()
             left = float(np.linalg.norm((then - now) / scale) / before)
             if left < 1.0:
@@ -255,9 +290,10 @@ def _differ(held: np.ndarray, arriving: np.ndarray, by: tuple[float, float]) -> 
     return ~near
 
 
-def _within(system: System, name: str, names: Sequence[str]) -> list[Connection]:
-    """The connections that end at a component and begin within its ring."""
-    return [c for c in system.feeding[name] if c.source.component in names]
+def _from(names: Sequence[str], connections: Sequence[Connection]) -> list[Connection]:
+    """The connections that begin at one of some components."""
+    known = set(names)
+    return [connection for connection in connections if connection.source.component in known]
 
 
 def _is_real(system: System, connection: Connection) -> bool:

@@ -9,10 +9,10 @@ outputs of a component are read as soon as it was stepped.
   without feedthrough are states: everybody takes them at t_k.
 - the names of all components: the same in the order that they stand in.
 
-A ring of feedthroughs that is solved is a stage by itself: it is closed before its components are
-stepped, with their states of t_k, and after that with those of t_k+1. One that is not solved is
-opened before the one of its components that stands first in the system, which takes what feeds it
-at t_k.
+A ring of feedthroughs that is solved is a stage by itself. It is closed before its components are
+stepped, with their states of t_k, after that, with those of t_k+1 and the latest of what feeds it,
+and again when all have been stepped: every row shows its solution. One that is not solved is opened
+before the one of its components that stands first in the system, which takes what feeds it at t_k.
 
 A component may take n communication steps in one of its own. It is stepped at every n-th t_k, with
 the inputs of that time, which it holds. What it computes waits in hidden columns of the row: from
@@ -69,7 +69,7 @@ class Member(NamedTuple):
 class Action:
     """A member of a stage that acts in the place of a step."""
 
-    def __init__(self, act: Callable[[float, float], None]) -> None:
+    def __init__(self, act: Callable[[float, float], object]) -> None:
         """Do something in every step.
 
         Args:
@@ -256,7 +256,8 @@ def schedule(
 
     """
     pace = paces(system, experiment.step)
-    closing = {ring.names[0]: [Action(partial(_close, ring)).member] for ring in rings}
+    ring_of = {ring.names[0]: ring for ring in rings}
+    renewed = [Stage(Gathering.along(row, ()), [_action(ring.renew)]) for ring in rings]
     found: list[Stage] = []
     shown: list[Stage] = []
     nothing = Gathering.along(row, ())
@@ -271,9 +272,10 @@ def schedule(
         )
         # All inputs are gathered before anybody is stepped.
         found += [Stage(Gathering.along(row, some), [], Pace(n)) for n, some in taken.items()]
-        if names[0] in closing:
-            close = Stage(nothing, closing[names[0]])
-            found += [Stage(fast.gather, close.members), Stage(nothing, fast.members), close]
+        if ring := ring_of.get(names[0]):
+            found += [Stage(fast.gather, [_action(ring.check)]), Stage(nothing, fast.members)]
+            if experiment.order != JACOBI:
+                found.append(Stage(nothing, [_action(partial(ring.renew, True))]))
         else:
             found.append(fast)
         for name in names:
@@ -287,11 +289,13 @@ def schedule(
                     Stage(early, [], Pace(n)),
                 ]
                 shown.append(Stage(later, [], Pace(n, at_end=True)))
-    return [stage for stage in found + shown if stage.members or len(stage.gather.targets)]
+    found += shown + renewed
+    return [stage for stage in found if stage.members or len(stage.gather.targets)]
 
 
-def _close(ring: Ring, _t: float, _h: float) -> None:
-    ring.close()
+def _action(act: Callable[[], object]) -> Member:
+    """A member that does something that needs no time."""
+    return Action(lambda _t, _h: act()).member
 
 
 def _shown(component: Component, order: Order) -> tuple[list[PortName], list[PortName]]:

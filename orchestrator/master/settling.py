@@ -18,6 +18,26 @@ from orchestrator.system.structure import System
 _MOST_ROUNDS = 1000
 
 
+class _Single:
+    """A component of no ring: see :class:`.ring.Ring`."""
+
+    def __init__(self, name: str, system: System, instance: Instance, row: Row) -> None:
+        self.names = [name]
+        self._instance, self._row = instance, row
+        self._gather = Gathering.along(row, system.feeding[name])
+        self.gatherings = [self._gather]
+
+    def renew(self, always: bool = False) -> bool:
+        values, targets = self._row.values, self._gather.targets
+        before = values[targets]
+        self._gather(values)
+        if not always and np.array_equal(before, values[targets], equal_nan=True):
+            return False
+        self._instance.exchange()
+        self._row.show(self._instance.name)
+        return True
+
+
 class Settling:
     """Hands values along the order in which components feed each other directly."""
 
@@ -41,24 +61,17 @@ class Settling:
         """
         self._system, self._instances, self._row = system, instances, row
         ring_of = {ring.names[0]: ring for ring in rings}
-        inner = {name: ring for ring in ring_of.values() for name in ring.names}
-        self._units: list[tuple[Gathering, Instance | Ring]] = []
+        self._units: list[Ring | _Single] = []
         for stage in plan:
-            ring = ring_of.get(stage[0])
-            for names in [stage] if ring else [[name] for name in stage]:
-                connections = [
-                    connection
-                    for name in names
-                    for connection in system.feeding[name]
-                    if not ring or inner.get(connection.source.component) is not ring
-                ]
-                self._units.append((Gathering.along(row, connections), ring or instances[names[0]]))
+            if stage[0] in ring_of:
+                self._units.append(ring_of[stage[0]])
+            else:
+                self._units += [_Single(name, system, instances[name], row) for name in stage]
 
     @property
     def gatherings(self) -> list[Gathering]:
         """All that it gathers."""
-        inner = [one.gatherings for _, one in self._units if isinstance(one, Ring)]
-        return [gather for gather, _ in self._units] + [one for some in inner for one in some]
+        return [gather for unit in self._units for gather in unit.gatherings]
 
     def begin(self) -> None:
         """Settle for the first time, when no output has been read.
@@ -98,27 +111,15 @@ class Settling:
             Whether any input has changed.
 
         """
-        values, changed = self._row.values, False
-        for gather, one in self._units:
-            before = values[gather.targets]
-            gather(values)
-            as_before = np.array_equal(before, values[gather.targets], equal_nan=True)
-            if isinstance(one, Ring):
-                if everything or not as_before or not one.is_closed:
-                    one.close()
-                    changed = True
-            elif everything or not as_before:
-                one.exchange()
-                self._row.show(one.name)
-                changed = True
-        return changed
+        changed = [unit.renew(everything) for unit in self._units]
+        return any(changed)
 
     def _read_ahead(self) -> None:
         """Read outputs that feed a component before it is their own component's turn."""
         row, instances = self._row, self._instances
         place: dict[str, int] = {}
-        for i, (_, one) in enumerate(self._units):
-            place |= dict.fromkeys(one.names if isinstance(one, Ring) else [one.name], i)
+        for i, unit in enumerate(self._units):
+            place |= dict.fromkeys(unit.names, i)
         wanted: dict[str, dict[str, None]] = {}
         for connection in self._system.connections:
             source, target = connection.source, connection.target

@@ -86,15 +86,12 @@ class Signals:
 
         """
         self._row = row
-        self._fed = {
-            int(column): (gathering, place)
-            for gathering in gatherings
-            for place, column in enumerate(gathering.targets)
-        }
-        self._own = {
-            place: (float(gathering.factors[at]), float(gathering.offsets[at]))
-            for place, (gathering, at) in self._fed.items()
-        }
+        # An input of a solved ring is gathered in more than one place.
+        self._fed: dict[int, list[tuple[Gathering, int]]] = {}
+        for gathering in gatherings:
+            for place, column in enumerate(gathering.targets.tolist()):
+                self._fed.setdefault(column, []).append((gathering, place))
+        self._own = {column: _factor_and_offset(fed) for column, fed in self._fed.items()}
         self._targets = [connection.target for connection in connections]
         # Of inputs that nothing feeds: what they would have, and what is done to it.
         self._open: dict[int, tuple[float, float, float]] = {}
@@ -135,32 +132,34 @@ class Signals:
         """Let the inputs of a component take at once what feeds them."""
         for target in self._targets:
             if target.component == component:
-                gathering, place = self._fed[self._row.columns[target]]
+                gathering, place = self._fed[self._row.columns[target]][0]
                 gathering.move(self._row.values, place)
 
     def state(self) -> dict[str, Any]:
         """What is done to them, as JSON has it."""
         return {
-            "fed": [
-                (column, float(gathering.factors[place]), float(gathering.offsets[place]))
-                for column, (gathering, place) in self._fed.items()
-            ],
+            "fed": [(column, *_factor_and_offset(fed)) for column, fed in self._fed.items()],
             "open": list(self._open.items()),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Do to them what was done before; the row is left as it is."""
         for column, factor, offset in state["fed"]:
-            gathering, place = self._fed[column]
-            gathering.set(place, factor, offset)
+            for gathering, place in self._fed[column]:
+                gathering.set(place, factor, offset)
         self._open = {column: tuple(values) for column, values in state["open"]}
 
     def _alter(self, target: PortName, factor: float, offset: float) -> None:
         column, values = self._row.columns[target], self._row.values
         if column in self._fed:
-            gathering, place = self._fed[column]
-            gathering.set(place, factor, offset)
+            for gathering, place in self._fed[column]:
+                gathering.set(place, factor, offset)
         else:
             value = self.supplied(target)
             self._open[column] = value, factor, offset
             values[column] = factor * value + offset
+
+
+def _factor_and_offset(fed: Sequence[tuple[Gathering, int]]) -> tuple[float, float]:
+    gathering, place = fed[0]
+    return float(gathering.factors[place]), float(gathering.offsets[place])

@@ -258,8 +258,8 @@ def _scheduled(
         return [Stage(Gathering.along(row, ()), [Action(steps.step).member])], settling.gatherings
     plan = stages(system, experiment.order, [ring.names for ring in solved])
     found = schedule(system, experiment, plan, instances, row, solved)
-    inner = [gather for ring in solved for gather in ring.gatherings]
-    return found, [stage.gather for stage in found] + inner
+    own = [gather for ring in solved for gather in ring.gatherings]
+    return found, [stage.gather for stage in found] + own
 
 
 def _check_finite(instances: Mapping[str, Instance], row: Row, experiment: Experiment) -> None:

@@ -45,7 +45,8 @@ def derived_order(system: System, solved: Iterable[Sequence[str]] = ()) -> list[
 
     Args:
         system: that is stepped.
-        solved: rings that are stepped as one component each; their components stay together.
+        solved: rings that are stepped as one component each, after all that does not wait for
+            them: so they can be closed with the latest of what feeds them.
 
     """
     ring_of = {name: ring for ring in solved for name in ring}
@@ -58,7 +59,7 @@ def derived_order(system: System, solved: Iterable[Sequence[str]] = ()) -> list[
         sources[own] |= {lead.get(source, source) for source in feeding}
         if name in lead:
             sources[own].discard(own)
-    order = _in_levels(_without_rings(sources))
+    order = _in_levels(_without_rings(sources), set(lead.values()))
     return [member for name in order for member in ring_of.get(name, (name,))]
 
 
@@ -155,8 +156,11 @@ def _without_rings(sources: _Sources) -> dict[str, set[str]]:
     return {name: found[name] for name in sources}
 
 
-def _in_levels(sources: _Sources) -> list[str]:
-    """The components of a graph without rings: first those that wait for nothing, and so on."""
+def _in_levels(sources: _Sources, last: Collection[str]) -> list[str]:
+    """The components of a graph without rings: first those that wait for nothing, and so on.
+
+    Some come last, when nothing else is left that does not wait for them.
+    """
     missing = {name: len(feeding) for name, feeding in sources.items()}
     fed: dict[str, list[str]] = {name: [] for name in sources}
     for name, feeding in sources.items():
@@ -164,15 +168,20 @@ def _in_levels(sources: _Sources) -> list[str]:
             fed[source].append(name)
     place = {name: i for i, name in enumerate(sources)}
     order: list[str] = []
-    level = [name for name, n in missing.items() if n == 0]
-    while level:
+    ready = [name for name, n in missing.items() if n == 0]
+    later: list[str] = []
+    while ready or later:
+        level = [name for name in ready if name not in last]
+        later += [name for name in ready if name in last]
+        if not level:
+            level, later = later, []
+        level.sort(key=place.__getitem__)
         order += level
-        following = []
+        ready = []
         for target in (target for name in level for target in fed[name]):
             missing[target] -= 1
             if missing[target] == 0:
-                following.append(target)
-        level = sorted(following, key=place.__getitem__)
+                ready.append(target)
     return order
 
 
