@@ -44,6 +44,8 @@ class Growth:
 
         """
         sizes = np.log2(np.abs(rows[:, self._columns]))
+        # From zero, everything is infinitely far.
+        sizes[np.isinf(sizes)] = np.nan
         for length in _LENGTHS:
             new = sizes[-self._rows % length :: length]
             known = np.concatenate([self._last[length], new])

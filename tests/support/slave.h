@@ -34,8 +34,10 @@ ABSENT(fmi2SerializeFMUstate)
 ABSENT(fmi2DeSerializeFMUstate)
 #endif
 #endif
+#ifndef HAS_DERIVATIVES
 ABSENT(fmi2GetDirectionalDerivative)
 ABSENT(fmi2SetRealInputDerivatives)
+#endif
 ABSENT(fmi2GetRealOutputDerivatives)
 ABSENT(fmi2CancelStep)
 #ifndef HAS_STATUS

@@ -31,7 +31,7 @@ from orchestrator.system.structure import System
 from support.others import build, system_of
 
 #: Answers of a run before its first step, of which the first says that it begins, and its steps.
-BEFORE, STEPS = 9, 5
+BEFORE, STEPS = 8, 5
 
 
 def _json(note: Any) -> bytes:

@@ -1,0 +1,169 @@
+"""Linear systems as FMUs, and the exact solution of such FMUs that are coupled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+from zipfile import ZipFile
+
+import numpy as np
+
+from orchestrator.system.component import read_component
+from orchestrator.system.names import PortName, port_name
+from orchestrator.system.structure import Connection, System
+from support.compiled import library_of
+
+_SOURCE = Path(__file__).with_name("linear.c")
+
+#: Names of inputs, outputs and parameters, by the value references of the C source.
+INPUTS, OUTPUTS = ("u0", "u1"), ("y0", "y1")
+_MATRICES = [f"{matrix}{i}{j}" for matrix in "ABCD" for i in range(2) for j in range(2)]
+_PARAMETERS = [*_MATRICES, "x0", "x1"]
+
+
+class Part(NamedTuple):
+    """x' = A x + B u, y = C x + D u; matrices of up to two rows and columns."""
+
+    A: object = 0.0
+    B: object = 0.0
+    C: object = 0.0
+    D: object = 0.0
+    x: object = 0.0
+
+    def matrices(self) -> list[np.ndarray]:
+        """A, B, C, D, each (2, 2), and x, (2,)."""
+        found = []
+        for given in self[:4]:
+            whole, some = np.zeros((2, 2)), np.atleast_2d(np.asarray(given, dtype=float))
+            whole[: some.shape[0], : some.shape[1]] = some
+            found.append(whole)
+        start = np.zeros(2)
+        start[: np.size(self.x)] = self.x
+        return [*found, start]
+
+
+def linear(
+    folder: Path, says: str = "dependencies", cached: bool = False, can: bool = True
+) -> Path:
+    """The FMU.
+
+    Args:
+        folder: for it.
+        says: of its outputs' dependencies: `dependencies`: first output none, second both inputs;
+            `all`: both of both; `nothing`: no attribute; `no outputs`: not even the outputs.
+        cached: whether its outputs are computed by steps alone.
+        can: give its state and derivatives, and let inputs change in a step.
+
+    """
+    fmu = folder / f"linear-{says.replace(' ', '-')}-{cached:d}{can:d}.fmu"
+    if fmu.exists():
+        return fmu
+    names = [("input", name) for name in INPUTS] + [("output", name) for name in OUTPUTS]
+    names += [("parameter", name) for name in _PARAMETERS]
+    kinds = {"input": "continuous", "output": "continuous", "parameter": "fixed"}
+    starts = {"input": ' start="0"', "output": "", "parameter": ' start="0"'}
+    variables = "".join(
+        f'<ScalarVariable name="{name}" valueReference="{i}" causality="{causality}" '
+        f'variability="{kinds[causality]}"><Real{starts[causality]}/>'
+        "</ScalarVariable>"
+        for i, (causality, name) in enumerate(names)
+    )
+    said = {
+        "dependencies": [' dependencies=""', ' dependencies="1 2"'],
+        "all": [' dependencies="1 2"'] * 2,
+        "nothing": [""] * 2,
+    }
+    unknowns = "".join(
+        f'<Unknown index="{3 + i}"{text}/>' for i, text in enumerate(said.get(says, []))
+    )
+    outputs = f"<Outputs>{unknowns}</Outputs>" if unknowns else ""
+    able = (
+        'canGetAndSetFMUstate="true" canInterpolateInputs="true" '
+        'canSerializeFMUstate="true" providesDirectionalDerivative="true"'
+    )
+    with ZipFile(fmu, "w") as archive:
+        archive.writestr(
+            "modelDescription.xml",
+            '<?xml version="1.0" encoding="UTF-8"?>'
+            '<fmiModelDescription fmiVersion="2.0" modelName="Linear" guid="linear">'
+            '<CoSimulation modelIdentifier="linear" canHandleVariableCommunicationStepSize="true" '
+            f"{able if can else ''}/><ModelVariables>{variables}</ModelVariables>"
+            f"<ModelStructure>{outputs}</ModelStructure></fmiModelDescription>",
+        )
+        options = ("-ffp-contract=off", *["-DCACHED"] * cached)
+        archive.writestr("binaries/linux64/linear.so", library_of(_SOURCE, *options))
+    return fmu
+
+
+def system_of(
+    fmus: Mapping[str, Path], parts: Mapping[str, Part], wires: Mapping[str, str], **others: object
+) -> System:
+    """A system of such FMUs.
+
+    Args:
+        fmus: by the names of the components, in their order.
+        parts: what each is.
+        wires: sources by targets.
+        others: of the system.
+
+    """
+    values = {
+        PortName(name, parameter): float(value)
+        for name, part in parts.items()
+        for parameter, value in zip(
+            _PARAMETERS, np.concatenate([m.ravel() for m in part.matrices()]), strict=True
+        )
+    }
+    connections = tuple(Connection(port_name(s), port_name(t)) for t, s in wires.items())
+    components = {name: read_component(name, fmu) for name, fmu in fmus.items()}
+    return System("linear", components, connections, values, **others)
+
+
+def exact(
+    parts: Mapping[str, Part], wires: Mapping[str, str], times: np.ndarray
+) -> dict[str, np.ndarray]:
+    """All outputs of the coupled system, whose inputs are at all times what feeds them.
+
+    x' = A x + B u, y = C x + D u, u = L y, so u = (1 - L D)^-1 L C x; by eigenvalues, or, where a
+    matrix has too few eigenvectors, by its exponential series.
+    """
+    names = list(parts)
+    A, B, C, D = (_diagonal([parts[name].matrices()[i] for name in names]) for i in range(4))
+    start = np.concatenate([parts[name].matrices()[4] for name in names])
+    place = {f"{name}.y{i}": 2 * k + i for k, name in enumerate(names) for i in range(2)}
+    wired = np.zeros_like(D)
+    for target, source in wires.items():
+        name, port = target.split(".")
+        wired[2 * names.index(name) + int(port[1]), place[source]] = 1.0
+    inputs = np.linalg.solve(np.eye(len(D)) - wired @ D, wired @ C)
+    matrix, outputs = A + B @ inputs, C + D @ inputs
+    step, state, found = np.inf, start, []
+    transition = np.eye(len(matrix))
+    for before, time in zip([0.0, *times[:-1]], times, strict=True):
+        if time - before != step:
+            step = time - before
+            transition = _exponential(matrix * step)
+        state = transition @ state
+        found.append(outputs @ state)
+    columns = np.array(found).T
+    return {name: columns[i] for name, i in place.items()}
+
+
+def _diagonal(blocks: list[np.ndarray]) -> np.ndarray:
+    whole = np.zeros((2 * len(blocks), 2 * len(blocks)))
+    for i, block in enumerate(blocks):
+        whole[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = block
+    return whole
+
+
+def _exponential(matrix: np.ndarray) -> np.ndarray:
+    """By scaling and squaring of its series."""
+    halvings = max(0, int(np.ceil(np.log2(max(np.linalg.norm(matrix), 1e-300)))) + 1)
+    term = whole = np.eye(len(matrix))
+    for k in range(1, 25):
+        term = term @ matrix / 2**halvings / k
+        whole = whole + term
+    for _ in range(halvings):
+        whole = whole @ whole
+    return whole

@@ -1,0 +1,236 @@
+"""Rings of direct feedthroughs, solved, delayed, or with linear inputs, beside exact solutions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.master.attendant import Run
+from orchestrator.master.checkpoint import Checkpoints
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.instance import ComponentFailed
+from orchestrator.master.isolated import Isolation
+from orchestrator.master.library import made
+from orchestrator.master.loop import PYTHON_LOOP, Loop, chosen
+from orchestrator.master.simulation import simulate
+from orchestrator.master.table import Table
+from orchestrator.system.structure import System
+from support.linear import Part, exact, linear, system_of
+
+H = 0.1
+
+#: sin t, and cos t.
+SINE = Part(A=[[0.0, 1.0], [-1.0, 0.0]], C=np.eye(2), x=[0.0, 1.0])
+
+#: y_a = k u_a + sin t, y_b = l u_b: the gain of the ring is k l.
+WIRES = {"a.u0": "b.y1", "a.u1": "s.y0", "b.u0": "a.y1"}
+
+
+def gains(k: float, l: float) -> dict[str, Part]:
+    return {"s": SINE, "a": Part(D=[[0.0, 0.0], [k, 1.0]]), "b": Part(D=[[0.0, 0.0], [l, 0.0]])}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("linear")
+
+
+def run(
+    system: System,
+    experiment: Experiment,
+    loop: Loop = PYTHON_LOOP,
+    isolation: Isolation | None = None,
+) -> Table:
+    table = Table()
+    simulate(system, experiment, [table], isolation, loop)
+    assert table.failure is None
+    return table
+
+
+def ring(folder, k: float, l: float, names: str = "sab", **kind: object) -> System:
+    return system_of({name: linear(folder, **kind) for name in names}, gains(k, l), WIRES)
+
+
+@pytest.mark.parametrize(("k", "l"), [(0.5, 0.9), (0.9, -0.9), (1.0, -2.0), (2.0, 3.0)])
+@pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
+@pytest.mark.parametrize("can", [True, False])
+def test_static_rings_are_solved_in_every_row_whatever_their_gain(folder, k, l, order, can):
+    """By directional derivatives, and by differences."""
+    table = run(ring(folder, k, l, can=can), Experiment(5.0, H, order))
+    solution = np.sin(table.time) / (1.0 - k * l)
+    np.testing.assert_allclose(table["a.y1"], solution, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(table["b.y1"], l * solution, rtol=0.0, atol=1e-13)
+
+
+@pytest.mark.parametrize("names", list(permutations("sab")))
+def test_the_order_of_elements_does_not_matter(folder, names):
+    first, other = (
+        run(ring(folder, 1.0, -2.0, some), Experiment(1.0, H)) for some in ("sab", names)
+    )
+    for column in first.columns:
+        np.testing.assert_allclose(other[column], first[column], rtol=0.0, atol=1e-14)
+
+
+@pytest.mark.parametrize("coupling", ["solve", "linear"])
+def test_both_loops_and_isolation_make_the_same_rows(folder, coupling):
+    system, experiment = ring(folder, 0.5, 0.9), Experiment(2.0, H, coupling=coupling)
+    made()
+    table, *others = (
+        run(system, experiment),
+        run(system, experiment, chosen("compiled", experiment)),
+        run(system, experiment, isolation=Isolation()),
+    )
+    for other in others:
+        assert other.rows.tobytes() == table.rows.tobytes()
+
+
+def test_what_hangs_on_a_ring_takes_its_new_outputs(folder):
+    """Wherever it stands; it is in no ring itself."""
+    parts = {"sink": Part(D=[[0.0, 0.0], [3.0, 0.0]]), **gains(0.5, 0.9)}
+    wires = {**WIRES, "sink.u0": "a.y1"}
+    for coupling in ("solve", "delay"):
+        for names in (["sink", *"sab"], [*"abs", "sink"]):
+            fmus = {name: linear(folder) for name in names}
+            table = run(system_of(fmus, parts, wires), Experiment(2.0, H, coupling=coupling))
+            np.testing.assert_array_equal(table["sink.u0"], table["a.y1"])
+            np.testing.assert_array_equal(table["sink.y1"], 3.0 * table["a.y1"])
+
+
+def test_fmus_that_compute_outputs_in_steps_only_are_delayed_and_one_line_says_so(folder):
+    system, table = ring(folder, 0.5, 0.9, cached=True, can=False), Table()
+    ending = simulate(system, Experiment(2.0, H), [table])
+    assert ending.messages == (
+        "a takes b.y1 one step late: direct feedthroughs form a ring; no output of a follows an "
+        "input of it between steps",
+    )
+    a = b = 0.0
+    for k, sine in enumerate(np.sin(H * np.arange(20)), start=1):
+        a = 0.5 * b + sine
+        b = 0.9 * a
+        assert table["a.y1"][k] == pytest.approx(a, abs=1e-13)
+    with pytest.raises(InputError, match=r"coupling solve: a takes b\.y1 one step late"):
+        simulate(system, Experiment(2.0, H, coupling="solve"))
+
+
+@pytest.mark.parametrize("k", [-2.0, 1.5, 6.0])
+@pytest.mark.parametrize("stop", [20.0, 200.0])
+def test_a_delayed_ring_that_grows_without_bound_ends_the_run(folder, k, stop):
+    ending = simulate(ring(folder, k, 1.0), Experiment(stop, H, coupling="delay"))
+    assert ending.failure is not None
+    assert "grows without bound" in ending.failure
+
+
+@pytest.mark.parametrize("growth", [0.0, 0.3, -0.3])
+def test_what_grows_as_it_should_is_let_grow(folder, growth):
+    """A ramp, and exponentials of time, on a ring that is delayed."""
+    parts = gains(0.5, 0.9) | {"s": Part(A=[[growth, 1.0], [0.0, growth]], C=np.eye(2), x=[0, 1])}
+    system = system_of({name: linear(folder) for name in "sab"}, parts, WIRES)
+    assert simulate(system, Experiment(40.0, H, coupling="delay")).failure is None
+
+
+class _Broken:
+    """An attendant that ends a run after some steps."""
+
+    def attend(self, run: Run) -> int:
+        if run.made == 21:
+            raise ComponentFailed("broken off")
+        return 21
+
+
+@pytest.mark.parametrize("coupling", ["solve", "linear"])
+def test_a_run_with_a_solved_ring_goes_on_where_it_was(folder, tmp_path, coupling):
+    system, experiment = ring(folder, 1.0, -2.0), Experiment(3.0, H, coupling=coupling)
+    whole, again = run(system, experiment), Table()
+    kept = Checkpoints(tmp_path, {}, 1.0, resume=False)
+    ending = simulate(system, experiment, [kept], attendants=[kept, _Broken()])
+    assert ending.failure == "stopped at t = 2.1 s: broken off"
+    kept = Checkpoints(tmp_path, {}, 1.0, resume=True)
+    simulate(system, experiment, [again, kept], attendants=[kept])
+    assert kept.time == 3.0
+    assert again.rows.tobytes() == whole.rows.tobytes()
+
+
+#: Two masses, and between them a spring and a damper that belong to the second, which is tied to a
+#: wall as well.
+TWO_MASSES = (
+    {
+        "first": Part(A=[[0, 1], [-1, -0.1]], B=[[0, 0], [1, 0]], C=np.eye(2), x=[1.0, 0.0]),
+        "second": Part(
+            A=[[0, 1], [-10 - 1, -0.1]],
+            B=[[0, 0], [10, 0.1]],
+            C=[[1, 0], [10, 0.1]],
+            D=[[0, 0], [-10, -0.1]],
+        ),
+    },
+    {"first.u0": "second.y1", "second.u0": "first.y0", "second.u1": "first.y1"},
+    ("first.y0", "first.y1", "second.y1"),
+    10.0,
+)
+
+#: A wheel of 40 kg on a tyre, a quarter of a chassis on a spring and a damper above it, and a road
+#: of 5 cm and 1 Hz.
+_ROAD = 2.0 * np.pi
+QUARTER_TRUCK = (
+    {
+        "road": Part(A=[[0, _ROAD], [-_ROAD, 0]], C=[[0.05, 0], [0, 0]], x=[0.0, 1.0]),
+        "wheel": Part(
+            A=[[0, 1], [-150000 / 40, 0]], B=[[0, 0], [150000 / 40, -1 / 40]], C=np.eye(2)
+        ),
+        "chassis": Part(
+            A=[[0, 1], [-15000 / 400, -1000 / 400]],
+            B=[[0, 0], [15000 / 400, 1000 / 400]],
+            C=[[1, 0], [-15000, -1000]],
+            D=[[0, 0], [15000, 1000]],
+        ),
+    },
+    {
+        "wheel.u0": "road.y0",
+        "wheel.u1": "chassis.y1",
+        "chassis.u0": "wheel.y0",
+        "chassis.u1": "wheel.y1",
+    },
+    ("wheel.y0", "wheel.y1", "chassis.y0", "chassis.y1"),
+    2.0,
+)
+
+
+def error(folder, model, step: float, coupling: str | None, says: str = "dependencies") -> float:
+    """The largest error of some outputs, relative to their amplitudes."""
+    parts, wires, outputs, stop = model
+    system = system_of({name: linear(folder, says) for name in parts}, parts, wires)
+    table = run(system, Experiment(stop, step, coupling=coupling))
+    right = exact(parts, wires, np.asarray(table.time))
+    return max(np.abs(table[o] - right[o]).max() / np.abs(right[o]).max() for o in outputs)
+
+
+@pytest.mark.parametrize(
+    ("model", "steps", "last"),
+    [(TWO_MASSES, (0.05, 0.025, 0.0125), 2e-3), (QUARTER_TRUCK, (0.005, 0.0025, 0.00125), 1e-3)],
+)
+@pytest.mark.parametrize("says", ["dependencies", "nothing"])
+def test_linear_inputs_are_of_second_order_where_held_ones_are_of_first(
+    folder, model, steps, last, says
+):
+    errors = [error(folder, model, step, "linear", says) for step in steps]
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert ((orders > 1.8) & (orders < 2.6)).all(), orders
+    assert errors[-1] < last
+    held = [error(folder, model, step, None, says) for step in steps]
+    assert held[-1] > 10.0 * errors[-1]
+
+
+def test_linear_inputs_are_refused_where_an_fmu_cannot_take_them(folder):
+    system = ring(folder, 0.5, 0.9, can=False)
+    with pytest.raises(InputError, match=r"coupling linear: a cannot go back .*canInterpolateInp"):
+        simulate(system, Experiment(1.0, H, coupling="linear"))
+    system = replace(ring(folder, 0.5, 0.9), steps={"b": 2 * H})
+    with pytest.raises(InputError, match="coupling linear: b: takes steps of its own"):
+        simulate(system, Experiment(1.0, H, coupling="linear"))
+    with pytest.raises(InputError, match="leave the order out"):
+        Experiment(1.0, H, ("a", "b", "s"), coupling="linear")
+    with pytest.raises(InputError, match="coupling 'strong': use one of solve, delay, linear"):
+        Experiment(1.0, H, coupling="strong")
