@@ -9,7 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from orchestrator.errors import InputError
 from orchestrator.master.observer import Ending, Header
-from orchestrator.system.graph import has_feedthrough, rings
+from orchestrator.system.graph import has_feedthrough
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 
@@ -66,15 +66,16 @@ class Growth:
         """Nothing is kept."""
 
 
-def delayed_ports(system: System, solved: Sequence[Sequence[str]]) -> list[PortName]:
-    """The inputs within rings that are not solved as a whole."""
-    parts = [set(ring) for ring in rings(system) if sorted(ring) not in map(sorted, solved)]
+def delayed_ports(
+    system: System, whole: Sequence[Sequence[str]], solved: Sequence[Sequence[str]]
+) -> list[PortName]:
+    """The inputs that rings feed by themselves which are not solved as a whole."""
+    left = [ring for ring in whole if set(ring) not in map(set, solved)]
+    ring_of = {name: i for i, ring in enumerate(left) for name in ring}
     return [
         connection.target
         for connection in system.connections
-        if any(
-            connection.source.component in part and connection.target.component in part
-            for part in parts
-        )
+        if connection.source.component in ring_of
+        and ring_of[connection.source.component] == ring_of.get(connection.target.component)
         and has_feedthrough(system, connection)
     ]

@@ -114,31 +114,34 @@ class Ring:
         """
         self.names = list(names)
         self._values = row.values
-        inner = {name: _from(names, system.feeding[name]) for name in names}
+        own = set(names)
         feeding = [connection for name in names for connection in system.feeding[name]]
-        outer = [c for c in feeding if c.source.component not in names]
-        self.outer = Gathering.along(row, outer)
-        connections = [connection for name in names for connection in inner[name]]
+        connections = [c for c in feeding if c.source.component in own]
+        self.outer = Gathering.along(row, [c for c in feeding if c.source.component not in own])
         self._targets, self._sources = row.places(connections)
         self._ports = [connection.target for connection in connections]
-        real = [_is_real(system, c) for c in connections]
-        self._real = np.array(real, dtype=bool)
+        self._real = np.array([_is_real(system, c) for c in connections], dtype=bool)
+        inner: dict[str, list[int]] = {name: [] for name in names}
+        feeds: dict[str, list[int]] = {name: [] for name in names}
+        for i, connection in enumerate(connections):
+            inner[connection.target.component].append(i)
+            if self._real[i]:
+                feeds[connection.source.component].append(i)
         self._parts: list[_Part] = []
         for name in names:
             variables = system.components[name].variables
-            unknowns = [
-                i for i, c in enumerate(connections) if real[i] and c.target.component == name
-            ]
-            feeds = [i for i, c in enumerate(connections) if real[i] and c.source.component == name]
-            outputs = [variables[connections[i].source.port].valueReference for i in feeds]
+            unknowns = [i for i in inner[name] if self._real[i]]
             inputs = [variables[connections[i].target.port] for i in unknowns]
             self._parts.append(
                 _Part(
                     instances[name],
-                    Gathering.along(row, inner[name]),
+                    Gathering.along(row, [connections[i] for i in inner[name]]),
                     unknowns,
-                    feeds,
-                    (outputs, [variable.valueReference for variable in inputs]),
+                    feeds[name],
+                    (
+                        [variables[connections[i].source.port].valueReference for i in feeds[name]],
+                        [variable.valueReference for variable in inputs],
+                    ),
                     [_nominal(variable) for variable in inputs],
                 )
             )
@@ -206,7 +209,11 @@ class Ring:
             moving = _differ(held, arriving, _ROUNDING)
             if not moving.any():
                 return
-            if moving[~self._real].any() or not np.isfinite(arriving).all():
+            if (
+                moving[~self._real].any()
+                or not np.isfinite(arriving).all()
+                or len(moving) > _MOST_INPUTS
+            ):
                 self._go_round()
                 derivative = None
                 continue
@@ -288,12 +295,6 @@ class Ring:
 def _differ(held: np.ndarray, arriving: np.ndarray, by: tuple[float, float]) -> np.ndarray:
     near: np.ndarray = np.isclose(arriving, held, *by, equal_nan=True)
     return ~near
-
-
-def _from(names: Sequence[str], connections: Sequence[Connection]) -> list[Connection]:
-    """The connections that begin at one of some components."""
-    known = set(names)
-    return [connection for connection in connections if connection.source.component in known]
 
 
 def _is_real(system: System, connection: Connection) -> bool:

@@ -79,13 +79,15 @@ def simulate(
             stack.enter_context(surroundings)
             loop = _possible_loop(loop, instances, log)
             row = Row(system, instances, slow)
-            solved = _initialise(system, instances, row, experiment, slow, log)
+            whole = [Ring(ring, system, instances, row) for ring in rings(system)]
+            solved = _initialise(system, instances, row, whole, experiment, slow, log)
             names = tuple(map(str, row.columns))
             parameters = _parameters(system, instances, log)
             texts = dict.fromkeys(map(str, row.text_ports), row.texts)
             header = Header(names, experiment, parameters, loop.name, texts)
         scheduled, gatherings = _scheduled(system, experiment, instances, row, solved)
-        if watched := delayed_ports(system, [ring.names for ring in solved]):
+        parts = [[ring.names for ring in some] for some in (whole, solved)]
+        if watched := delayed_ports(system, *parts):
             observers = [*observers, Growth(watched)]
         with _told(header, observers, surroundings) as tell:
             blocks = Blocks(len(row.shown), observers, surroundings.ours)
@@ -176,6 +178,7 @@ def _initialise(
     system: System,
     instances: Mapping[str, Instance],
     row: Row,
+    whole: Sequence[Ring],
     experiment: Experiment,
     slow: Collection[str],
     log: Log,
@@ -194,7 +197,6 @@ def _initialise(
         instance.enter_initialization(system.parameters_of(name), experiment.start_time)
         held = instance.read(system.open_inputs(name))
         row.enter({PortName(name, port): value for port, value in held.items()})
-    whole = [Ring(names, system, instances, row) for names in rings(system)]
     _settling(system, instances, row, whole).begin()
     _check_finite(instances, row, experiment)
     for instance in instances.values():

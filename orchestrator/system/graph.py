@@ -36,7 +36,7 @@ def rings(system: System, among: Collection[str] | None = None) -> list[list[str
     ]
 
 
-def derived_order(system: System, solved: Iterable[Sequence[str]] = ()) -> list[str]:
+def derived_order(system: System, solved: Sequence[Sequence[str]] = ()) -> list[str]:
     """All components: one with direct feedthrough comes before those that it feeds.
 
     No order does that for every connection of a ring. The component of the ring that stands first
@@ -52,7 +52,8 @@ def derived_order(system: System, solved: Iterable[Sequence[str]] = ()) -> list[
     ring_of = {name: ring for ring in solved for name in ring}
     # A ring stands where the first of its components stands.
     place = {name: i for i, name in enumerate(system.components)}
-    lead = {name: min(ring, key=place.__getitem__) for name, ring in ring_of.items()}
+    firsts = [(min(ring, key=place.__getitem__), ring) for ring in solved]
+    lead = {name: first for first, ring in firsts for name in ring}
     sources: dict[str, set[str]] = {lead.get(name, name): set() for name in system.components}
     for name, feeding in _sources(system).items():
         own = lead.get(name, name)
@@ -93,7 +94,7 @@ def in_stages(
 
     A solved ring is a stage by itself, in the place of its component that comes first.
     """
-    ring_of = {name: list(ring) for ring in solved for name in ring}
+    ring_of = {name: ring for ring in map(list, solved) for name in ring}
     units: dict[str, list[str]] = {}
     for name in order:
         ring = ring_of.get(name, [name])
@@ -150,8 +151,9 @@ def _without_rings(sources: _Sources) -> dict[str, set[str]]:
     found: dict[str, set[str]] = {}
     for part in _strongly_connected(sources, sources):
         before: set[str] = set()
+        ring = set(part)
         for name in _opened(part, sources, place):
-            found[name] = set(sources[name]).difference(part) | before
+            found[name] = {source for source in sources[name] if source not in ring} | before
             before = {name}
     return {name: found[name] for name in sources}
 
@@ -186,16 +188,70 @@ def _in_levels(sources: _Sources, last: Collection[str]) -> list[str]:
 
 
 def _opened(ring: Sequence[str], sources: _Sources, place: Mapping[str, int]) -> list[str]:
-    """A ring in the order in which it is opened: its first, then what is left, part by part."""
+    """A ring in the order in which it is opened: its first, then what is left, part by part.
+
+    What is left of a ring may be rings again, and so on inwards. They are found from the inmost
+    outwards: components are added to a graph, the last first, and each of them becomes one with
+    those that it closes a ring with. That takes the time of the connections, but for rings that
+    are made for it.
+    """
+    lead: dict[str, str] = {}
+    feeding: dict[str, set[str]] = {}
+    fed: dict[str, set[str]] = {}
+    parts: dict[str, list[str]] = {}
+    targets: dict[str, list[str]] = {name: [] for name in ring}
+    for name in ring:
+        for source in sources[name]:
+            if source in targets:
+                targets[source].append(name)
+
+    def whole(name: str) -> str:
+        while lead[name] != name:
+            lead[name] = name = lead[lead[name]]
+        return name
+
+    for first in sorted(ring, key=place.__getitem__, reverse=True):
+        feeding[first] = {whole(source) for source in sources[first] if source in lead}
+        fed[first] = {whole(target) for target in targets[first] if target in lead}
+        lead[first] = first
+        inner = _closing(first, feeding, fed)
+        waiting = {name: feeding[name] & inner for name in sorted(inner, key=place.__getitem__)}
+        parts[first] = _in_levels(waiting, ())
+        for ends, others in ((feeding, fed), (fed, feeding)):
+            ends[first] = ends[first].union(*(ends.pop(name) for name in inner)) - inner - {first}
+            for name in ends[first]:
+                others[name] = others[name] - inner | {first}
+        lead |= dict.fromkeys(inner, first)
     order: list[str] = []
-    parts: list[Sequence[str]] = [ring]
-    while parts:
-        part = parts.pop()
-        first = min(part, key=place.__getitem__)
-        order.append(first)
-        rest = [name for name in part if name != first]
-        parts += reversed(_strongly_connected(rest, sources))
+    ahead = [first]
+    while ahead:
+        order.append(ahead.pop())
+        ahead += reversed(parts[order[-1]])
     return order
+
+
+def _closing(first: str, feeding: Mapping[str, set[str]], fed: Mapping[str, set[str]]) -> set[str]:
+    """What feeds a component, directly or through others, and is fed by it.
+
+    The search goes both ways at the same time, until one of them has come to its end.
+    """
+    ways = (feeding, fed)
+    found: tuple[set[str], set[str]] = (set(), set())
+    ahead = [[first], [first]]
+    while all(ahead):
+        for neighbours, known, waiting in zip(ways, found, ahead, strict=True):
+            new = neighbours[waiting.pop()] - known
+            known |= new
+            waiting += new
+    done = 0 if not ahead[0] else 1
+    within, neighbours = found[done], ways[1 - done]
+    closing: set[str] = set()
+    waiting = [first]
+    while waiting:
+        new = (neighbours[waiting.pop()] & within) - closing
+        closing |= new
+        waiting += new
+    return closing - {first}
 
 
 def _strongly_connected(names: Iterable[str], sources: _Sources) -> list[list[str]]:
