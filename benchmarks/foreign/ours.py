@@ -77,6 +77,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
             stop_time=min(end, system.stop_time or np.inf),
             step=step,
             order=options.order,
+            # Other masters open rings by a delay.
+            coupling="delay" if options.order else None,
         )
     outputs = [
         (name, variable.name, variable.valueReference)

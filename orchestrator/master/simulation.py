@@ -234,12 +234,13 @@ def _solvable(
     if experiment.coupling == LINEAR:
         # Where outputs are computed in steps only, the second one has them right.
         return list(whole)
-    reasons = {name: f"{name} takes longer steps" for name in slow}
+    reasons: dict[str, str] = {}
     if experiment.coupling == DELAY:
         reasons = dict.fromkeys(system.components, "")
     else:
         for ring in whole:
             reasons |= ring.unsolved()
+        reasons |= {name: f"{name} takes longer steps" for name in slow}
     solved = rings(system, system.components.keys() - reasons.keys())
     if experiment.coupling == SOLVE:
         for delay in delays(system, GAUSS_SEIDEL, solved, reasons):

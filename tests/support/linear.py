@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 from zipfile import ZipFile
 
 import numpy as np
 
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.simulation import simulate
+from orchestrator.master.table import Table
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import Connection, System
@@ -41,6 +44,70 @@ class Part(NamedTuple):
         start = np.zeros(2)
         start[: np.size(self.x)] = self.x
         return [*found, start]
+
+
+class Model(NamedTuple):
+    """Parts that are coupled.
+
+    Attributes:
+        parts: by their names.
+        wires: sources by targets.
+        outputs: whose errors count.
+        stop: end of a run [s].
+
+    """
+
+    parts: Mapping[str, Part]
+    wires: Mapping[str, str]
+    outputs: Sequence[str]
+    stop: float
+
+
+#: sin t, and cos t.
+SINE = Part(A=[[0.0, 1.0], [-1.0, 0.0]], C=np.eye(2), x=[0.0, 1.0])
+
+#: Two masses, and between them a spring and a damper that belong to the second, which is tied to a
+#: wall as well.
+TWO_MASSES = Model(
+    {
+        "first": Part(A=[[0, 1], [-1, -0.1]], B=[[0, 0], [1, 0]], C=np.eye(2), x=[1.0, 0.0]),
+        "second": Part(
+            A=[[0, 1], [-10 - 1, -0.1]],
+            B=[[0, 0], [10, 0.1]],
+            C=[[1, 0], [10, 0.1]],
+            D=[[0, 0], [-10, -0.1]],
+        ),
+    },
+    {"first.u0": "second.y1", "second.u0": "first.y0", "second.u1": "first.y1"},
+    ("first.y0", "first.y1", "second.y1"),
+    10.0,
+)
+
+#: A wheel of 40 kg on a tyre, a quarter of a chassis on a spring and a damper above it, and a road
+#: of 5 cm and 1 Hz.
+_ROAD = 2.0 * np.pi
+QUARTER_TRUCK = Model(
+    {
+        "road": Part(A=[[0, _ROAD], [-_ROAD, 0]], C=[[0.05, 0], [0, 0]], x=[0.0, 1.0]),
+        "wheel": Part(
+            A=[[0, 1], [-150000 / 40, 0]], B=[[0, 0], [150000 / 40, -1 / 40]], C=np.eye(2)
+        ),
+        "chassis": Part(
+            A=[[0, 1], [-15000 / 400, -1000 / 400]],
+            B=[[0, 0], [15000 / 400, 1000 / 400]],
+            C=[[1, 0], [-15000, -1000]],
+            D=[[0, 0], [15000, 1000]],
+        ),
+    },
+    {
+        "wheel.u0": "road.y0",
+        "wheel.u1": "chassis.y1",
+        "chassis.u0": "wheel.y0",
+        "chassis.u1": "wheel.y1",
+    },
+    ("wheel.y0", "wheel.y1", "chassis.y0", "chassis.y1"),
+    2.0,
+)
 
 
 def linear(
@@ -148,6 +215,19 @@ def exact(
         found.append(outputs @ state)
     columns = np.array(found).T
     return {name: columns[i] for name, i in place.items()}
+
+
+def error(folder: Path, model: Model, experiment: Experiment, says: str = "dependencies") -> float:
+    """The largest error of the outputs of a model, relative to their amplitudes."""
+    fmus = {name: linear(folder, says) for name in model.parts}
+    table = Table()
+    simulate(system_of(fmus, model.parts, model.wires), experiment, [table])
+    assert table.failure is None
+    right = exact(model.parts, model.wires, np.asarray(table.time))
+    return max(
+        float(np.abs(table[name] - right[name]).max() / np.abs(right[name]).max())
+        for name in model.outputs
+    )
 
 
 def _diagonal(blocks: list[np.ndarray]) -> np.ndarray:

@@ -150,7 +150,7 @@ def test_strict_wants_rings_solved_unless_something_else_is_stated(folder):
     """An output that takes a step of its own cannot be solved for."""
     system = replace(ring(folder, steps={"a": 2 * H}), stop_time=1.0)
     with pytest.raises(InputError, match=r"a takes c\.g one step late: .*; a takes longer steps"):
-        simulated(system, strict=True)
+        simulated(system, strict=True, step=H)
     assert len(simulated(system, strict=True, order=["b", "c", "a"], step=H)) == 9
     assert len(simulated(system, strict=True, coupling="delay", step=H)) == 9
     simulated(replace(system, steps={}), strict=True)
@@ -167,7 +167,7 @@ def test_values_of_a_ring_are_its_solution_at_the_start(folder):
 
 def test_a_ring_that_does_not_come_to_rest_is_refused_with_its_ports(folder):
     """Its gain is one, and something is added each time: there is no solution."""
-    with pytest.raises(InputError, match=r"do not come to rest: .*a\.u.* in an algebraic loop"):
+    with pytest.raises(InputError, match=r"do not come to rest: b\.u in an algebraic loop"):
         run(ring(folder, gain=-4.0), Experiment(H, H))
 
 

@@ -19,12 +19,9 @@ from orchestrator.master.loop import PYTHON_LOOP, Loop, chosen
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
 from orchestrator.system.structure import System
-from support.linear import Part, exact, linear, system_of
+from support.linear import QUARTER_TRUCK, SINE, TWO_MASSES, Model, Part, error, linear, system_of
 
 H = 0.1
-
-#: sin t, and cos t.
-SINE = Part(A=[[0.0, 1.0], [-1.0, 0.0]], C=np.eye(2), x=[0.0, 1.0])
 
 #: y_a = k u_a + sin t, y_b = l u_b: the gain of the ring is k l.
 WIRES = {"a.u0": "b.y1", "a.u1": "s.y0", "b.u0": "a.y1"}
@@ -154,73 +151,22 @@ def test_a_run_with_a_solved_ring_goes_on_where_it_was(folder, tmp_path, couplin
     assert again.rows.tobytes() == whole.rows.tobytes()
 
 
-#: Two masses, and between them a spring and a damper that belong to the second, which is tied to a
-#: wall as well.
-TWO_MASSES = (
-    {
-        "first": Part(A=[[0, 1], [-1, -0.1]], B=[[0, 0], [1, 0]], C=np.eye(2), x=[1.0, 0.0]),
-        "second": Part(
-            A=[[0, 1], [-10 - 1, -0.1]],
-            B=[[0, 0], [10, 0.1]],
-            C=[[1, 0], [10, 0.1]],
-            D=[[0, 0], [-10, -0.1]],
-        ),
-    },
-    {"first.u0": "second.y1", "second.u0": "first.y0", "second.u1": "first.y1"},
-    ("first.y0", "first.y1", "second.y1"),
-    10.0,
-)
-
-#: A wheel of 40 kg on a tyre, a quarter of a chassis on a spring and a damper above it, and a road
-#: of 5 cm and 1 Hz.
-_ROAD = 2.0 * np.pi
-QUARTER_TRUCK = (
-    {
-        "road": Part(A=[[0, _ROAD], [-_ROAD, 0]], C=[[0.05, 0], [0, 0]], x=[0.0, 1.0]),
-        "wheel": Part(
-            A=[[0, 1], [-150000 / 40, 0]], B=[[0, 0], [150000 / 40, -1 / 40]], C=np.eye(2)
-        ),
-        "chassis": Part(
-            A=[[0, 1], [-15000 / 400, -1000 / 400]],
-            B=[[0, 0], [15000 / 400, 1000 / 400]],
-            C=[[1, 0], [-15000, -1000]],
-            D=[[0, 0], [15000, 1000]],
-        ),
-    },
-    {
-        "wheel.u0": "road.y0",
-        "wheel.u1": "chassis.y1",
-        "chassis.u0": "wheel.y0",
-        "chassis.u1": "wheel.y1",
-    },
-    ("wheel.y0", "wheel.y1", "chassis.y0", "chassis.y1"),
-    2.0,
-)
-
-
-def error(folder, model, step: float, coupling: str | None, says: str = "dependencies") -> float:
-    """The largest error of some outputs, relative to their amplitudes."""
-    parts, wires, outputs, stop = model
-    system = system_of({name: linear(folder, says) for name in parts}, parts, wires)
-    table = run(system, Experiment(stop, step, coupling=coupling))
-    right = exact(parts, wires, np.asarray(table.time))
-    return max(np.abs(table[o] - right[o]).max() / np.abs(right[o]).max() for o in outputs)
-
-
 @pytest.mark.parametrize(
     ("model", "steps", "last"),
     [(TWO_MASSES, (0.05, 0.025, 0.0125), 2e-3), (QUARTER_TRUCK, (0.005, 0.0025, 0.00125), 1e-3)],
 )
 @pytest.mark.parametrize("says", ["dependencies", "nothing"])
 def test_linear_inputs_are_of_second_order_where_held_ones_are_of_first(
-    folder, model, steps, last, says
+    folder, model: Model, steps, last, says
 ):
-    errors = [error(folder, model, step, "linear", says) for step in steps]
+    def found(coupling: str | None, step: float) -> float:
+        return error(folder, model, Experiment(model.stop, step, coupling=coupling), says)
+
+    errors = [found("linear", step) for step in steps]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert ((orders > 1.8) & (orders < 2.6)).all(), orders
     assert errors[-1] < last
-    held = [error(folder, model, step, None, says) for step in steps]
-    assert held[-1] > 10.0 * errors[-1]
+    assert found(None, steps[-1]) > 10.0 * errors[-1]
 
 
 def test_linear_inputs_are_refused_where_an_fmu_cannot_take_them(folder):

@@ -1,0 +1,104 @@
+"""What ways of coupling bring and cost: `python benchmarks/coupling.py`.
+
+Linear FMUs, so that the exact solution is known: two masses with a spring and a damper between
+them, and a quarter of a truck on a road. For each way and step the largest error of the coupled
+outputs, relative to their amplitudes, and the time of a step in the compiled loop, the least of
+some rounds in turns. In `nothing said` the FMUs do not say what their outputs depend on.
+
+A ring of gains is added whose solution is known: what it is solved to, and what that costs.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+
+import numpy as np
+
+from orchestrator.master.experiment import COUPLINGS, Experiment
+from orchestrator.master.library import made
+from orchestrator.master.loop import chosen
+from orchestrator.master.simulation import simulate
+from orchestrator.master.table import Table
+from orchestrator.system.structure import System
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from support.linear import QUARTER_TRUCK, SINE, TWO_MASSES, Part, error, linear, system_of
+
+#: Steps that are timed, and how often.
+_STEPS, _ROUNDS = 2000, 5
+
+_STEP_OF = {"two masses": 0.0125, "quarter truck": 0.00125}
+_MODELS = {"two masses": TWO_MASSES, "quarter truck": QUARTER_TRUCK}
+_RING = {"a.u0": "b.y1", "a.u1": "s.y0", "b.u0": "a.y1"}
+
+
+def _time(system: System, step: float, coupling: str) -> float:
+    """Of a step, without what a run costs at its beginning [us]."""
+
+    def run(n: int) -> float:
+        experiment = Experiment(n * step, step, coupling=coupling)
+        begin = perf_counter()
+        simulate(system, experiment, loop=chosen("compiled", experiment))
+        return perf_counter() - begin
+
+    return 1e6 * (run(_STEPS) - run(1)) / (_STEPS - 1)
+
+
+def _ring(folder: Path, gain: float) -> System:
+    parts = {"s": SINE, "a": Part(D=[[0, 0], [1, 1]]), "b": Part(D=[[0, 0], [gain, 0]])}
+    return system_of({name: linear(folder) for name in "sab"}, parts, _RING)
+
+
+def _print(name: str, errors: list[float], least: float) -> None:
+    print(f"{name:34}" + "".join(f"{one:10.1e}" for one in errors) + f"{least:10.1f}")
+
+
+def main() -> None:
+    """Print the tables."""
+    made()
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        for title, model in _MODELS.items():
+            finest = _STEP_OF[title]
+            steps = [4 * finest, 2 * finest, finest]
+            print(f"{title:34}" + "".join(f"{1e3 * h:7.4g} ms" for h in steps) + "  us a step")
+            for says in ("dependencies", "nothing"):
+                fmus = {part: linear(folder, says) for part in model.parts}
+                system = system_of(fmus, model.parts, model.wires)
+                ways = [None, "linear"]
+                for coupling in ways:
+                    errors = [
+                        error(folder, model, Experiment(model.stop, h, coupling=coupling), says)
+                        for h in steps
+                    ]
+                    least = min(_time(system, finest, coupling) for _ in range(_ROUNDS))
+                    said = "nothing said" if says == "nothing" else "dependencies said"
+                    _print(f"  {coupling or 'held inputs'}, {said}", errors, least)
+        steps = [0.1, 0.05, 0.025]
+        print(
+            f"{'ring of gains':34}" + "".join(f"{1e3 * h:7.4g} ms" for h in steps) + "  us a step"
+        )
+        for gain in (0.45, -0.81, -2.0, 6.0):
+            system = _ring(folder, gain)
+            for coupling in COUPLINGS[:2]:
+                errors = []
+                for h in steps:
+                    table = Table()
+                    simulate(system, Experiment(5.0, h, coupling=coupling), [table])
+                    right = np.sin(table.time) / (1.0 - gain)
+                    errors.append(float(np.abs(table["a.y1"] - right).max()))
+                stable = max(errors) < 1.0
+                least = (
+                    min(_time(system, 0.001, coupling) for _ in range(_ROUNDS))
+                    if stable
+                    else np.nan
+                )
+                _print(f"  {coupling}, gain {gain:g}", errors, least)
+
+
+if __name__ == "__main__":
+    main()
