@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,6 +27,13 @@ _OWN = "auv-fmu "
 
 #: What only FMUs with some capability need, and some of the others lack.
 _OPTIONAL = ("FMUstate", "Derivative", "Status", "CancelStep", "DebugLogging")
+
+#: How ELF files of 32 and of 64 bits say where they have what: the place and form of that part of
+#: their header, and the length and form of the entries for their segments.
+_ELF = {1: (28, "3I5H", 32, "2I8xI"), 2: (32, "2QI5H", 56, "I4xQ16xQ")}
+
+#: The kind of segments that are mapped into memory.
+_LOADED = 1
 
 
 class FMU2OfOthers(FMU2Slave):  # type: ignore[misc]
@@ -120,7 +128,7 @@ def named(component: Component) -> str:
 
 
 def check_binary(component: Component, folder: Path) -> None:
-    """Check that an FMU, unpacked into a folder, has a library for this machine.
+    """Check that an FMU, unpacked into a folder, has a whole library for this machine.
 
     Raises:
         InputError: it has none.
@@ -131,6 +139,9 @@ def check_binary(component: Component, folder: Path) -> None:
     suffix = fmpy.sharedLibraryExtension
     file = f"{identifier}{suffix}"
     if (binaries / fmpy.platform / file).is_file():
+        for path in sorted((binaries / fmpy.platform).iterdir()):
+            if path.is_file() and _is_cut_short(path):
+                raise InputError(f"{named(component)}: its {path.name} is cut short: get it anew")
         return
     others = sorted({path.parent.name for path in binaries.glob(f"*/{glob.escape(identifier)}.*")})
     named_otherwise = sorted(path.name for path in (binaries / fmpy.platform).glob(f"*{suffix}"))
@@ -143,6 +154,28 @@ def check_binary(component: Component, folder: Path) -> None:
     raise InputError(
         f"{named(component)} has no {file} for this machine, {fmpy.platform}: it has {there}"
     )
+
+
+def _is_cut_short(path: Path) -> bool:
+    """Whether an ELF file ends before what its header tells of: reading that ends the process.
+
+    The loaders of other systems look for themselves.
+    """
+    with path.open("rb") as file:
+        head = file.read(64).ljust(64, b"\0")
+        if head[:4] != b"\x7fELF" or head[4] not in _ELF or head[5] not in (1, 2):
+            return False
+        order, (start, header, width, segment) = "<>"[head[5] - 1], _ELF[head[4]]
+        segments, sections, _, _, length, count, section_length, section_count = struct.unpack_from(
+            order + header, head, start
+        )
+        ends: list[int] = [segments + length * count, sections + section_length * section_count]
+        file.seek(segments)
+        table = file.read(length * count)
+        for at in range(0, len(table) - width + 1, max(length, width)):
+            kind, offset, size = struct.unpack_from(order + segment, table, at)
+            ends += [offset + size] * (kind == _LOADED)
+        return path.stat().st_size < max(ends)
 
 
 #: Libraries by the folders into which their FMUs are unpacked, for runs in several threads.

@@ -118,6 +118,9 @@ def _contradictions(description: ModelDescription) -> Iterator[str]:
 def _misread(file: Path) -> Iterator[str]:
     """Numbers of a description that Python takes for others, or that are none."""
     for element in _elements(ElementTree.parse(file).getroot()):
+        for name in ("name", "value") if element.tag == "Item" else ():
+            if name not in element.attrib:
+                yield f"an <Item> of an enumeration has no {name}"
         for kind, names in ((integer, _INTEGERS), (real, _REALS)):
             for name in names.intersection(element.attrib):
                 text = element.attrib[name]

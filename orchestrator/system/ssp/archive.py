@@ -117,7 +117,11 @@ class Archive:
         if "://" in source:
             self.problem(f"{needer}: {source!r} is elsewhere; a file in the archive is supported")
             return None
-        decoded = unquote(urlsplit(source).path)
+        try:
+            decoded = unquote(urlsplit(source).path)
+        except ValueError:
+            self.problem(f"{needer}: {source!r} is no URI")
+            return None
         for name in dict.fromkeys((decoded, source, source.replace("\\", "/"))):
             path = Path(os.path.normpath(base / name))
             if not path.is_relative_to(base):

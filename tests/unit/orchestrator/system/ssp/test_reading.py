@@ -436,12 +436,22 @@ def test_parameter_set_inside_an_fmu(files, tmp_path: Path):
         (system(component("a", "../a.fmu")), "'../a.fmu' lies outside of the archive"),
         (system(component("a", "/etc/passwd")), "'/etc/passwd' lies outside of the archive"),
         (system(component("a", "http://x/a.fmu")), "'http://x/a.fmu' is elsewhere"),
+        (system(component("a", "//[x/a.fmu")), "'//[x/a.fmu' is no URI"),
         (system(component("a", type="text/x-modelica")), "type 'text/x-modelica' is not supported"),
         (system(component("a", implementation="ModelExchange")), "asks for ModelExchange"),
         (system('<ssd:Component name="a"/>'), "a component without a source"),
         (system('<ssd:SignalDictionaryReference name="a" dictionary="b"/>'), "dictionary 'b'"),
         (system(system(name="inner")), "holds no component"),
         (system(component("a", bindings=binding({"k": 'Real value="x"'}))), "a.k = x: not a real"),
+        (system(component("mm", "mm.fmu", binding({"k": 'Real value="1,5" unit="m"'}))),
+         "mm.k = 1,5: not a number, so it can be neither converted nor transformed"),
+        (system(component("a", bindings=binding({"k": 'String value="much"'}, mapping(
+            'source="k" target="k"|<ssc:LinearTransformation factor="2"/>')))),
+         "a.k = much: not a number"),
+        (system(component("a", bindings=binding({"k": 'Integer value="1_0"'}, mapping(
+            'source="k" target="Integer.k"|<ssc:IntegerMappingTransformation>'
+            '<ssc:MapEntry source="1" target="2"/></ssc:IntegerMappingTransformation>')))),
+         "a.Integer.k = 1_0: not a number"),
         (system(component("a", bindings=binding({"k": "Real"}))), "k: a parameter without a value"),
         (system(component("a", bindings=binding(source="none.ssv"))), "holds no 'none.ssv'"),
         (system(component("a", bindings=binding(source="a.csv", type="text/csv"))), "'text/csv'"),
