@@ -8,15 +8,12 @@ from typing import Any
 
 from orchestrator.commands.options import BAD_INPUT, OK, add_variant
 from orchestrator.commands.streams import show
-from orchestrator.experiments.preparation import Request, loaded, prepare
+from orchestrator.experiments.preparation import SOME_TIME, Request, loaded, prepare
 from orchestrator.experiments.waypoints import impossible_paths
 from orchestrator.findings import Findings
 from orchestrator.master.binary import check_binary
 from orchestrator.master.schedule import delays
 from orchestrator.system.examination import examine, surprises
-
-#: How long a run could last that nobody makes [s].
-_SOME_TIME = 1.0
 
 
 def add_to(commands: Any) -> None:
@@ -24,9 +21,7 @@ def add_to(commands: Any) -> None:
     check = commands.add_parser(
         "check", help="say all that is wrong with an FMU, an SSP or a scenario"
     )
-    check.add_argument(
-        "file", metavar="FILE.fmu|FILE.ssp|FILE.toml|SCENARIO", help="what is looked at, not run"
-    )
+    check.add_argument("file", metavar="FILE|DIR|SCENARIO", help="what is looked at, not run")
     add_variant(check)
     check.set_defaults(action=_check)
 
@@ -70,7 +65,7 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
         request = Request()
         if scenario.stop_time is None and system.stop_time is None:
             to_know.append("names no stop time: a run wants --stop-time")
-            request = Request(stop_time=(system.start_time or 0.0) + _SOME_TIME)
+            request = Request(stop_time=(system.start_time or 0.0) + SOME_TIME)
         prepared = prepare(scenario, system, request)
         for text in impossible_paths(prepared.system):
             findings.problem(text)

@@ -35,6 +35,9 @@ _WHAT = "not a scenario"
 
 FOLDER = Path(__file__).parent / "scenarios"
 
+#: What is run besides those that come with the bundle.
+KINDS = "a .toml, .ssp, .ssd or .fmu file, an OspSystemStructure.xml, or a folder with a .ssd"
+
 
 @dataclass(frozen=True)
 class Scenario:
@@ -200,7 +203,7 @@ def read_scenario(name: str) -> Scenario:
         InputError: there is no such scenario, or its file has a mistake.
 
     """
-    path = path_of(name, FOLDER, "scenario", ".toml or .ssp")
+    path = path_of(name, FOLDER, "scenario", KINDS)
     text = text_of(path, _WHAT)
     with explained(path, _WHAT):
         return _scenario(path, text)

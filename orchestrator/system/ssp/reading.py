@@ -27,10 +27,10 @@ _ROOT = "SystemStructureDescription"
 
 
 def read_ssp(path: Path, variant: str | None = None, findings: Findings | None = None) -> System:
-    """Read the system in an SSP archive.
+    """Read the system in an SSP archive, or in the folder of one that is unpacked.
 
     Args:
-        path: of the archive.
+        path: of the archive, the folder, or a description in it.
         variant: which of its descriptions; None: the default.
         findings: takes all that is wrong with it.
 
@@ -68,7 +68,7 @@ def _read(archive: Archive, root: Element) -> System:
     times = times_of(archive, root)
     steps = {".".join(way): step_of(archive, leaf) for way, leaf in leaves.items()}
     system = System(
-        name=content.get("name") or archive.path.stem,
+        name=content.get("name") or archive.path.resolve().stem,
         components=components,
         connections=tuple(ports.connections),
         parameters=ports.parameters,
