@@ -29,6 +29,7 @@ from orchestrator.master.paces import paces, step_of, with_common_step
 from orchestrator.master.playback import Course, Playback
 from orchestrator.master.real_time import check_factor
 from orchestrator.master.schedule import delays, stages
+from orchestrator.reading import is_folder
 from orchestrator.system.component import RUNNABLE, WRITABLE, read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.osp import STRUCTURE as OSP
@@ -221,7 +222,7 @@ def is_path(name: str) -> bool:
 
 def _reader(path: Path) -> Callable[..., System] | None:
     """Who reads a file or folder; None: it is a scenario."""
-    if path.suffix in _READERS or str(path) in names() or not path.is_dir():
+    if path.suffix in _READERS or str(path) in names() or not is_folder(path):
         return _READERS.get(path.suffix)
     return read_osp if (path / OSP).is_file() and not (path / SSD).is_file() else read_ssp
 

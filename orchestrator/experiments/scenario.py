@@ -152,8 +152,8 @@ ENTRIES: dict[str, Entry] = {
         "table of names, or false",
         _is_table_of_wires,
         'Further wires, as `"component.group" = "component.group"`: every input of the group on '
-        "the left takes the output of the same name in the group on the right. `false` removes "
-        "a wire.",
+        "the left takes the output of the same name in the group on the right. Where both sides "
+        'name a port, that one is wired, as `"g.u[1]" = "t.y"`. `false` removes a wire.',
         "none",
     ),
     "parameters": Entry(

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 from orchestrator.errors import InputError, reason
 from orchestrator.findings import Findings
-from orchestrator.reading import check_file
+from orchestrator.reading import check_file, is_folder
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.archive import Archive
@@ -102,7 +102,7 @@ def read_osp(path: Path, findings: Findings | None = None) -> System:
         InputError: the file is missing, broken, or uses what this master cannot do.
 
     """
-    path = path / STRUCTURE if path.is_dir() else path
+    path = path / STRUCTURE if is_folder(path) else path
     archive = Archive(path, Findings() if findings is None else findings)
     root = _root(path)
     components = _components(archive, root)

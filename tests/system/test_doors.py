@@ -258,3 +258,77 @@ def test_what_is_none_of_these_is_refused_in_one_line(workplace: Path, capsys, n
         assert main([command, name]) == 2
         out, err = capsys.readouterr()
         assert why in (out + err) and len((out + err).splitlines()) == 1
+
+
+WIRED = """
+stop_time = 1.0
+step = 0.125
+only = ["t", "g", "x"]
+[components]
+t = "t.fmu"
+g = "g.fmu"
+x = "x.fmu"
+[wires]
+"g.u" = "t.y"
+"x.w[1]" = "t.z[2]"
+"x.in" = "t.out"
+"""
+
+
+def ports(path: Path, *names: str) -> None:
+    """An FMU without a library, of Real inputs and outputs: an output's name has a star."""
+    fmu(path, *(variable(name.removesuffix("*"), "output" if name.endswith("*") else "input")
+                for name in names))  # fmt: skip
+
+
+@pytest.fixture
+def wired(workplace: Path) -> Path:
+    """A scenario of three FMUs with single ports and groups, and of no other component."""
+    ports(Path("t.fmu"), "y*", "z[2]*", "out.a*", "out.b*", "one*")
+    ports(Path("g.fmu"), "u", "speed")
+    ports(Path("x.fmu"), "w[1]", "in.a", "in.b")
+    path = workplace / "wired.toml"
+    path.write_text(WIRED, encoding="utf-8")
+    return path
+
+
+def test_a_scenario_wires_single_ports_beside_groups(dist: Path, wired: Path):
+    found = {str(wire.target): str(wire.source) for wire in load(wired).connections}
+    assert found == {
+        "g.u": "t.y",
+        "x.w[1]": "t.z[2]",
+        "x.in.a": "t.out.a",
+        "x.in.b": "t.out.b",
+    }
+
+
+@pytest.mark.parametrize(
+    ("wire", "why"),
+    [
+        ('"g.u" = "t.out"', "g.u is one input, and t has no port 'out'; did you mean out.a or out"),
+        ('"g.u" = "t.yy"', "g.u is one input, and t has no port 'yy'; did you mean y?"),
+        ('"x.in" = "t.one"', "t.one is one port, and x.in a group of inputs; wire one of them; "
+         "did you mean in.a or in.b?"),
+        ('"g.sped" = "t.y"', "g has no input sped nor inputs sped.*; did you mean speed?"),
+        ('"g.u" = "tt.y"', "there is no component 'tt'; did you mean t?"),
+        ('"t.y" = "g.u"', "g.u is of causality input, not output"),
+    ],
+)  # fmt: skip
+def test_a_wire_that_cannot_be_says_what_to_write(dist: Path, wired: Path, wire: str, why: str):
+    old = '"x.in" = "t.out"' if wire.startswith('"x.in"') else '"g.u" = "t.y"'
+    wired.write_text(WIRED.replace(old, wire), encoding="utf-8")
+    with pytest.raises(InputError) as error:
+        load(wired).check()
+    assert why in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_wire_of_two_single_ports_carries_their_values(dist: Path, workplace: Path):
+    shutil.copy(relay(workplace), "relay.fmu")
+    Path("two.toml").write_text(
+        'stop_time = 1.0\nstep = 0.125\nonly = ["a", "b"]\n[components]\na = "relay.fmu"\n'
+        'b = "relay.fmu"\n[wires]\n"b.u" = "a.y"\n[parameters]\n"a.u" = 2.0\n',
+        encoding="utf-8",
+    )
+    result = simulate("two.toml", order="jacobi")
+    assert result["a.y"].tolist() == [2.0 * t for t in result.time]
+    assert result["b.u"][1:].tolist() == result["a.y"][:-1].tolist()

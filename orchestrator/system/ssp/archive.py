@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 from orchestrator.errors import InputError, did_you_mean, reason
 from orchestrator.findings import Findings
-from orchestrator.reading import check_file
+from orchestrator.reading import check_file, is_folder
 from orchestrator.system.ssp import STRUCTURE
 from orchestrator.system.ssp.document import read_document
 from orchestrator.system.ssp.validation import violations
@@ -53,11 +53,12 @@ class Archive:
 
         """
         self.path, self.findings = path, findings
-        self._is_packed = not path.is_dir() and path.suffix not in LOOSE
+        is_whole = is_folder(path)
+        self._is_packed = not is_whole and path.suffix not in LOOSE
         if self._is_packed:
             self.folder = unpacked(path).folder
         else:
-            self.folder = path.resolve() if path.is_dir() else path.resolve().parent
+            self.folder = path.resolve() if is_whole else path.resolve().parent
 
     def problem(self, text: object) -> None:
         """Take note of what makes a run meaningless, or impossible."""
