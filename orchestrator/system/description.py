@@ -72,6 +72,8 @@ def described(fmu: Path, folder: Path, versions: Sequence[str]) -> Described:
         InputError: it is no such FMU.
 
     """
+    if not (folder / "modelDescription.xml").is_file():
+        raise InputError(f"{fmu}: not a readable FMU: it holds no modelDescription.xml")
     try:
         version = _version(folder / "modelDescription.xml")
         if version not in versions:

@@ -62,7 +62,8 @@ class Archive:
 
     def problem(self, text: object) -> None:
         """Take note of what makes a run meaningless, or impossible."""
-        self.findings.problem(f"{self.path}: {text}")
+        said = str(text).removeprefix(f"{self.path}: ")
+        self.findings.problem(f"{self.path}: {said}")
 
     def note(self, text: object) -> None:
         """Take note of what changes no number."""

@@ -89,9 +89,9 @@ def notes(read: Read, text: str, **files: str) -> list[str]:
     return [note.partition("test.ssp: ")[2] for note in findings.notes]
 
 
-def problem(read: Read, text: str) -> str:
+def problem(read: Read, text: str, **files: str) -> str:
     with pytest.raises(InputError) as error:
-        read(text)
+        read(text, **files)
     assert "\n" not in str(error.value)
     return str(error.value)
 
@@ -401,6 +401,10 @@ def test_parameter_set_inside_an_fmu(files, tmp_path: Path):
         (system(component("a"), connection("a.y", "a.z")), "a has no port or parameter 'z'"),
         (system(component("a"), connection("a.y", "b.u")), "there is no element 'b'"),
         (system(component("a"), connection("a.y", "U")), "a connection to U, which is not there"),
+        (system(component("a"), connection("aa.y", "a.u")), "no element 'aa'; did you mean a?"),
+        (system(component("a"), connection("a.y", "a.U")), "parameter 'U'; did you mean u?"),
+        (system(component("a"), connection("a.y", "up"), connector("u", "output")),
+         "a connection to up, which is not there; did you mean u?"),
         (system(component("a"), connection("a.y", "a.x")), "a.y -> a.x: cannot be connected"),
         (system(component("a"), connection("a.y", "a.u") + connection("a.x", "a.u")),
          "a.u is fed by a.y and by a.x"),
@@ -469,6 +473,11 @@ def test_parameter_set_inside_an_fmu(files, tmp_path: Path):
 )  # fmt: skip
 def test_what_cannot_be_run_is_said_by_name(read: Read, text: str, why: str):
     assert why in problem(read, text)
+
+
+def test_a_parameter_set_that_is_no_xml_is_named_once(read: Read):
+    text = problem(read, system(component("a", bindings=binding(source="s.ssv"))), s__ssv="k = 1")
+    assert text.count("test.ssp") == 1 and "s.ssv: not well-formed XML" in text
 
 
 def test_all_problems_are_collected(read: Read):
