@@ -11,8 +11,9 @@ from orchestrator.commands.streams import show
 from orchestrator.experiments.preparation import SOME_TIME, Request, loaded, prepare
 from orchestrator.experiments.waypoints import impossible_paths
 from orchestrator.findings import Findings
-from orchestrator.master.binary import check_binary
+from orchestrator.master.binary import binary_of, check_binary
 from orchestrator.master.schedule import delays
+from orchestrator.system.component import Component
 from orchestrator.system.examination import examine, surprises
 
 
@@ -48,9 +49,16 @@ def _fmu(options: argparse.Namespace, findings: Findings) -> list[str]:
     component = examine(Path(options.file), findings)
     if component is None:
         return []
+    return _binary(component, findings) + list(surprises(component))
+
+
+def _binary(component: Component, findings: Findings) -> list[str]:
+    """Look at the library of an FMU; returns what is to be known of it."""
     with findings.collecting():
         check_binary(component, component.folder)
-    return list(surprises(component))
+        if not binary_of(component, component.folder).is_file():
+            return ["has no binary for this machine: a run compiles its sources first"]
+    return []
 
 
 def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
@@ -59,9 +67,8 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
     with findings.collecting():
         scenario, system = loaded(options.file, variant=options.variant, findings=findings)
         for name, component in system.components.items():
-            with findings.collecting():
-                check_binary(component, component.folder)
-            to_know += [f"{name}: {text}" for text in surprises(component)]
+            known = (*_binary(component, findings), *surprises(component))
+            to_know += [f"{name}: {text}" for text in known]
         request = Request()
         if scenario.stop_time is None and system.stop_time is None:
             to_know.append("names no stop time: a run wants --stop-time")

@@ -18,6 +18,7 @@ from fmpy.fmi2 import FMU2Slave, fmi2Error, fmi2Status
 
 from orchestrator.errors import InputError, reason
 from orchestrator.master.mode import put_back
+from orchestrator.master.sources import check_compiler, compile_into, sources_of
 from orchestrator.master.surroundings import within
 from orchestrator.system.component import Component
 from orchestrator.system.unpacking import check_place, runs_python
@@ -104,6 +105,7 @@ class Library:
         """
         check_place(folder)
         check_binary(component, folder)
+        make_binary(component, folder)
         try:
             # fmpy changes the current folder meanwhile, and leaves it so if it fails.
             with within(folder):
@@ -127,21 +129,43 @@ def named(component: Component) -> str:
     return f"{component.name}: {component.fmu.name}"
 
 
-def check_binary(component: Component, folder: Path) -> None:
-    """Check that an FMU, unpacked into a folder, has a whole library for this machine.
+def binary_of(component: Component, folder: Path) -> Path:
+    """Where the library of an unpacked FMU for this machine is, if it has one."""
+    identifier = component.description.coSimulation.modelIdentifier
+    name = f"{identifier}{fmpy.sharedLibraryExtension}"
+    return Path(folder, "binaries", fmpy.platform, name)
+
+
+def make_binary(component: Component, folder: Path) -> None:
+    """Compile an unpacked FMU that has sources and no library for this machine.
 
     Raises:
-        InputError: it has none.
+        InputError: it cannot be compiled.
+
+    """
+    binary = binary_of(component, folder)
+    if not binary.is_file() and (sources := sources_of(component, folder)):
+        compile_into(component, sources, binary)
+
+
+def check_binary(component: Component, folder: Path) -> None:
+    """Check that an FMU, unpacked into a folder, has a whole library for this machine, or sources.
+
+    Raises:
+        InputError: it has neither.
 
     """
     binaries = folder / "binaries"
     identifier = component.description.coSimulation.modelIdentifier
     suffix = fmpy.sharedLibraryExtension
-    file = f"{identifier}{suffix}"
-    if (binaries / fmpy.platform / file).is_file():
-        for path in sorted((binaries / fmpy.platform).iterdir()):
+    binary = binary_of(component, folder)
+    if binary.is_file():
+        for path in sorted(binary.parent.iterdir()):
             if path.is_file() and _is_cut_short(path):
                 raise InputError(f"{named(component)}: its {path.name} is cut short: get it anew")
+        return
+    if sources_of(component, folder):
+        check_compiler(component)
         return
     others = sorted({path.parent.name for path in binaries.glob(f"*/{glob.escape(identifier)}.*")})
     named_otherwise = sorted(path.name for path in (binaries / fmpy.platform).glob(f"*{suffix}"))
@@ -152,7 +176,7 @@ def check_binary(component: Component, folder: Path) -> None:
     else:
         there = "no binaries at all"
     raise InputError(
-        f"{named(component)} has no {file} for this machine, {fmpy.platform}: it has {there}"
+        f"{named(component)} has no {binary.name} for this machine, {fmpy.platform}: it has {there}"
     )
 
 
