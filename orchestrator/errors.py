@@ -73,5 +73,6 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     """A hint at names that resemble a mistaken one, or begin with it; empty if there is none."""
     names = list(known)
     members = [other for other in names if other.startswith((f"{name}[", f"{name}."))]
-    near = members[:3] or get_close_matches(name, names, n=3)
+    same = [other for other in names if other.casefold() == name.casefold()]
+    near = members[:3] or same[:3] or get_close_matches(name, names, n=3)
     return f"; did you mean {' or '.join(near)}?" if near else ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 from typing import TextIO
@@ -33,6 +33,13 @@ def explained(path: Path, what: str) -> Iterator[None]:
         raise InputError(f"{path}: {what}: nested too deeply") from error
     except ValueError as error:
         raise InputError(f"{path}: {what}: {reason(error)}") from error
+
+
+def is_folder(path: Path) -> bool:
+    """Whether there is such a folder; what cannot be the name of one is none."""
+    with suppress(OSError, ValueError):
+        return path.is_dir()
+    return False
 
 
 def check_file(path: Path) -> None:

@@ -8,15 +8,13 @@ from typing import Any
 
 from orchestrator.commands.options import BAD_INPUT, OK, add_variant
 from orchestrator.commands.streams import show
-from orchestrator.experiments.preparation import Request, loaded, prepare
+from orchestrator.experiments.preparation import SOME_TIME, Request, loaded, prepare
 from orchestrator.experiments.waypoints import impossible_paths
 from orchestrator.findings import Findings
-from orchestrator.master.binary import check_binary
+from orchestrator.master.binary import binary_of, check_binary
+from orchestrator.system.component import Component
 from orchestrator.system.examination import examine, surprises
 from orchestrator.system.graph import rings
-
-#: How long a run could last that nobody makes [s].
-_SOME_TIME = 1.0
 
 
 def add_to(commands: Any) -> None:
@@ -24,9 +22,7 @@ def add_to(commands: Any) -> None:
     check = commands.add_parser(
         "check", help="say all that is wrong with an FMU, an SSP or a scenario"
     )
-    check.add_argument(
-        "file", metavar="FILE.fmu|FILE.ssp|FILE.toml|SCENARIO", help="what is looked at, not run"
-    )
+    check.add_argument("file", metavar="FILE|DIR|SCENARIO", help="what is looked at, not run")
     add_variant(check)
     check.set_defaults(action=_check)
 
@@ -53,9 +49,16 @@ def _fmu(options: argparse.Namespace, findings: Findings) -> list[str]:
     component = examine(Path(options.file), findings)
     if component is None:
         return []
+    return _binary(component, findings) + list(surprises(component))
+
+
+def _binary(component: Component, findings: Findings) -> list[str]:
+    """Look at the library of an FMU; returns what is to be known of it."""
     with findings.collecting():
         check_binary(component, component.folder)
-    return list(surprises(component))
+        if not binary_of(component, component.folder).is_file():
+            return ["has no binary for this machine: a run compiles its sources first"]
+    return []
 
 
 def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
@@ -64,13 +67,12 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
     with findings.collecting():
         scenario, system = loaded(options.file, variant=options.variant, findings=findings)
         for name, component in system.components.items():
-            with findings.collecting():
-                check_binary(component, component.folder)
-            to_know += [f"{name}: {text}" for text in surprises(component)]
+            known = (*_binary(component, findings), *surprises(component))
+            to_know += [f"{name}: {text}" for text in known]
         request = Request()
         if scenario.stop_time is None and system.stop_time is None:
             to_know.append("names no stop time: a run wants --stop-time")
-            request = Request(stop_time=(system.start_time or 0.0) + _SOME_TIME)
+            request = Request(stop_time=(system.start_time or 0.0) + SOME_TIME)
         prepared = prepare(scenario, system, request)
         for text in impossible_paths(prepared.system):
             findings.problem(text)

@@ -27,7 +27,14 @@ from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.exchange.verify import verify
 from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.folder import replaced
-from orchestrator.experiments.preparation import DEFAULT_STEP, Request, left_behind, load, prepare
+from orchestrator.experiments.preparation import (
+    DEFAULT_STEP,
+    SOME_TIME,
+    Request,
+    left_behind,
+    load,
+    prepare,
+)
 from orchestrator.system.container import write_container
 from orchestrator.system.osp import write_osp
 from orchestrator.system.ssp.writing import write_ssp
@@ -89,19 +96,27 @@ def _add_scenario(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scenario",
         default="fig4",
-        metavar="SCENARIO|FILE.toml|FILE.ssp",
+        metavar="SCENARIO|FILE|DIR",
         help="what the other tool runs; default: fig4",
     )
 
 
 def _export(options: argparse.Namespace) -> int:
-    request = Request(step=options.step, parameters=assignments(options), strict=options.strict)
-    prepared = prepare(*read(options, options.fmi), request)
+    scenario, system = read(options, options.fmi)
+    ends = scenario.stop_time is not None or system.stop_time is not None
+    request = Request(
+        # What names no end is written without one.
+        stop_time=None if ends else (system.start_time or 0.0) + SOME_TIME,
+        step=options.step,
+        parameters=assignments(options),
+        strict=options.strict,
+    )
+    prepared = prepare(scenario, system, request)
     experiment = prepared.experiment
     system = replace(
         prepared.system,
         name=prepared.scenario.name,
-        stop_time=experiment.stop_time,
+        stop_time=experiment.stop_time if ends else None,
         step=experiment.step,
     )
     if left := left_behind(prepared.scenario):

@@ -25,8 +25,9 @@ def add_system(parser: argparse.ArgumentParser) -> None:
     """What is run."""
     parser.add_argument(
         "scenario",
-        metavar="SCENARIO|FILE.toml|FILE.ssp",
-        help="a scenario of `auv-fmu list`, a scenario file, or an SSP",
+        metavar="SCENARIO|FILE|DIR",
+        help="a scenario of `auv-fmu list`, a scenario file, an SSP or the folder of one that is "
+        "unpacked, an FMU, or libcosim's OspSystemStructure.xml",
     )
     add_variant(parser)
     parser.add_argument(

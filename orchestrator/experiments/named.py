@@ -30,7 +30,7 @@ def path_of(name: str, folder: Path, what: str, files: str) -> Path:
     known = names_in(folder)
     if name not in known:
         raise InputError(
-            f"no {what} {name!r}; there are {', '.join(known)}, or give a {files} file"
+            f"no {what} {name!r}; there are {', '.join(known)}, or give {files}"
             f"{did_you_mean(name, known)}"
         )
     return folder / f"{name}.toml"

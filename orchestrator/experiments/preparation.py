@@ -1,9 +1,10 @@
-"""From a name to what is run: a scenario or an SSP, with the user's changes."""
+"""From a name to what is run: a scenario or a file of others, with the user's changes."""
 
 from __future__ import annotations
 
+import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import FMI, PYTHON, current_fmus
 from orchestrator.experiments.events import check_events, read_events, shared_events
 from orchestrator.experiments.inputs import Inputs, read_inputs
-from orchestrator.experiments.scenario import Scenario, read_scenario
+from orchestrator.experiments.scenario import Scenario, names, read_scenario
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.findings import Findings
 from orchestrator.master.attendant import Attendant
@@ -25,12 +26,16 @@ from orchestrator.master.isolated import Isolation
 from orchestrator.master.linear import check_linear
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
 from orchestrator.master.observer import Ending
-from orchestrator.master.paces import paces, with_common_step
+from orchestrator.master.paces import paces, step_of, with_common_step
 from orchestrator.master.playback import Course, Playback
 from orchestrator.master.real_time import check_factor
 from orchestrator.master.schedule import stages
-from orchestrator.system.component import RUNNABLE, WRITABLE
+from orchestrator.reading import is_folder
+from orchestrator.system.component import RUNNABLE, WRITABLE, read_component
 from orchestrator.system.names import PortName
+from orchestrator.system.osp import STRUCTURE as OSP
+from orchestrator.system.osp import read_osp
+from orchestrator.system.ssp import STRUCTURE as SSD
 from orchestrator.system.ssp.reading import read_ssp
 from orchestrator.system.structure import System
 
@@ -38,6 +43,9 @@ T = TypeVar("T")
 
 #: Communication step of the paper [s], for systems that name none.
 DEFAULT_STEP = STEP
+
+#: How long a run could last that nobody makes [s].
+SOME_TIME = 1.0
 
 
 @dataclass(frozen=True)
@@ -108,12 +116,13 @@ class Prepared:
 def load(
     name: str | Path, kind: str = PYTHON, *, variant: str | None = None, strict: bool = False
 ) -> System:
-    """The system of a scenario, or of an SSP, with its experiment.
+    """The system of a scenario, or of a file of others, with its experiment.
 
     What is not as it should be and does no harm is a warning.
 
     Args:
-        name: of a scenario of the bundle, or path of a .toml or .ssp file.
+        name: of a scenario of the bundle, or path of a .toml file, an SSP, an FMU, or libcosim's
+            OspSystemStructure.xml; an SSP and the latter may also be a folder.
         kind: of the bundle's FMUs, `python` or `native`.
         variant: which of the descriptions in an SSP; None: the default.
         strict: refuse what otherwise is a warning.
@@ -154,7 +163,8 @@ def loaded(
     """A scenario and its system.
 
     Args:
-        name: of a scenario of the bundle, or path of a .toml or .ssp file.
+        name: of a scenario of the bundle, or path of a .toml file, an SSP, an FMU, or libcosim's
+            OspSystemStructure.xml; an SSP and the latter may also be a folder.
         kind: of the bundle's FMUs, `python` or `native`; FMUs that a file names are as they are.
         fmi: their version of FMI. The master can step those of the first.
         variant: which of the descriptions in an SSP; None: the default.
@@ -164,16 +174,60 @@ def loaded(
         InputError: there is no such scenario, or its system cannot be put together.
 
     """
-    if name.endswith(".ssp"):
-        check_brings_its_own(name, kind, fmi)
-        system = read_ssp(Path(name), variant, findings)
-        return Scenario(Path(name).stem, title=Path(name).name), system
-    if variant is not None:
+    path = Path(name)
+    read = _reader(path)
+    if variant is not None and read is not read_ssp:
         raise InputError(f"{name}: has no variants; an SSP may have")
+    if read is not None:
+        check_brings_its_own(name, kind, fmi)
+        system = read_ssp(path, variant, findings) if read is read_ssp else read(path, findings)
+        whole = path.resolve()
+        named = whole.parent if path.name in (SSD, OSP) else whole
+        return Scenario(named.stem, title=path.name or named.name), system
     scenario = read_scenario(name)
     check_figure(scenario.figure)
     versions = RUNNABLE if fmi == FMI[0] else WRITABLE
     return scenario, closed_loop(current_fmus(kind, fmi), scenario, versions)
+
+
+def read_fmu(path: Path, findings: Findings | None = None) -> System:
+    """A system of one FMU, with the experiment that it was made for.
+
+    Raises:
+        InputError: the file is missing, or is no FMU that can be run.
+
+    """
+    name = re.sub(r"\W", "_", path.stem)
+    component = read_component(name, path, findings=findings)
+    return System(
+        name=path.stem,
+        components={name: component},
+        connections=(),
+        start_time=component.experiment("startTime"),
+        stop_time=component.experiment("stopTime"),
+        step=step_of(component),
+    )
+
+
+#: Who reads what is no scenario, by the endings of files.
+_READERS: Mapping[str, Callable[..., System]] = {
+    ".ssp": read_ssp,
+    ".ssd": read_ssp,
+    ".xml": read_osp,
+    ".fmu": read_fmu,
+}
+
+
+def is_path(name: str) -> bool:
+    """Whether what is run is named by a path: all else is the name of a scenario."""
+    return name.endswith((".toml", *_READERS))
+
+
+def _reader(path: Path) -> Callable[..., System] | None:
+    """Who reads a file or folder; None: it is a scenario."""
+    if path.suffix in _READERS or str(path) in names() or not is_folder(path):
+        return _READERS.get(path.suffix)
+    return read_osp if (path / OSP).is_file() and not (path / SSD).is_file() else read_ssp
 
 
 def left_behind(scenario: Scenario) -> str | None:

@@ -35,6 +35,9 @@ _WHAT = "not a scenario"
 
 FOLDER = Path(__file__).parent / "scenarios"
 
+#: What is run besides those that come with the bundle.
+KINDS = "a .toml, .ssp, .ssd or .fmu file, an OspSystemStructure.xml, or a folder with a .ssd"
+
 
 @dataclass(frozen=True)
 class Scenario:
@@ -156,8 +159,8 @@ ENTRIES: dict[str, Entry] = {
         "table of names, or false",
         _is_table_of_wires,
         'Further wires, as `"component.group" = "component.group"`: every input of the group on '
-        "the left takes the output of the same name in the group on the right. `false` removes "
-        "a wire.",
+        "the left takes the output of the same name in the group on the right. Where both sides "
+        'name a port, that one is wired, as `"g.u[1]" = "t.y"`. `false` removes a wire.',
         "none",
     ),
     "parameters": Entry(
@@ -207,7 +210,7 @@ def read_scenario(name: str) -> Scenario:
         InputError: there is no such scenario, or its file has a mistake.
 
     """
-    path = path_of(name, FOLDER, "scenario", ".toml or .ssp")
+    path = path_of(name, FOLDER, "scenario", KINDS)
     text = text_of(path, _WHAT)
     with explained(path, _WHAT):
         return _scenario(path, text)

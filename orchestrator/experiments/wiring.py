@@ -99,33 +99,48 @@ def _changed(
             f"there are {', '.join(there)}"
         )
     if scenario.only:
+        left = there.keys() - {*scenario.only}
         there = {name: fmu for name, fmu in there.items() if name in scenario.only}
         wired = {
             target: source
             for target, source in wired.items()
-            if {target.split(".")[0], source.split(".")[0]} <= there.keys()
+            if left.isdisjoint((target.split(".")[0], source.split(".")[0]))
         }
     return there, wired
 
 
 def _wire(components: Mapping[str, Component], target: str, source: str) -> list[Connection]:
-    """The connections of one wire: every input of the target group takes its namesake."""
+    """The connections of one wire: of two ports, or every input of a group takes its namesake."""
     to, group = port_name(target).component, port_name(target).port
     start, source_group = port_name(source).component, port_name(source).port
     for name in (to, start):
         if name not in components:
-            raise InputError(f"wire {source} -> {target}: there is no component {name!r}")
-    inputs = [
-        variable.name
-        for variable in components[to].having("input")
-        if variable.name.startswith(f"{group}.")
-    ]
-    if not inputs:
+            raise InputError(
+                f"wire {source} -> {target}: there is no component {name!r}"
+                f"{did_you_mean(name, components)}"
+            )
+    inputs = [variable.name for variable in components[to].having("input")]
+    outputs = components[start].variables
+    if group in components[to].variables and source_group in outputs:
+        return [Connection(PortName(start, source_group), PortName(to, group))]
+    members = [name for name in inputs if name.startswith(f"{group}.")]
+    if group in inputs and not members:
         raise InputError(
-            f"wire {source} -> {target}: {to} has no inputs {group}.*; a scenario removes a wire "
-            f'with "{target}" = false under [wires]'
+            f"wire {source} -> {target}: {target} is one input, and {start} has no port "
+            f"{source_group!r}{did_you_mean(source_group, outputs)}"
+        )
+    if not members:
+        raise InputError(
+            f"wire {source} -> {target}: {to} has no input {group} nor inputs {group}.*"
+            f'{did_you_mean(group, inputs)}; a scenario removes a wire with "{target}" = false '
+            "under [wires]"
+        )
+    if source_group in outputs and not any(name.startswith(f"{source_group}.") for name in outputs):
+        raise InputError(
+            f"wire {source} -> {target}: {source} is one port, and {target} a group of inputs; "
+            f"wire one of them{did_you_mean(group, members)}"
         )
     return [
         Connection(PortName(start, source_group + name.removeprefix(group)), PortName(to, name))
-        for name in inputs
+        for name in members
     ]

@@ -7,6 +7,7 @@ module                  what it holds
 :mod:`.simulation`      a run from the first exchange to the last step
 :mod:`.instance`        what a run asks of a component
 :mod:`.binary`          the library of an FMU, loaded once a process
+:mod:`.sources`         that library compiled, where an FMU has none for this machine
 :mod:`.loaded`          an FMU loaded into this process
 :mod:`.isolated`        an FMU in a process of its own, from this side
 :mod:`.placing`         in which process each FMU runs

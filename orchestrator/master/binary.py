@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +18,7 @@ from fmpy.fmi2 import FMU2Slave, fmi2Error, fmi2Status
 
 from orchestrator.errors import InputError, reason
 from orchestrator.master.mode import put_back
+from orchestrator.master.sources import check_compiler, compile_into, sources_of
 from orchestrator.master.surroundings import within
 from orchestrator.system.component import Component
 from orchestrator.system.unpacking import check_place, runs_python
@@ -26,6 +28,13 @@ _OWN = "auv-fmu "
 
 #: What only FMUs with some capability need, and some of the others lack.
 _OPTIONAL = ("FMUstate", "Derivative", "Status", "CancelStep", "DebugLogging")
+
+#: How ELF files of 32 and of 64 bits say where they have what: the place and form of that part of
+#: their header, and the length and form of the entries for their segments.
+_ELF = {1: (28, "3I5H", 32, "2I8xI"), 2: (32, "2QI5H", 56, "I4xQ16xQ")}
+
+#: The kind of segments that are mapped into memory.
+_LOADED = 1
 
 
 class FMU2OfOthers(FMU2Slave):  # type: ignore[misc]
@@ -96,6 +105,7 @@ class Library:
         """
         check_place(folder)
         check_binary(component, folder)
+        make_binary(component, folder)
         try:
             # fmpy changes the current folder meanwhile, and leaves it so if it fails.
             with within(folder):
@@ -119,18 +129,43 @@ def named(component: Component) -> str:
     return f"{component.name}: {component.fmu.name}"
 
 
-def check_binary(component: Component, folder: Path) -> None:
-    """Check that an FMU, unpacked into a folder, has a library for this machine.
+def binary_of(component: Component, folder: Path) -> Path:
+    """Where the library of an unpacked FMU for this machine is, if it has one."""
+    identifier = component.description.coSimulation.modelIdentifier
+    name = f"{identifier}{fmpy.sharedLibraryExtension}"
+    return Path(folder, "binaries", fmpy.platform, name)
+
+
+def make_binary(component: Component, folder: Path) -> None:
+    """Compile an unpacked FMU that has sources and no library for this machine.
 
     Raises:
-        InputError: it has none.
+        InputError: it cannot be compiled.
+
+    """
+    binary = binary_of(component, folder)
+    if not binary.is_file() and (sources := sources_of(component, folder)):
+        compile_into(component, sources, binary)
+
+
+def check_binary(component: Component, folder: Path) -> None:
+    """Check that an FMU, unpacked into a folder, has a whole library for this machine, or sources.
+
+    Raises:
+        InputError: it has neither.
 
     """
     binaries = folder / "binaries"
     identifier = component.description.coSimulation.modelIdentifier
     suffix = fmpy.sharedLibraryExtension
-    file = f"{identifier}{suffix}"
-    if (binaries / fmpy.platform / file).is_file():
+    binary = binary_of(component, folder)
+    if binary.is_file():
+        for path in sorted(binary.parent.iterdir()):
+            if path.is_file() and _is_cut_short(path):
+                raise InputError(f"{named(component)}: its {path.name} is cut short: get it anew")
+        return
+    if sources_of(component, folder):
+        check_compiler(component)
         return
     others = sorted({path.parent.name for path in binaries.glob(f"*/{glob.escape(identifier)}.*")})
     named_otherwise = sorted(path.name for path in (binaries / fmpy.platform).glob(f"*{suffix}"))
@@ -141,8 +176,30 @@ def check_binary(component: Component, folder: Path) -> None:
     else:
         there = "no binaries at all"
     raise InputError(
-        f"{named(component)} has no {file} for this machine, {fmpy.platform}: it has {there}"
+        f"{named(component)} has no {binary.name} for this machine, {fmpy.platform}: it has {there}"
     )
+
+
+def _is_cut_short(path: Path) -> bool:
+    """Whether an ELF file ends before what its header tells of: reading that ends the process.
+
+    The loaders of other systems look for themselves.
+    """
+    with path.open("rb") as file:
+        head = file.read(64).ljust(64, b"\0")
+        if head[:4] != b"\x7fELF" or head[4] not in _ELF or head[5] not in (1, 2):
+            return False
+        order, (start, header, width, segment) = "<>"[head[5] - 1], _ELF[head[4]]
+        segments, sections, _, _, length, count, section_length, section_count = struct.unpack_from(
+            order + header, head, start
+        )
+        ends: list[int] = [segments + length * count, sections + section_length * section_count]
+        file.seek(segments)
+        table = file.read(length * count)
+        for at in range(0, len(table) - width + 1, max(length, width)):
+            kind, offset, size = struct.unpack_from(order + segment, table, at)
+            ends += [offset + size] * (kind == _LOADED)
+        return path.stat().st_size < max(ends)
 
 
 #: Libraries by the folders into which their FMUs are unpacked, for runs in several threads.

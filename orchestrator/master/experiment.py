@@ -68,12 +68,11 @@ class Experiment:
                 object.__setattr__(self, name, float(value))
             except OverflowError:
                 raise InputError("times and step must be smaller than 1e308 s") from None
-        if not all(isfinite(value) and value > 0.0 for value in (self._length, self.step)):
-            after = f" after {self.start_time:g} s" if self.start_time else ""
-            raise InputError(
-                f"stop time {self.stop_time:g} s{after} and step {self.step:g} s must be positive, "
-                "and finite"
-            )
+        if not (isfinite(self.step) and self.step > 0.0):
+            raise InputError(f"step {self.step:g} s must be positive, and finite")
+        if not (isfinite(self._length) and self._length > 0.0):
+            than = f"after the start time, {self.start_time:g} s" if self.start_time else "positive"
+            raise InputError(f"stop time {self.stop_time:g} s must be {than}, and finite")
         if self._length / self.step > MOST_STEPS:
             raise InputError(
                 f"{self._length:g} s in steps of {self.step:g} s are more than {MOST_STEPS:,} steps"

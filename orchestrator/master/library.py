@@ -60,19 +60,24 @@ def made(in_no_time: bool = False) -> CDLL:
         InputError: it cannot be; the text says what to do.
 
     """
-    compiler = _of_the_machine() or (None if in_no_time else _zig())
-    if compiler is None:
+    found = _of_the_machine() if in_no_time else compiler()
+    if found is None:
         raise InputError(
             "the compiled loop needs a C compiler: install gcc or clang, or `pip install ziglang`"
         )
     try:
-        return _made(compiler)
+        return _made(found)
     except OSError as error:
         raise InputError(f"the loop cannot be compiled: {reason(error)}") from error
 
 
 #: A compiler: a call with its arguments.
 _Compiler = Callable[..., CompletedProcess[str]]
+
+
+def compiler() -> _Compiler | None:
+    """A C compiler: this machine's, or else that of a package; None: there is none."""
+    return _of_the_machine() or _zig()
 
 
 def machines_compiler() -> str | None:

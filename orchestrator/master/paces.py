@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from math import gcd, isfinite, lcm
@@ -13,7 +12,6 @@ from orchestrator.errors import InputError
 from orchestrator.master.experiment import MOST_STEPS, ROUNDING
 from orchestrator.system.component import Component
 from orchestrator.system.structure import System
-from orchestrator.system.values import real
 
 #: So many times a common measure of steps may go into the smallest of them.
 _MOST_PARTS = 1000
@@ -64,11 +62,8 @@ def with_common_step(system: System) -> System:
 
 def step_of(component: Component) -> float | None:
     """The step that an FMU was made for [s]; None: it does not say."""
-    experiment = component.description.defaultExperiment
-    with suppress(ValueError):
-        step = real(str(experiment.stepSize)) if experiment is not None else 0.0
-        return step if isfinite(step) and step > 0.0 else None
-    return None
+    step = component.experiment("stepSize")
+    return step if step is not None and step > 0.0 else None
 
 
 def _common_measure(steps: Iterable[float]) -> float:

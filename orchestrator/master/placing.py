@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from threading import Lock
 
+from orchestrator.master.binary import make_binary
 from orchestrator.master.instance import Instance
 from orchestrator.master.interrupts import Interrupts
 from orchestrator.master.isolated import Isolation, isolated
@@ -51,6 +52,9 @@ def placed(
         instances = stack.enter_context(all_loaded(here, log))
         if apart:
             how = isolation or Isolation()
+            for component in apart.values():
+                # Here there is time for it, and somebody to tell.
+                make_binary(component, component.folder)
             instances |= stack.enter_context(isolated(apart, log, how, interrupts))
         yield {name: instances[name] for name in components}
 

@@ -22,6 +22,7 @@ from orchestrator.experiments.entries import (
     is_text,
 )
 from orchestrator.experiments.named import names_in, path_of
+from orchestrator.experiments.preparation import is_path
 from orchestrator.master.experiment import ORDERS
 from orchestrator.reading import explained, text_of
 from orchestrator.system.names import file_name, port_name
@@ -152,8 +153,9 @@ ENTRIES: dict[str, Entry] = {
     "scenario": Entry(
         "name, or list of names",
         _is_text_or_names,
-        "What is run: a scenario of `auv-fmu list`, or the path of a .toml or .ssp file, relative "
-        "to this one. Of several, each is run at every point, with the parameters that it has.",
+        "What is run: a scenario of `auv-fmu list`, or the path of a .toml, .ssp, .ssd or .fmu "
+        "file, or of an OspSystemStructure.xml, relative to this one. Of several, each is run at "
+        "every point, with the parameters that it has.",
         "",
     ),
     "title": Entry("text", is_text, "Heading of the figures.", "none"),
@@ -231,7 +233,7 @@ def read_study(name: str) -> Study:
         InputError: there is no such study, or its file has a mistake.
 
     """
-    path = path_of(name, FOLDER, "study", ".toml")
+    path = path_of(name, FOLDER, "study", "a .toml file")
     text = text_of(path, _WHAT)
     with explained(path, _WHAT):
         return study_of(path.stem, tomllib.loads(text), path)
@@ -256,7 +258,7 @@ def study_of(name: str, content: Mapping[str, Any], path: Path | None = None) ->
     entries = dict(content)
     names = content["scenario"]
     entries["scenario"] = tuple(
-        str(path.parent / scenario) if path and scenario.endswith((".toml", ".ssp")) else scenario
+        str(path.parent / scenario) if path and is_path(scenario) else scenario
         for scenario in ([names] if is_text(names) else names)
     )
     entries["parameters"] = dict(flattened(content.get("parameters", {})))

@@ -14,7 +14,7 @@ from orchestrator.errors import InputError, did_you_mean
 from orchestrator.findings import Findings
 from orchestrator.system.description import described
 from orchestrator.system.unpacking import folder_of, unpacked
-from orchestrator.system.values import Value, typed
+from orchestrator.system.values import Value, finite, typed
 
 #: The versions of FMI that a system can be written with, and those that the master can step.
 WRITABLE, RUNNABLE = ("2.0", "3.0"), ("2.0",)
@@ -116,6 +116,13 @@ class Component:
                 value = self.start(name)
                 values |= {} if value is None else {name: value}
         return values
+
+    def experiment(self, name: str) -> float | None:
+        """What its DefaultExperiment says, such as `stopTime` [s]; None: no number, or nothing."""
+        stated = getattr(self.description.defaultExperiment, name, None)
+        with suppress(ValueError):
+            return None if stated is None else finite(stated, name)
+        return None
 
     def is_settable(self, name: str) -> bool:
         """Whether a variable takes a value before the first step (FMI 2.0.4, section 2.2.7).

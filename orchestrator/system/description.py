@@ -72,6 +72,8 @@ def described(fmu: Path, folder: Path, versions: Sequence[str]) -> Described:
         InputError: it is no such FMU.
 
     """
+    if not (folder / "modelDescription.xml").is_file():
+        raise InputError(f"{fmu}: not a readable FMU: it holds no modelDescription.xml")
     try:
         version = _version(folder / "modelDescription.xml")
         if version not in versions:
@@ -118,6 +120,9 @@ def _contradictions(description: ModelDescription) -> Iterator[str]:
 def _misread(file: Path) -> Iterator[str]:
     """Numbers of a description that Python takes for others, or that are none."""
     for element in _elements(ElementTree.parse(file).getroot()):
+        for name in ("name", "value") if element.tag == "Item" else ():
+            if name not in element.attrib:
+                yield f"an <Item> of an enumeration has no {name}"
         for kind, names in ((integer, _INTEGERS), (real, _REALS)):
             for name in names.intersection(element.attrib):
                 text = element.attrib[name]

@@ -39,6 +39,9 @@ _MOST_OF_A_PROCESS = 2**33
 #: Files of an archive that are read into memory, and how long they may be [bytes].
 _DESCRIPTIONS, _MOST_OF_A_DESCRIPTION = (".xml", ".ssd", ".ssv", ".ssm"), 100_000_000
 
+#: How a file begins that Git has left in the place of another one.
+_POINTER = b"version https://git-lfs.github.com/spec/"
+
 #: Runs in several threads share what is unpacked.
 _LOCK = Lock()
 
@@ -80,6 +83,11 @@ def unpacked(archive: Path) -> Unpacked:
     check_file(archive)
     try:
         with _LOCK, archive.open("rb") as file:
+            if file.peek(len(_POINTER)).startswith(_POINTER):
+                raise InputError(
+                    f"{archive}: is a pointer of Git LFS, not the file that it stands for: get "
+                    "that with `git lfs pull`"
+                )
             return _unpacked(archive, file)
     except InputError:
         raise

@@ -31,7 +31,7 @@ def test_readme_names_the_command(name):
 
 
 def test_readme_names_every_option_of_run():
-    described = README.split("auv-fmu run SCENARIO|FILE.toml", 1)[1].split("    auv-fmu ", 1)[0]
+    described = README.split("auv-fmu run SCENARIO|FILE", 1)[1].split("    auv-fmu ", 1)[0]
     options = {o for action in commands()["run"]._actions for o in action.option_strings}
     assert options - {"-h", "--help"} == set(re.findall(r"--[\w-]+", described))
 

@@ -115,3 +115,21 @@ def test_what_cannot_be_read_is_one_problem(workplace, capsys, ending, content):
     assert main(["check", str(path)]) in ((0, 2) if ending == "toml" and content == b"" else (2,))
     [line] = lines(capsys)
     assert path.name in line
+
+
+@pytest.mark.parametrize("ending", ["fmu", "ssp"])
+def test_a_pointer_of_git_lfs_is_called_so(workplace, capsys, ending):
+    Path(f"m.{ending}").write_text(
+        "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a2146\nsize 12345\n"
+    )
+    assert main(["check", f"m.{ending}"]) == 2
+    [line] = lines(capsys)
+    assert f"m.{ending}: is a pointer of Git LFS" in line and "`git lfs pull`" in line
+
+
+def test_an_archive_without_a_description_is_no_fmu(workplace, capsys):
+    with ZipFile("m.fmu", "w") as archive:
+        archive.writestr("m/modelDescription.xml", "<fmiModelDescription/>")
+    assert main(["check", "m.fmu"]) == 2
+    [line] = lines(capsys)
+    assert line.endswith("not a readable FMU: it holds no modelDescription.xml")

@@ -250,7 +250,7 @@ def test_animation_is_written(workplace):
         (["run", "fig4", "--order="], "--order= says nothing"),
         (["plot", ""], "the argument after plot is empty"),
         (["build", "--out", "file/below"], "cannot write into"),
-        (["run", "wire.toml"], "controller has no inputs dy.*"),
+        (["run", "wire.toml"], "controller has no input dy nor inputs dy.*"),
         (["run", "wires.toml"], "not a table of names"),
         (["run", "only.toml"], "no such component"),
         (["run", "bool.toml"], "wrong type"),

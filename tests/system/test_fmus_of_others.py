@@ -226,6 +226,22 @@ def test_a_library_of_another_name_is_named(tmp_path: Path):
         run(system_of(renamed))
 
 
+@pytest.mark.parametrize("way", [WAYS["python"], WAYS["isolated"]])
+@pytest.mark.parametrize("share", [0.02, 0.5, 0.999])
+def test_a_library_cut_short_is_refused_before_it_is_loaded(tmp_path, capsys, share, way):
+    """The system would end the process that reads what is not there."""
+    cut = tmp_path / "cut.fmu"
+    with ZipFile(build(tmp_path)) as fmu, ZipFile(cut, "w") as archive:
+        for name in fmu.namelist():
+            content = fmu.read(name)
+            whole = len(content) if name.endswith(".xml") else int(share * len(content))
+            archive.writestr(name, content[:whole])
+    with pytest.raises(InputError, match=r"a: cut\.fmu: its others\.so is cut short"):
+        run(system_of(cut), **way)
+    assert main(["check", str(cut)]) == 2
+    assert "its others.so is cut short" in capsys.readouterr().out
+
+
 def test_an_fmu_that_cannot_be_instantiated_says_that_it_needs_a_tool(tmp_path):
     fmu = build(tmp_path, "ONCE", 'needsExecutionTool="true"')
     with pytest.raises(InputError) as error:
@@ -309,6 +325,20 @@ def test_numbers_of_descriptions_that_others_do_not_read_are_refused(
         change = text, instead
     with pytest.raises(InputError, match=f"not a readable FMU: {words}.*is no number"):
         read_component("a", build(tmp_path, change=change))
+
+
+@pytest.mark.parametrize(
+    ("item", "words"),
+    [
+        ('name="storm"', "an <Item> of an enumeration has no value"),
+        ('value="4"', "an <Item> of an enumeration has no name"),
+        ('name="storm" value="1.5"', "value of <Item> is '1.5', which is no number"),
+    ],
+)
+def test_items_of_enumerations_that_are_none_are_refused(tmp_path, item, words):
+    fmu = build(tmp_path, change=('name="storm" value="4"', item))
+    with pytest.raises(InputError, match=f"not a readable FMU: {words}"):
+        read_component("a", fmu)
 
 
 def test_words_of_tools_are_no_numbers(tmp_path):

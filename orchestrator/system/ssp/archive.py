@@ -1,4 +1,4 @@
-"""An SSP archive while it is read: its files, and what is found wrong with it."""
+"""An SSP archive or its folder while it is read: its files, and what is found wrong with it."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element
 
 from orchestrator.errors import InputError, did_you_mean, reason
 from orchestrator.findings import Findings
+from orchestrator.reading import check_file, is_folder
 from orchestrator.system.ssp import STRUCTURE
 from orchestrator.system.ssp.document import read_document
 from orchestrator.system.ssp.validation import violations
@@ -20,6 +21,9 @@ from orchestrator.system.unpacking import unpacked
 from orchestrator.system.values import finite, integer
 
 _SUFFIX = Path(STRUCTURE).suffix
+
+#: Endings of descriptions that are read where they are, with the files beside them.
+LOOSE = (_SUFFIX, ".xml")
 
 #: The version whose words are read; later ones have more of them, of which each is refused.
 _VERSION = "1.0"
@@ -32,28 +36,34 @@ _MOST_SAID = 5
 
 
 class Archive:
-    """An archive, unpacked, and the findings about it.
+    """An archive, unpacked, or a description in a folder, and the findings about it.
 
     Attributes:
-        path: of the archive.
-        folder: into which it is unpacked.
+        path: of the archive, or of the folder or the description.
+        folder: into which it is unpacked, or with the description.
         findings: what is wrong with it.
 
     """
 
     def __init__(self, path: Path, findings: Findings) -> None:
-        """Unpack it.
+        """Unpack what is no folder.
 
         Raises:
             InputError: it cannot be unpacked.
 
         """
         self.path, self.findings = path, findings
-        self.folder = unpacked(path).folder
+        is_whole = is_folder(path)
+        self._is_packed = not is_whole and path.suffix not in LOOSE
+        if self._is_packed:
+            self.folder = unpacked(path).folder
+        else:
+            self.folder = path.resolve() if is_whole else path.resolve().parent
 
     def problem(self, text: object) -> None:
         """Take note of what makes a run meaningless, or impossible."""
-        self.findings.problem(f"{self.path}: {text}")
+        said = str(text).removeprefix(f"{self.path}: ")
+        self.findings.problem(f"{self.path}: {said}")
 
     def note(self, text: object) -> None:
         """Take note of what changes no number."""
@@ -70,7 +80,8 @@ class Archive:
 
         """
         files = {path.stem: path for path in sorted(self.folder.glob(f"*{_SUFFIX}"))}
-        name = Path(STRUCTURE).stem if variant is None else variant.removesuffix(_SUFFIX)
+        default = self.path.name if self.path.suffix == _SUFFIX else STRUCTURE
+        name = (default if variant is None else variant).removesuffix(_SUFFIX)
         if name not in files:
             known = f"; it has {', '.join(files)}" if files else ""
             raise InputError(
@@ -87,9 +98,10 @@ class Archive:
 
         """
         name = path.relative_to(self.folder) if path.is_relative_to(self.folder) else path.name
-        text = path.read_bytes()
         remarks: list[str] = []
         try:
+            check_file(path)
+            text = path.read_bytes()
             root = read_document(text, remarks.append)
         except Exception as error:
             raise InputError(f"{self.path}: not a readable SSP: {name}: {reason(error)}") from error
@@ -117,10 +129,14 @@ class Archive:
         if "://" in source:
             self.problem(f"{needer}: {source!r} is elsewhere; a file in the archive is supported")
             return None
-        decoded = unquote(urlsplit(source).path)
+        try:
+            decoded = unquote(urlsplit(source).path)
+        except ValueError:
+            self.problem(f"{needer}: {source!r} is no URI")
+            return None
         for name in dict.fromkeys((decoded, source, source.replace("\\", "/"))):
             path = Path(os.path.normpath(base / name))
-            if not path.is_relative_to(base):
+            if self._is_packed and not path.is_relative_to(base):
                 self.problem(f"{needer}: {source!r} lies outside of the archive")
                 return None
             if path.is_file():

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, shortened
 from orchestrator.findings import Findings
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
@@ -27,10 +27,10 @@ _ROOT = "SystemStructureDescription"
 
 
 def read_ssp(path: Path, variant: str | None = None, findings: Findings | None = None) -> System:
-    """Read the system in an SSP archive.
+    """Read the system in an SSP archive, or in the folder of one that is unpacked.
 
     Args:
-        path: of the archive.
+        path: of the archive, the folder, or a description in it.
         variant: which of its descriptions; None: the default.
         findings: takes all that is wrong with it.
 
@@ -68,7 +68,7 @@ def _read(archive: Archive, root: Element) -> System:
     times = times_of(archive, root)
     steps = {".".join(way): step_of(archive, leaf) for way, leaf in leaves.items()}
     system = System(
-        name=content.get("name") or archive.path.stem,
+        name=content.get("name") or archive.path.resolve().stem,
         components=components,
         connections=tuple(ports.connections),
         parameters=ports.parameters,
@@ -212,12 +212,18 @@ class _Ports:
         items = {**connector.items, **given.items}
         value: object = items.get(given.text, given.text)
         if whole is not None:
-            value = whole(_number(str(value)))
+            value = whole(_number(port, str(value)))
         if isinstance(value, float) and value.is_integer() and connector.type != "Real":
             value = int(value)
         self.parameters[port] = typed(str(port), component.variable(port.port), value)
 
 
-def _number(text: str) -> float:
+def _number(port: PortName, text: str) -> float:
     """A value that is transformed, as a number."""
-    return float(BOOLEANS[text]) if text in BOOLEANS else real(text)
+    try:
+        return float(BOOLEANS[text]) if text in BOOLEANS else real(text)
+    except ValueError:
+        raise InputError(
+            f"{port} = {shortened(text)}: not a number, so it can be neither converted nor "
+            "transformed"
+        ) from None

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, did_you_mean
 from orchestrator.system.ssp.archive import Archive
 from orchestrator.system.ssp.hierarchy import GIVES, TAKES, Bus, Connector, Group, Leaf, Node
 from orchestrator.system.ssp.transformations import converts_units, transformation_of
@@ -176,13 +176,16 @@ class _End:
         if element is None:
             raise InputError(
                 f"a connection to {Node((*group.way, name or ''), port)}: "
-                f"there is no element {name!r}"
+                f"there is no element {name!r}{did_you_mean(name or '', group.members)}"
             )
         connector = element.connector(port)
         if connector is None:
             if isinstance(element, Leaf) and element.component is not None:
                 element.component.variable(port)
-            raise InputError(f"a connection to {Node(element.way, port)}, which is not there")
+            raise InputError(
+                f"a connection to {Node(element.way, port)}, which is not there"
+                f"{did_you_mean(port, element.connectors)}"
+            )
         outwards, inwards = connector.kind in GIVES, connector.kind in TAKES
         # Seen from within, a system's inputs give and its outputs take.
         gives, takes = (inwards, outwards) if element is group else (outwards, inwards)

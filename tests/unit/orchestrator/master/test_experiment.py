@@ -102,3 +102,20 @@ def test_a_step_of_a_component_may_be_beyond_all_multiples():
     system = replace(load("fig4", "native"), steps={"plant": 1e308})
     with pytest.raises(InputError, match=r"steps of 1e\+308 s, which are no multiple"):
         paces(system, 0.02)
+
+
+@pytest.mark.parametrize(
+    ("stop_time", "step", "start_time", "said"),
+    [
+        (1.0, 0.1, 5.0, "stop time 1 s must be after the start time, 5 s, and finite"),
+        (0.0, 0.1, 0.0, "stop time 0 s must be positive, and finite"),
+        (1.0, 0.0, 0.0, "step 0 s must be positive, and finite"),
+        (1.0, -0.1, 0.0, "step -0.1 s must be positive, and finite"),
+        (float("inf"), 0.1, 0.0, "stop time inf s must be positive, and finite"),
+        (1.0, float("nan"), 5.0, "step nan s must be positive, and finite"),
+    ],
+)
+def test_the_number_that_is_wrong_is_named(stop_time, step, start_time, said):
+    with pytest.raises(InputError) as error:
+        Experiment(stop_time, step, start_time=start_time)
+    assert str(error.value) == said

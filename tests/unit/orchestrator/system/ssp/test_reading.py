@@ -89,9 +89,9 @@ def notes(read: Read, text: str, **files: str) -> list[str]:
     return [note.partition("test.ssp: ")[2] for note in findings.notes]
 
 
-def problem(read: Read, text: str) -> str:
+def problem(read: Read, text: str, **files: str) -> str:
     with pytest.raises(InputError) as error:
-        read(text)
+        read(text, **files)
     assert "\n" not in str(error.value)
     return str(error.value)
 
@@ -204,7 +204,7 @@ def test_units_and_transformations_along_a_way_are_those_of_each_hop(read: Read,
     top = system(component("a", f"{source}.fmu") + inside, connection("a.y", f"{name}.u", texts[0]))
     [wire] = read(top).connections
     arrived = 7.0 if wire.transformation is None else wire.transformation(7.0)
-    assert arrived == pytest.approx(value, rel=1e-12)
+    assert arrived == pytest.approx(value, rel=1e-12, abs=1e-9)
 
 
 def test_a_value_that_nothing_changes_arrives_bit_for_bit(read: Read):
@@ -401,6 +401,10 @@ def test_parameter_set_inside_an_fmu(files, tmp_path: Path):
         (system(component("a"), connection("a.y", "a.z")), "a has no port or parameter 'z'"),
         (system(component("a"), connection("a.y", "b.u")), "there is no element 'b'"),
         (system(component("a"), connection("a.y", "U")), "a connection to U, which is not there"),
+        (system(component("a"), connection("aa.y", "a.u")), "no element 'aa'; did you mean a?"),
+        (system(component("a"), connection("a.y", "a.U")), "parameter 'U'; did you mean u?"),
+        (system(component("a"), connection("a.y", "up"), connector("u", "output")),
+         "a connection to up, which is not there; did you mean u?"),
         (system(component("a"), connection("a.y", "a.x")), "a.y -> a.x: cannot be connected"),
         (system(component("a"), connection("a.y", "a.u") + connection("a.x", "a.u")),
          "a.u is fed by a.y and by a.x"),
@@ -436,12 +440,22 @@ def test_parameter_set_inside_an_fmu(files, tmp_path: Path):
         (system(component("a", "../a.fmu")), "'../a.fmu' lies outside of the archive"),
         (system(component("a", "/etc/passwd")), "'/etc/passwd' lies outside of the archive"),
         (system(component("a", "http://x/a.fmu")), "'http://x/a.fmu' is elsewhere"),
+        (system(component("a", "//[x/a.fmu")), "'//[x/a.fmu' is no URI"),
         (system(component("a", type="text/x-modelica")), "type 'text/x-modelica' is not supported"),
         (system(component("a", implementation="ModelExchange")), "asks for ModelExchange"),
         (system('<ssd:Component name="a"/>'), "a component without a source"),
         (system('<ssd:SignalDictionaryReference name="a" dictionary="b"/>'), "dictionary 'b'"),
         (system(system(name="inner")), "holds no component"),
         (system(component("a", bindings=binding({"k": 'Real value="x"'}))), "a.k = x: not a real"),
+        (system(component("mm", "mm.fmu", binding({"k": 'Real value="1,5" unit="m"'}))),
+         "mm.k = 1,5: not a number, so it can be neither converted nor transformed"),
+        (system(component("a", bindings=binding({"k": 'String value="much"'}, mapping(
+            'source="k" target="k"|<ssc:LinearTransformation factor="2"/>')))),
+         "a.k = much: not a number"),
+        (system(component("a", bindings=binding({"k": 'Integer value="1_0"'}, mapping(
+            'source="k" target="Integer.k"|<ssc:IntegerMappingTransformation>'
+            '<ssc:MapEntry source="1" target="2"/></ssc:IntegerMappingTransformation>')))),
+         "a.Integer.k = 1_0: not a number"),
         (system(component("a", bindings=binding({"k": "Real"}))), "k: a parameter without a value"),
         (system(component("a", bindings=binding(source="none.ssv"))), "holds no 'none.ssv'"),
         (system(component("a", bindings=binding(source="a.csv", type="text/csv"))), "'text/csv'"),
@@ -459,6 +473,11 @@ def test_parameter_set_inside_an_fmu(files, tmp_path: Path):
 )  # fmt: skip
 def test_what_cannot_be_run_is_said_by_name(read: Read, text: str, why: str):
     assert why in problem(read, text)
+
+
+def test_a_parameter_set_that_is_no_xml_is_named_once(read: Read):
+    text = problem(read, system(component("a", bindings=binding(source="s.ssv"))), s__ssv="k = 1")
+    assert text.count("test.ssp") == 1 and "s.ssv: not well-formed XML" in text
 
 
 def test_all_problems_are_collected(read: Read):

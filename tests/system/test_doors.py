@@ -1,0 +1,334 @@
+"""What is run besides scenarios and SSPs: one FMU, an unpacked SSP, and libcosim's own files."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from zipfile import ZipFile
+
+import numpy as np
+import pytest
+
+from orchestrator import load, simulate
+from orchestrator.commands.main import main
+from orchestrator.errors import InputError
+from orchestrator.system.osp import STRUCTURE, write_osp
+from orchestrator.system.ssp.writing import write_ssp
+from support.archives import archive, component, described, fmu, system, variable
+from support.others import build
+from support.relay import relay
+
+STEP, STEPS = 0.125, 24
+
+#: A ring by way of a function, written from both ends, with a component of a longer step.
+OSP = f"""<?xml version="1.0"?>
+<OspSystemStructure xmlns="http://opensimulationplatform.com/MSMI/OSPSystemStructure" version="0.1">
+  <StartTime>0.0</StartTime>
+  <BaseStepSize>{STEP}</BaseStepSize>
+  <Algorithm>fixedStep</Algorithm>
+  <!-- the first is beside this file's folder -->
+  <Simulators>
+    <Simulator name="a" source="../fmus/relay%20one.fmu" stepSize="{STEP}">
+      <InitialValues>
+        <InitialValue variable="v"><Real value="0.7"/></InitialValue>
+        <InitialValue variable="a"><Real value="1.5"/></InitialValue>
+      </InitialValues>
+    </Simulator>
+    <Simulator name="b" source="relay.fmu" stepSize="{2 * STEP}">
+      <InitialValues>
+        <InitialValue variable="a"><Real value="-0.3"/></InitialValue>
+        <InitialValue variable="c"><Real value="0.1"/></InitialValue>
+        <InitialValue variable="u"><Real value="9"/></InitialValue>
+      </InitialValues>
+    </Simulator>
+    <Simulator name="c" source="relay.fmu"/>
+  </Simulators>
+  <Functions>
+    <LinearTransformation name="scaled" factor="0.5" offset="-0.25"/>
+  </Functions>
+  <Connections>
+    <SignalConnection>
+      <Variable simulator="a" name="y"/><Signal function="scaled" name="in"/>
+    </SignalConnection>
+    <SignalConnection>
+      <Signal function="scaled" name="out"/><Variable simulator="b" name="u"/>
+    </SignalConnection>
+    <VariableConnection>
+      <Variable simulator="a" name="u"/><Variable simulator="b" name="y"/>
+    </VariableConnection>
+    <VariableConnection>
+      <Variable simulator="b" name="g"/><Variable simulator="c" name="v"/>
+    </VariableConnection>
+  </Connections>
+</OspSystemStructure>
+"""
+
+#: Reads a file of libcosim's and prints all outputs, a line a step.
+LIBCOSIM = """
+import sys
+from libcosimpy.CosimExecution import CosimExecution
+from libcosimpy.CosimObserver import CosimObserver
+execution = CosimExecution.from_osp_config_file(osp_path=sys.argv[1])
+observer = CosimObserver.create_last_value()
+execution.add_observer(observer=observer)
+for _ in range(int(sys.argv[2])):
+    assert execution.step()
+    print("row", end=" ")
+    for name in sys.argv[3:]:
+        index = execution.slave_index_from_instance_name(name)
+        print(*map(float.hex, observer.last_real_values(index, [2, 3])), end=" ")
+    print()
+"""
+
+
+@pytest.fixture
+def osp(tmp_path: Path) -> Path:
+    """The folder with the file."""
+    folder, beside = tmp_path / "plant", tmp_path / "fmus"
+    for one in (folder, beside):
+        one.mkdir()
+    shutil.copy(relay(tmp_path), folder / "relay.fmu")
+    shutil.copy(relay(tmp_path), beside / "relay one.fmu")
+    (folder / STRUCTURE).write_text(OSP, encoding="utf-8")
+    return folder
+
+
+def outputs_of_libcosim(folder: Path, *names: str) -> np.ndarray:
+    """The outputs g and y of components, after each step."""
+    if find_spec("libcosimpy") is None:
+        pytest.skip("libcosimpy is not installed")
+    arguments = [sys.executable, "-c", LIBCOSIM, str(folder), str(STEPS), *names]
+    said = subprocess.run(arguments, capture_output=True, text=True, check=True, timeout=60).stdout
+    # It logs to the same stream.
+    rows = [line.split()[1:] for line in said.splitlines() if line.startswith("row ")]
+    return np.array([[float.fromhex(value) for value in row] for row in rows])
+
+
+def test_osp_file_gives_the_numbers_of_libcosim(osp: Path):
+    expected = outputs_of_libcosim(osp, "a", "b", "c")
+    with pytest.warns(UserWarning, match=r"b\.u: is fed by a\.y; .* has no effect"):
+        result = simulate(osp / STRUCTURE, stop_time=STEPS * STEP, order="jacobi")
+    assert result.failure is None
+    ours = [result[f"{name}.{port}"][1:] for name in "abc" for port in "gy"]
+    assert np.array_equal(np.column_stack(ours), expected)
+    assert np.ptp(expected, axis=0)[[0, 1, 2, 3, 5]].min() > 0.05
+
+
+def test_what_is_written_for_libcosim_is_read_again(dist: Path, tmp_path: Path):
+    """Components, connections, parameters and steps of the closed loop."""
+    system = load("fig5")
+    write_osp(system, tmp_path)
+    again = load(tmp_path)
+    assert set(again.connections) == set(system.connections)
+    assert again.parameters == system.parameters
+    assert (again.step, again.start_time or 0.0) == (system.step, system.start_time or 0.0)
+    digests = [{n: c.digest for n, c in one.components.items()} for one in (system, again)]
+    assert digests[0] == digests[1]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ('<LinearTransformation name="scaled" factor="0.5" offset="-0.25"/>',
+         '<Sum name="scaled" inputCount="1"/>', "function scaled: a <Sum> is not supported"),
+        ('offset="-0.25"', 'offset="1,5"', "offset '1,5' is no number"),
+        ("VariableConnection>", "VariableGroupConnection>", "a <VariableGroupConnection> of 2 var"),
+        ('name="in"/>', 'name="into"/>', "function scaled: takes one variable, and has 0"),
+        ('function="scaled" name="in"', 'function="scale" name="in"', "no function 'scale'"),
+        ('simulator="c" name="v"', 'simulator="c" name="w"', "c has no port or parameter 'w'"),
+        ('simulator="b" name="y"', 'simulator="d" name="y"', "has no component 'd'"),
+        ('<Real value="0.7"/>', '<Real value="much"/>', "a.v = much: not a real number"),
+        ('<Real value="0.7"/>', "", "a.v: an initial value without a value"),
+        ('name="b" source', 'name="a" source', "two simulators are named a"),
+        ('source="relay.fmu" stepSize', 'source="none.fmu" stepSize', "holds no 'none.fmu' for b"),
+        ('"../fmus/relay%20one.fmu"', '"proxyfmu://host?file=x.fmu"', "'proxyfmu://host?file=x"),
+        (f"<BaseStepSize>{STEP}<", "<BaseStepSize>fast<", "BaseStepSize 'fast' is no number"),
+        ("<OspSystemStructure ", "<OspSystem ", "mismatched tag"),
+    ],
+)  # fmt: skip
+def test_what_of_an_osp_file_cannot_be_run_is_said_by_name(osp: Path, old, new, why):
+    assert old in OSP
+    (osp / STRUCTURE).write_text(OSP.replace(old, new), encoding="utf-8")
+    with pytest.raises(InputError) as error:
+        load(osp)
+    assert why in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ("fixedStep", "ecco", "asks for the algorithm 'ecco'; steps of one length are made"),
+        (f'"{2 * STEP}"', f'"{2.03 * STEP}"', "b: its step of 0.25375 s becomes 0.25 s"),
+    ],
+)
+def test_what_of_an_osp_file_changes_is_a_warning(osp: Path, old, new, why):
+    (osp / STRUCTURE).write_text(OSP.replace(old, new), encoding="utf-8")
+    with pytest.warns(UserWarning, match=why):
+        assert load(osp).steps["b"] == 2 * STEP
+
+
+def test_units_of_an_osp_file_are_not_converted(tmp_path: Path):
+    for name, unit in (("m", "m"), ("mm", "mm")):
+        fmu(tmp_path / f"{name}.fmu", variable("u", "input", unit=unit),
+            variable("y", "output", unit=unit))  # fmt: skip
+    wire = '<Variable simulator="m" name="y"/><Variable simulator="mm" name="u"/>'
+    (tmp_path / STRUCTURE).write_text(
+        '<OspSystemStructure version="0.1"><Simulators><Simulator name="m" source="m.fmu"/>'
+        '<Simulator name="mm" source="mm.fmu"/></Simulators><Connections><VariableConnection>'
+        f"{wire}</VariableConnection></Connections></OspSystemStructure>",
+        encoding="utf-8",
+    )
+    with pytest.warns(UserWarning, match=r"m\.y -> mm\.u: units differ, m and mm; values are take"):
+        [connection] = load(tmp_path).connections
+    assert connection.transformation is not None and connection.transformation(2.5) == 2.5
+
+
+def test_one_fmu_is_a_system_with_its_own_experiment(tmp_path: Path, capsys):
+    experiment = '<DefaultExperiment startTime="1" stopTime="2" stepSize="0.25"/><ModelVariables>'
+    own = build(tmp_path, change=("<ModelVariables>", experiment)).rename(tmp_path / "my-1.fmu")
+    result = simulate(own, {"my_1.u": 3.0, "my_1.gain": 2.0})
+    assert result.time.tolist() == [1.0, 1.25, 1.5, 1.75, 2.0]
+    assert set(result["my_1.y"]) == {6.0}
+    out = tmp_path / "out"
+    assert main(["export", str(own), "--out", str(out)]) == 0
+    assert load(out / "my-1.ssp").step == 0.25
+    assert main(["run", str(own), "--variant", "x", "--out", str(out)]) == 2
+    assert "has no variants" in capsys.readouterr().err
+
+
+def test_an_experiment_of_an_fmu_that_is_none_is_left_out(tmp_path: Path):
+    experiment = '<DefaultExperiment stopTime="1,5" stepSize="-1"/><ModelVariables>'
+    found = load(build(tmp_path, change=("<ModelVariables>", experiment)))
+    assert (found.stop_time, found.step) == (None, None)
+
+
+@pytest.mark.parametrize("name", ["", "SystemStructure.ssd", "Winter.ssd"])
+def test_an_unpacked_ssp_is_what_the_archive_is(tmp_path: Path, name: str):
+    relay(tmp_path)
+    twice = described(system(component("a") + component("b")))
+    packed = archive(tmp_path / "x.ssp", described(system(component("a"))), {
+        "a.fmu": relay(tmp_path), "Winter.ssd": twice})  # fmt: skip
+    folder = tmp_path / "x"
+    with ZipFile(packed) as content:
+        content.extractall(folder)
+    variant = "Winter" if name.startswith("W") else None
+    expected, found = load(packed, variant=variant), load(folder / name)
+    assert list(found.components) == list(expected.components)
+    assert name.startswith("W") or found.name == expected.name
+    assert list(load(folder, variant="Winter").components) == ["a", "b"]
+
+
+def test_a_folder_runs_from_within_and_may_lack_a_stop_time(workplace: Path, capsys):
+    [path] = write_ssp(load(relay(workplace)), workplace)
+    Path("inside").mkdir()
+    with ZipFile(path) as content:
+        content.extractall("inside")
+    assert main(["check", "inside"]) == 0
+    assert "names no stop time" in capsys.readouterr().out
+    assert main(["export", "inside", "--format", "osp", "--out", "out"]) == 0
+    assert main(["run", "out", "--stop-time", "1", "--out", "results", "--no-figures"]) == 0
+    assert Path("results/result.csv").read_text().count("\n") > 10
+
+
+def test_a_scenario_wins_over_a_folder_of_its_name(dist: Path, workplace: Path):
+    Path("fig4").mkdir()
+    assert "plant" in load("fig4").components
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("mine.mo", "or give a .toml, .ssp, .ssd or .fmu file, an OspSystemStructure.xml, or a fo"),
+        ("empty", "empty: not a readable SSP: there is no SystemStructure.ssd in it"),
+        ("none.ssd", "not a readable SSP: there is no none.ssd in it"),
+        ("none.xml", "none.xml: no such file"),
+        ("other.xml", "not a readable OspSystemStructure.xml: it describes a <other>"),
+        ("text.xml", "not a readable OspSystemStructure.xml: syntax error"),
+        ("none.fmu", "none.fmu: no such file"),
+    ],
+)
+def test_what_is_none_of_these_is_refused_in_one_line(workplace: Path, capsys, name, why):
+    Path("empty").mkdir()
+    Path("other.xml").write_text("<other/>")
+    Path("text.xml").write_text("text")
+    for command in ("run", "check"):
+        assert main([command, name]) == 2
+        out, err = capsys.readouterr()
+        assert why in (out + err) and len((out + err).splitlines()) == 1
+
+
+WIRED = """
+stop_time = 1.0
+step = 0.125
+only = ["t", "g", "x"]
+[components]
+t = "t.fmu"
+g = "g.fmu"
+x = "x.fmu"
+[wires]
+"g.u" = "t.y"
+"x.w[1]" = "t.z[2]"
+"x.in" = "t.out"
+"""
+
+
+def ports(path: Path, *names: str) -> None:
+    """An FMU without a library, of Real inputs and outputs: an output's name has a star."""
+    fmu(path, *(variable(name.removesuffix("*"), "output" if name.endswith("*") else "input")
+                for name in names))  # fmt: skip
+
+
+@pytest.fixture
+def wired(workplace: Path) -> Path:
+    """A scenario of three FMUs with single ports and groups, and of no other component."""
+    ports(Path("t.fmu"), "y*", "z[2]*", "out.a*", "out.b*", "one*")
+    ports(Path("g.fmu"), "u", "speed")
+    ports(Path("x.fmu"), "w[1]", "in.a", "in.b")
+    path = workplace / "wired.toml"
+    path.write_text(WIRED, encoding="utf-8")
+    return path
+
+
+def test_a_scenario_wires_single_ports_beside_groups(dist: Path, wired: Path):
+    found = {str(wire.target): str(wire.source) for wire in load(wired).connections}
+    assert found == {
+        "g.u": "t.y",
+        "x.w[1]": "t.z[2]",
+        "x.in.a": "t.out.a",
+        "x.in.b": "t.out.b",
+    }
+
+
+@pytest.mark.parametrize(
+    ("wire", "why"),
+    [
+        ('"g.u" = "t.out"', "g.u is one input, and t has no port 'out'; did you mean out.a or out"),
+        ('"g.u" = "t.yy"', "g.u is one input, and t has no port 'yy'; did you mean y?"),
+        ('"x.in" = "t.one"', "t.one is one port, and x.in a group of inputs; wire one of them; "
+         "did you mean in.a or in.b?"),
+        ('"g.sped" = "t.y"', "g has no input sped nor inputs sped.*; did you mean speed?"),
+        ('"g.u" = "tt.y"', "there is no component 'tt'; did you mean t?"),
+        ('"t.y" = "g.u"', "g.u is of causality input, not output"),
+    ],
+)  # fmt: skip
+def test_a_wire_that_cannot_be_says_what_to_write(dist: Path, wired: Path, wire: str, why: str):
+    old = '"x.in" = "t.out"' if wire.startswith('"x.in"') else '"g.u" = "t.y"'
+    wired.write_text(WIRED.replace(old, wire), encoding="utf-8")
+    with pytest.raises(InputError) as error:
+        load(wired).check()
+    assert why in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_wire_of_two_single_ports_carries_their_values(dist: Path, workplace: Path):
+    shutil.copy(relay(workplace), "relay.fmu")
+    Path("two.toml").write_text(
+        'stop_time = 1.0\nstep = 0.125\nonly = ["a", "b"]\n[components]\na = "relay.fmu"\n'
+        'b = "relay.fmu"\n[wires]\n"b.u" = "a.y"\n[parameters]\n"a.u" = 2.0\n',
+        encoding="utf-8",
+    )
+    result = simulate("two.toml", order="jacobi")
+    assert result["a.y"].tolist() == [2.0 * t for t in result.time]
+    assert result["b.u"][1:].tolist() == result["a.y"][:-1].tolist()

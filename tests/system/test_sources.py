@@ -1,0 +1,148 @@
+"""FMUs that bring C sources and no library for this machine."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+
+from orchestrator import load, simulate
+from orchestrator.commands.main import main
+from orchestrator.errors import InputError
+from orchestrator.master import library, sources
+from orchestrator.system import unpacking
+from support.relay import relay
+
+SUPPORT = Path(__file__).parents[1] / "support"
+SOURCE = (SUPPORT / "relay.c").read_text(encoding="utf-8")
+HEADER = (SUPPORT / "slave.h").read_text(encoding="utf-8")
+
+BUILD = """<fmiBuildDescription fmiVersion="3.0">
+<BuildConfiguration modelIdentifier="other"><SourceFileSet><SourceFile name="none.c"/>
+</SourceFileSet></BuildConfiguration>
+<BuildConfiguration modelIdentifier="relay"><SourceFileSet language="C99">
+<SourceFile name="own/relay.c"/><PreprocessorDefinition name="NOTHING" value=""/>
+<IncludeDirectory name="headers"/></SourceFileSet></BuildConfiguration></fmiBuildDescription>
+"""
+
+#: Sources as FMUs have them: all of a folder, those that a list names, or a list of FMI 3.0's kind.
+WAYS = {
+    "all": ({"relay.c": SOURCE, "slave.h": HEADER}, ""),
+    "named": (
+        {"relay.c": SOURCE, "slave.h": HEADER, "example.c": "int main(void) { broken }"},
+        '<SourceFiles><File name="relay.c"/></SourceFiles>',
+    ),
+    "described": (
+        {"buildDescription.xml": BUILD, "own/relay.c": SOURCE, "headers/slave.h": HEADER,
+         "example.c": "broken"},
+        "",
+    ),
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache folder of its own; it is skipped where there is no compiler."""
+    if library.machines_compiler() is None:
+        pytest.skip("there is no C compiler")
+    folder = tmp_path_factory.mktemp("cache")
+    folder.chmod(0o700)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
+    forget()
+    return folder
+
+
+def with_sources(folder: Path, files: dict[str, str], listed: str = "", name: str = "s") -> Path:
+    """The relay without its library."""
+    path = folder / f"{name}.fmu"
+    with ZipFile(relay(folder)) as old, ZipFile(path, "w") as new:
+        text = old.read("modelDescription.xml").decode()
+        end = 'canHandleVariableCommunicationStepSize="true"/>'
+        assert end in text
+        inside = f"{end[:-2]}>{listed}</CoSimulation>" if listed else end
+        new.writestr("modelDescription.xml", text.replace(end, inside))
+        for file, content in files.items():
+            new.writestr(f"sources/{file}", content)
+    return path
+
+
+def rows(fmu: Path, **how: object) -> bytes:
+    """Of a run."""
+    [name] = load(fmu).components
+    given = {f"{name}.{port}": value for port, value in VALUES.items()}
+    result = simulate(fmu, given, stop_time=1.0, step=0.125, **how)
+    assert result.failure is None
+    return b"".join(result[f"{name}.{port}"].tobytes() for port in ("u", "v", "g", "y", "t", "h"))
+
+
+VALUES = {"u": 0.3, "v": 0.1, "a": 1.1}
+
+
+def forget() -> None:
+    """Forget what was unpacked, as another process has."""
+    unpacking._folders.clear()
+    unpacking._digests.clear()
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_sources_give_the_numbers_of_the_library(tmp_path: Path, way: str):
+    fmu = with_sources(tmp_path, *WAYS[way])
+    before = fmu.read_bytes()
+    expected = rows(relay(tmp_path))
+    with pytest.warns(UserWarning, match=r"s\.fmu has no binary for this machine, .*compiled"):
+        assert rows(fmu) == expected
+    forget()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert rows(fmu) == expected
+    assert fmu.read_bytes() == before
+    assert {path.name for path in tmp_path.iterdir()} == {"s.fmu", relay(tmp_path).name}
+
+
+def test_an_isolated_fmu_is_compiled_as_well(tmp_path: Path):
+    fmu = with_sources(tmp_path, *WAYS["all"])
+    with pytest.warns(UserWarning, match="compiled now"):
+        rows(fmu, isolate=True)
+    assert rows(fmu, isolate=True) == rows(relay(tmp_path))
+
+
+def test_check_says_that_sources_are_compiled_and_does_not(own_cache: Path, tmp_path, capsys):
+    fmu = with_sources(tmp_path, *WAYS["all"])
+    main(["check", str(fmu)])
+    assert "a run compiles its sources first" in capsys.readouterr().out
+    assert not list(own_cache.rglob("*.so"))
+
+
+@pytest.mark.parametrize(
+    ("files", "listed", "why"),
+    [
+        ({"relay.c": "int x = ;"}, "", "s.fmu: cannot be compiled: relay.c:1:9: error:"),
+        ({"relay.c": SOURCE}, "", "slave.h: No such file"),
+        ({"x.c": ""}, '<SourceFiles><File name="y.c"/></SourceFiles>', "holds no sources/y.c"),
+        (
+            {"x.c": ""},
+            '<SourceFiles><File name="../x.c"/></SourceFiles>',
+            "holds no sources/../x.c",
+        ),
+        ({"buildDescription.xml": "<x", "x.c": ""}, "", "s.fmu: buildDescription.xml:"),
+        ({"readme.txt": ""}, "", "it has no binaries at all"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:.*compiled now")
+def test_sources_that_cannot_be_compiled_are_said_in_one_line(tmp_path, files, listed, why):
+    fmu = with_sources(tmp_path, files, listed)
+    with pytest.raises(InputError) as error:
+        rows(fmu)
+    assert why in str(error.value) and "\n" not in str(error.value)
+
+
+def test_without_a_compiler_it_is_said_what_to_install(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sources, "compiler", lambda: None)
+    fmu = with_sources(tmp_path, *WAYS["all"])
+    for command in ("run", "check"):
+        arguments = ["--stop-time", "1", "--out", str(tmp_path / "o")] if command == "run" else []
+        assert main([command, str(fmu), *arguments]) == 2
+        said = capsys.readouterr()
+        assert "must be compiled: install gcc or clang" in said.out + said.err
