@@ -17,7 +17,7 @@ from orchestrator.master.instance import ComponentFailed, Ended, Instance
 from orchestrator.master.interrupts import held_interrupts
 from orchestrator.master.isolated import Isolation
 from orchestrator.master.log import Log
-from orchestrator.master.loop import PYTHON_LOOP, Loop
+from orchestrator.master.loop import PYTHON_LOOP, Loop, to_its_end
 from orchestrator.master.mode import default_mode
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.paces import paces
@@ -257,7 +257,7 @@ def _advance(
     blocks, failure = run.blocks, None
     try:
         attendance.attend()
-        for _ in loop.steps(run):
+        for _ in to_its_end(loop.steps, run):
             if run.made >= run.due:
                 attendance.attend()
             if monotonic() > blocks.due:
