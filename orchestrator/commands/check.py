@@ -74,5 +74,6 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
         prepared = prepare(scenario, system, request)
         for text in impossible_paths(prepared.system):
             findings.problem(text)
+        to_know += filter(None, [prepared.open_inputs()])
         to_know += delays(prepared.system, prepared.experiment.order)
     return to_know

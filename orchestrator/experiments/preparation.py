@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,10 +16,10 @@ from orchestrator.experiments.bundle import FMI, PYTHON, current_fmus
 from orchestrator.experiments.events import check_events, read_events, shared_events
 from orchestrator.experiments.inputs import Inputs, read_inputs
 from orchestrator.experiments.scenario import Scenario, read_scenario
-from orchestrator.experiments.wiring import closed_loop
+from orchestrator.experiments.wiring import closed_loop, left_open
 from orchestrator.findings import Findings
 from orchestrator.master.attendant import Attendant
-from orchestrator.master.events import Event, Events
+from orchestrator.master.events import Alter, Event, Events, Set
 from orchestrator.master.experiment import ORDERS, Experiment, Order
 from orchestrator.master.isolated import Isolation
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
@@ -29,6 +29,7 @@ from orchestrator.master.playback import Course, Playback
 from orchestrator.master.real_time import check_factor
 from orchestrator.master.schedule import delays, stages
 from orchestrator.system.component import RUNNABLE, WRITABLE
+from orchestrator.system.examination import open_inputs
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.reading import read_ssp
 from orchestrator.system.structure import System
@@ -91,6 +92,14 @@ class Prepared:
     events: tuple[Event, ...] = ()
     course: Course | None = None
 
+    def open_inputs(self) -> str | None:
+        """The inputs that nothing feeds and nobody sets, in words; None: there are none."""
+        actions = [event.action for event in self.events]
+        given = {*(self.course.targets if self.course else ())}
+        given |= {port for one in actions if isinstance(one, Alter) for port, _ in one.values}
+        given |= {port for one in actions if isinstance(one, Set) for port, _ in one.inputs}
+        return _open_inputs(self.scenario, self.system, given)
+
     def attendants(self) -> list[Attendant]:
         """Who acts on one run of it between its steps."""
         playing: list[Attendant] = [] if self.course is None else [Playback(self.course)]
@@ -123,7 +132,9 @@ def load(
         scenario, system = loaded(str(name), kind, variant=variant, findings=findings)
         if left := left_behind(scenario):
             findings.note(left)
-            findings.refuse()
+        elif still_open := _open_inputs(scenario, system):
+            findings.note(still_open)
+        findings.refuse()
     return replace(
         system,
         name=scenario.name,
@@ -282,6 +293,14 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     )
     wanted = replace(request, parameters=shared, steps=steps, events=None)
     return [prepared, prepare(same, system, wanted)]
+
+
+def _open_inputs(
+    scenario: Scenario, system: System, given: Collection[PortName] = ()
+) -> str | None:
+    # A file of the closed loop says which of its wires are not to be.
+    on_purpose = left_open(scenario, system) if scenario.digest else ()
+    return open_inputs(system, {*given, *on_purpose})
 
 
 def _first_given(*values: T | None) -> T | None:
