@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from auv_fmu.observer import EXACT, FORMS, exact_gain
 from auv_fmu.proof.gain_conditions import bounds
 from auv_fmu.proof.sampling import observer_rate, robust_rate
-from orchestrator.analysis.signals import ELL, THETA_HAT, VEHICLE, parameter, vehicle
+from orchestrator.analysis.signals import ELL, THETA_HAT, VEHICLE, Y_D, parameter, vehicle
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.table import Table
 from orchestrator.system.names import port_name
@@ -13,6 +15,9 @@ from orchestrator.system.structure import System
 
 _K_D, _LAMBDA, _EPS_T = "controller.k_d", "controller.lambda", "controller.eps_t"
 _H_MAX, _OBSERVER = "controller.h_max", "controller.observer"
+
+#: References that are farther apart are not the same [m].
+_SAME = 1e-6
 
 #: h p beyond which a mode of Euler's scheme changes its sign in every step, and grows.
 _REVERSES, _GROWS = 1.0, 2.0
@@ -61,4 +66,26 @@ def cautions_after(table: Table) -> list[str]:
         f"the robust term chatters: with theta_hat[1] up to {rho_hat:.3g} N and {_EPS_T} = "
         f"{eps_t:g} W it has h p = {h_p:.3g} and reverses in every step above {_REVERSES:g}; "
         "raise eps_t or take smaller steps"
+    ]
+
+
+def cautions_beside(table: Table, name: str, other: Table) -> list[str]:
+    """What a run has shown beside the one that it is compared with, in lines for the user.
+
+    Args:
+        table: of the run.
+        name: of the one that it is compared with.
+        other: of that one.
+
+    """
+    if table.missing(Y_D) or other.missing(Y_D):
+        return []
+    _, here, there = np.intersect1d(table.time, other.time, return_indices=True)
+    away = table.group(*Y_D)[here] - other.group(*Y_D)[there]
+    apart = float(np.linalg.norm(away, axis=1).max(initial=0.0))
+    if apart <= _SAME:
+        return []
+    return [
+        f"its reference planner.y_d is up to {apart:.3g} m away from that of {name}: the two runs "
+        "follow different paths"
     ]

@@ -29,6 +29,7 @@ from orchestrator.experiments.inputs import inputs_of
 from orchestrator.experiments.preparation import prepare, with_companion
 from orchestrator.experiments.run import Files, run_into
 from orchestrator.experiments.scenario import read_scenario
+from orchestrator.findings import Findings
 from orchestrator.master.experiment import COUPLINGS
 from orchestrator.master.files import FORMATS
 from orchestrator.master.interrupts import Interrupts, held_interrupts
@@ -122,6 +123,13 @@ def _run(options: argparse.Namespace) -> int:
         coupling=options.coupling,
     )
     runs = with_companion(prepare(*read(options), wanted), wanted)
+    findings = Findings(options.strict)
+    for prepared in runs:
+        if found := prepared.open_inputs():
+            findings.note(f"{prepared.scenario.name}: {found}")
+    findings.refuse()
+    for note in findings.notes:
+        say(f"warning: {note}")
     folder = options.out or Path("results", runs[0].scenario.stem)
     files = Files(
         options.interval,

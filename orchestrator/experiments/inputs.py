@@ -16,7 +16,7 @@ from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import type_of, typed
 
-#: How a Real input goes from one row to the next; the first is the default.
+#: How a continuous Real input goes from one row to the next; the first is the default.
 _WAYS = ("linear", "hold")
 
 #: So many seconds are farther apart than two numbers can be, but for rounding [s].
@@ -34,7 +34,8 @@ ENTRIES: dict[str, Entry] = {
     "between": Entry(
         "text",
         is_text,
-        "What a Real input does between two rows: `linear`, or `hold`, as all others do.",
+        "What a Real input does between two rows: `linear`, or `hold`, as all others do, and Real "
+        "inputs of variability `discrete`.",
         "`linear`",
     ),
 }
@@ -46,7 +47,7 @@ class Inputs:
 
     Attributes:
         file: with the table.
-        between: what Real inputs do between two rows, one of :data:`_WAYS`.
+        between: what continuous Real inputs do between two rows, one of :data:`_WAYS`.
 
     """
 
@@ -128,4 +129,5 @@ def _number(value: float) -> str:
 
 def _is_linear(system: System, target: PortName, between: str) -> bool:
     variable = system.component(target.component).variable(target.port)
-    return type_of(variable) == "Real" and between == "linear"
+    # FMI has it that what is discrete changes at events only.
+    return (type_of(variable), variable.variability, between) == ("Real", "continuous", "linear")

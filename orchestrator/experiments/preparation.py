@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,15 +12,17 @@ from typing import Any, TypeVar
 
 from auv_fmu.euler import STEP
 from orchestrator.analysis.figures import check_figure
+from orchestrator.analysis.signals import CONTROLLER
 from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import FMI, PYTHON, current_fmus
 from orchestrator.experiments.events import check_events, read_events, shared_events
 from orchestrator.experiments.inputs import Inputs, read_inputs
 from orchestrator.experiments.scenario import Scenario, names, read_scenario
-from orchestrator.experiments.wiring import closed_loop
+from orchestrator.experiments.waypoints import PLANNER
+from orchestrator.experiments.wiring import closed_loop, left_open, read_wiring
 from orchestrator.findings import Findings
 from orchestrator.master.attendant import Attendant
-from orchestrator.master.events import Event, Events
+from orchestrator.master.events import Alter, Event, Events, Set
 from orchestrator.master.experiment import GAUSS_SEIDEL, LINEAR, ORDERS, SOLVE, Experiment, Order
 from orchestrator.master.isolated import Isolation
 from orchestrator.master.linear import check_linear
@@ -32,7 +34,8 @@ from orchestrator.master.real_time import check_factor
 from orchestrator.master.schedule import stages
 from orchestrator.reading import is_folder
 from orchestrator.system.component import RUNNABLE, WRITABLE, read_component
-from orchestrator.system.names import PortName
+from orchestrator.system.examination import open_inputs
+from orchestrator.system.names import PortName, port_name
 from orchestrator.system.osp import STRUCTURE as OSP
 from orchestrator.system.osp import read_osp
 from orchestrator.system.ssp import STRUCTURE as SSD
@@ -102,6 +105,14 @@ class Prepared:
     events: tuple[Event, ...] = ()
     course: Course | None = None
 
+    def open_inputs(self) -> str | None:
+        """The inputs that nothing feeds and nobody sets, in words; None: there are none."""
+        actions = [event.action for event in self.events]
+        given = {*(self.course.targets if self.course else ())}
+        given |= {port for one in actions if isinstance(one, Alter) for port, _ in one.values}
+        given |= {port for one in actions if isinstance(one, Set) for port, _ in one.inputs}
+        return _open_inputs(self.scenario, self.system, given)
+
     def attendants(self) -> list[Attendant]:
         """Who acts on one run of it between its steps."""
         playing: list[Attendant] = [] if self.course is None else [Playback(self.course)]
@@ -135,7 +146,9 @@ def load(
         scenario, system = loaded(str(name), kind, variant=variant, findings=findings)
         if left := left_behind(scenario):
             findings.note(left)
-            findings.refuse()
+        elif still_open := _open_inputs(scenario, system):
+            findings.note(still_open)
+        findings.refuse()
     return replace(
         system,
         name=scenario.name,
@@ -308,7 +321,8 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     """A scenario, and the one it is compared with, if there is one.
 
-    What the scenario and the user set goes for both, as far as both have it.
+    What the scenario and the user set goes for both, as far as both have it. The companion keeps
+    its controller, and follows the reference of the scenario.
 
     Raises:
         InputError: something about the request cannot be done for the companion.
@@ -318,6 +332,8 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     if not scenario.compare:
         return [prepared]
     companion, system = loaded(scenario.compare, request.kind)
+    if scenario.digest and companion.digest:
+        companion, system = _beside(scenario, prepared.system, companion, system, request.kind)
     played = prepared.course.targets if prepared.course else ()
     shared = {
         target: value
@@ -339,10 +355,80 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         order=scenario.order,
         coupling=scenario.coupling,
         events=shared_events(events, system),
-        inputs=companion.inputs or scenario.inputs,
+        inputs=scenario.inputs or companion.inputs,
     )
     wanted = replace(request, parameters=shared, steps=steps, events=None)
     return [prepared, prepare(same, system, wanted)]
+
+
+def _beside(
+    scenario: Scenario, system: System, companion: Scenario, other: System, kind: str
+) -> tuple[Scenario, System]:
+    """A companion in the surroundings of a scenario, whose controllers are compared.
+
+    Where both have the same controller, something else is compared, and the reference alone is
+    the scenario's.
+
+    Args:
+        scenario: that it is compared with.
+        system: of the scenario.
+        companion: as its file has it.
+        other: of the companion.
+        kind: of the bundle's FMUs.
+
+    """
+    standard = read_wiring()["components"]
+    ours, theirs = ({**standard, **one.components} for one in (scenario, companion))
+    is_compared = ours[CONTROLLER] != theirs[CONTROLLER]
+    shared = ours.keys() - {CONTROLLER} if is_compared else {PLANNER}
+
+    def is_taken(target: str, source: str | bool) -> bool:
+        if port_name(target).component not in shared:
+            return False
+        start = port_name(source) if isinstance(source, str) else None
+        if start is None or start.component in shared:
+            return True
+        there = other.components.get(start.component)
+        return there is not None and any(v.startswith(f"{start.port}.") for v in there.variables)
+
+    wires = {
+        target: source
+        for target, source in companion.wires.items()
+        if port_name(target).component != PLANNER
+    }
+    wires |= {
+        target: source for target, source in scenario.wires.items() if is_taken(target, source)
+    }
+    only, given = companion.only, companion.parameters
+    if is_compared and CONTROLLER in scenario.only:
+        only = [*scenario.only, *(name for name in theirs if name not in ours)]
+    companion = replace(
+        companion,
+        components={**theirs, **{name: ours[name] for name in shared}},
+        wires=wires,
+        only=only,
+        parameters={},
+    )
+    new = closed_loop(current_fmus(kind), companion)
+    values = {
+        name: system.value(name) if name.component == PLANNER else value
+        for name, value in given.items()
+        if new.has(name) and (name.component != PLANNER or system.has(name))
+    }
+    steps = {
+        name: step
+        for name, step in companion.steps.items()
+        if name in new.components and name != PLANNER
+    }
+    return replace(companion, parameters=values), replace(new.with_parameters(values), steps=steps)
+
+
+def _open_inputs(
+    scenario: Scenario, system: System, given: Collection[PortName] = ()
+) -> str | None:
+    # A file of the closed loop says which of its wires are not to be.
+    on_purpose = left_open(scenario, system) if scenario.digest else ()
+    return open_inputs(system, {*given, *on_purpose})
 
 
 def _first_given(*values: T | None) -> T | None:

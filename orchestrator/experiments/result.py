@@ -261,6 +261,7 @@ def simulate(
         KeyboardInterrupt: Ctrl-C, when the step has ended that it came in.
 
     """
+    is_named = not isinstance(system, System)
     if isinstance(system, System):
         check_brings_its_own(str(system), kind)
         if variant is not None:
@@ -290,6 +291,11 @@ def simulate(
         coupling=coupling,
     )
     prepared = prepare(scenario, system, request)
+    if is_named:
+        with warned(strict) as findings:
+            if found := prepared.open_inputs():
+                findings.note(found)
+            findings.refuse()
     result = Result(prepared)
     observers: list[Observer] = [result, *([Progress(scenario.name)] * progress)]
     with _checkpoints(prepared, checkpoint, checkpoint_every, resume) as kept:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.analysis.cautions import cautions, cautions_after
+from orchestrator.analysis.cautions import cautions, cautions_after, cautions_beside
 from orchestrator.analysis.certificates import CertificatesFile
 from orchestrator.analysis.figures import Drawn, draw, figure_files
 from orchestrator.analysis.metrics import Metrics
@@ -197,6 +197,7 @@ def run_into(
                 done.append(run.ended(ending))
                 missed = [] if ending.failure else prepared.missed(ending)
                 said = [f"did not happen: {event}" for event in missed]
+                said += cautions_beside(done[-1].seen, runs[0].scenario.name, done[0].seen)
                 for caution in (*said, *cautions_after(done[-1].seen)):
                     say(f"warning: {prepared.scenario.name}: {caution}")
                 if interrupts:

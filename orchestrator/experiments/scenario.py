@@ -115,8 +115,11 @@ ENTRIES: dict[str, Entry] = {
         "text",
         is_text,
         "A scenario that is run and drawn together with this one: a name, or the path of a .toml "
-        "file, relative to this one. What this scenario and the command line set goes for both, "
-        "as far as both have it.",
+        "file, relative to this one. It keeps its controller. Other components, the wires between "
+        "them, `[path]` and the parameters of the planner are this scenario's, so that both follow "
+        "one reference; what else this scenario and the command line set goes for both, as far as "
+        "both have it. Where both have the same controller, it keeps all components but the "
+        "planner.",
         "none",
     ),
     "stop_time": Entry("number", is_number, "End of the run [s].", "100 s"),

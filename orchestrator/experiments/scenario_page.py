@@ -54,6 +54,10 @@ These wires connect them, unless `wires` says otherwise.
 
 $wires
 
+Inputs that nothing feeds, and that neither parameters, a table nor an event sets, are named in a
+warning, with the wire that they seem to want; `--strict` refuses them. Those whose wires a file
+removes with `only` or `false` are open on purpose.
+
 ## Figures
 
 $figures

@@ -69,6 +69,17 @@ def closed_loop(
     return system
 
 
+def left_open(scenario: Scenario, system: System) -> set[PortName]:
+    """Inputs whose wires a scenario has removed, or left out with a component."""
+    groups = {**read_wiring()["wires"], **scenario.wires}
+    return {
+        PortName(name, variable.name)
+        for name, component in system.components.items()
+        for variable in component.having("input")
+        if any(f"{name}.{variable.name}".startswith(f"{group}.") for group in groups)
+    }
+
+
 def _changed(
     scenario: Scenario,
     chosen: Mapping[str, str],

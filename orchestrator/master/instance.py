@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from ctypes import c_double
+from math import inf
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -31,7 +32,18 @@ class ComponentFailed(Exception):
 
 
 class Ended(Exception):
-    """The run ends here, and well; the text says why."""
+    """The run ends here, and well; the text says why.
+
+    Attributes:
+        component: that has ended it in a step; empty: none has.
+        time: until which that component has computed [s].
+
+    """
+
+    def __init__(self, text: str, component: str = "", time: float = -inf) -> None:
+        """Say why."""
+        super().__init__(text)
+        self.component, self.time = component, time
 
 
 class Part(NamedTuple):

@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from ctypes import c_double
 from dataclasses import dataclass
 from functools import partial
-from math import isfinite
+from math import inf, isfinite
 from numbers import Real
 from select import poll
 from subprocess import PIPE, Popen, TimeoutExpired
@@ -274,9 +274,15 @@ class IsolatedInstance:
             self._status(min(self._timeout, _FAREWELL))
 
     def _take_outputs(self) -> int:
-        self._steps = False
-        self._receive()
-        self._read_outputs()
+        # Those of a step that has ended the run are there already.
+        if self._steps:
+            self._steps = False
+            try:
+                self._receive()
+            except Ended:
+                self._read_outputs()
+                raise
+            self._read_outputs()
         return 0
 
     def _put_inputs(self) -> None:
@@ -339,6 +345,7 @@ class IsolatedInstance:
         fatal: bool = False,
         refused: str | None = None,
         ended: str | None = None,
+        until: float = -inf,
         texts: Sequence[str] = (),
     ) -> Any:
         for text in texts:
@@ -353,7 +360,7 @@ class IsolatedInstance:
         if refused is not None and self._doing == "instantiate":
             raise InputError(_line(refused))
         if ended is not None and self._doing == "doStep":
-            raise Ended(_line(ended))
+            raise Ended(_line(ended), self.name, float(until))
         if refused is not None or ended is not None:
             raise ValueError(f"it cannot end a run in {self._doing}")
         return value

@@ -317,7 +317,8 @@ class LoadedInstance:
             with suppress(FMICallException):
                 if self._fmu.getBooleanStatus(fmi2Terminated):
                     time = self._fmu.getRealStatus(fmi2LastSuccessfulTime)
-                    return Ended(f"{self.name} has ended the simulation, at {time:.12g} s")
+                    text = f"{self.name} has ended the simulation, at {time:.12g} s"
+                    return Ended(text, self.name, time)
         if status == fmi2Pending:
             return ComponentFailed(
                 f"{self.name}: its step goes on after {function}, and its description does not "

@@ -48,7 +48,16 @@ _CALLBACK = CFUNCTYPE(c_int, c_void_p, c_double, c_double, c_int)
 
 
 class Steppable(Protocol):
-    """What a loop asks of a member besides its calls."""
+    """What a loop asks of a member besides its calls.
+
+    Attributes:
+        name: of the component; empty: it is none.
+        is_here: whether its calls are functions of this process.
+
+    """
+
+    name: str
+    is_here: bool
 
     def pointers(self) -> layout.Member:
         """The same calls as pointers."""
@@ -67,7 +76,9 @@ class Member(NamedTuple):
 
 
 class Action:
-    """A member of a stage that acts in the place of a step."""
+    """A member of a stage that acts in the place of a step, and is no component."""
+
+    name, is_here = "", True
 
     def __init__(self, act: Callable[[float, float], object]) -> None:
         """Do something in every step.

@@ -6,10 +6,12 @@ import socket
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fmpy.fmi2 import fmi2OK, fmi2Warning
 
 from orchestrator.errors import InputError, reason
 from orchestrator.master.channel import Channel, sizes
@@ -89,6 +91,10 @@ class _Served:
         t, h = self._channel.incoming[:2]
         step([self._member], t, h)
 
+    def _are_read(self) -> bool:
+        """Whether the outputs can be read after the last step."""
+        return all(call() in (fmi2OK, fmi2Warning) for call in self._instance.get_outputs)
+
     def _answered(self, call: Callable[[], Any]) -> bool:
         note: dict[str, Any] = {}
         try:
@@ -96,7 +102,7 @@ class _Served:
             if value is not None:
                 note["value"] = value
         except Ended as end:
-            note["ended"] = str(end)
+            note |= {"ended": str(end), "until": end.time if self._are_read() else -inf}
         except ComponentFailed as error:
             note |= {"failed": str(error), "fatal": error.fatal}
         except Exception as error:

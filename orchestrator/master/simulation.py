@@ -12,6 +12,7 @@ import numpy as np
 
 from orchestrator.errors import InputError, StartError, reason, unforeseen
 from orchestrator.master.attendant import Attendance, Attendant, Run
+from orchestrator.master.ends import to_its_end
 from orchestrator.master.experiment import DELAY, GAUSS_SEIDEL, LINEAR, SOLVE, Experiment
 from orchestrator.master.growth import Growth, delayed_ports
 from orchestrator.master.instance import ComponentFailed, Ended, Instance
@@ -314,7 +315,7 @@ def _advance(
     blocks, failure = run.blocks, None
     try:
         attendance.attend()
-        for _ in loop.steps(run):
+        for _ in to_its_end(loop.steps, run):
             if run.made >= run.due:
                 attendance.attend()
             if monotonic() > blocks.due:

@@ -1,16 +1,20 @@
-"""An FMU examined without loading it: what is wrong with it, and what it cannot do."""
+"""FMUs examined without loading them: what is wrong with them, and what they cannot do."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
+from fmpy.model_description import ModelVariable
 from fmpy.validation import validate_fmu
 
 from orchestrator.errors import InputError, reason
 from orchestrator.findings import Findings
 from orchestrator.system.component import Component, read_component
+from orchestrator.system.names import PortName
+from orchestrator.system.ssp.archive import listed
+from orchestrator.system.structure import System
 from orchestrator.system.unpacking import unpacked
 
 #: What of an FMU surprises who runs it, by the flag of its description and what that is then.
@@ -56,6 +60,49 @@ def surprises(component: Component) -> Iterator[str]:
         unknown.dependencies is None for unknown in component.description.outputs
     ):
         yield "does not say what its outputs depend on: each is taken to depend on all inputs"
+
+
+def open_inputs(system: System, settled: Collection[PortName] = ()) -> str | None:
+    """The inputs that nothing feeds and nobody sets, in words, with wires that could feed them.
+
+    Args:
+        system: that is looked at.
+        settled: inputs that are set during a run, or open on purpose.
+
+    Returns:
+        One line; None: there is no such input.
+
+    """
+    taken = {c.target for c in system.connections} | system.parameters.keys() | {*settled}
+    labels: list[str] = []
+    wires: list[str] = []
+    for name, component in system.components.items():
+        groups: dict[str, list[ModelVariable]] = {}
+        for variable in component.having("input"):
+            groups.setdefault(variable.name.rpartition(".")[0], []).append(variable)
+        for group, members in groups.items():
+            found = [v for v in members if PortName(name, v.name) not in taken]
+            if not group or len(found) < len(members):
+                labels += [f"{name}.{variable.name}" for variable in found]
+                continue
+            labels.append(f"{name}.{group}.*")
+            sources = [
+                other
+                for other, source in system.components.items()
+                if other != name and all(_could_feed(source, variable) for variable in members)
+            ]
+            if len(sources) == 1:
+                wires.append(f'"{name}.{group}" = "{sources[0]}.{group}"')
+    if not labels:
+        return None
+    wanted = f"; wire {listed(wires)}" if wires else ""
+    return f"nothing feeds or sets {listed(labels)}{wanted}"
+
+
+def _could_feed(source: Component, variable: ModelVariable) -> bool:
+    """Whether a component has an output of the name and type of an input."""
+    output = source.variables.get(variable.name)
+    return output is not None and (output.causality, output.type) == ("output", variable.type)
 
 
 def _flaws(fmu: Path) -> list[str]:

@@ -1,6 +1,6 @@
 /* An FMI 2.0 slave as tools of others make them: see others.py.
 
-   y = gain u, and every other output is the input of its kind. What is peculiar about it says how
+   y = gain u, plus the sum of its steps times 1 + u where it ends at a time, and every other output is the input of its kind. What is peculiar about it says how
    it is compiled. */
 
 #include <math.h>
@@ -13,6 +13,10 @@
 #define HAS_STATE
 #include "mode.h"
 #include "slave.h"
+
+#ifdef MUTE
+#define ENDS_AT 0.5
+#endif
 
 /* Called in every function. */
 static void change_mode(void)
@@ -37,8 +41,8 @@ typedef struct {
     int integers[VARIABLES];
     int booleans[VARIABLES];
     char texts[VARIABLES][1000];
-    double time, step, end;
-    int asked, steps;
+    double time, step, end, sum;
+    int asked, steps, is_mute;
     const char *name;
     const Callbacks *callbacks;
 } Instance;
@@ -125,8 +129,10 @@ Status fmi2Reset(Component c) { return OK; }
     Status fmi2Get##kind(Component c, const unsigned *r, size_t n, type *values) \
     { \
         Instance *it = c; \
+        if (it->is_mute) \
+            return Error; \
         it->values_of[Y] = it->values_of[U]; \
-        it->reals[Y] = it->reals[GAIN] * it->reals[U]; \
+        it->reals[Y] = it->reals[GAIN] * it->reals[U] + it->sum; \
         for (size_t i = 0; i < n; i++) \
             values[i] = it->values_of[r[i]]; \
         change_mode(); \
@@ -164,6 +170,16 @@ Status fmi2DoStep(Component c, double t, double h, int no_rollback)
     it->time = t;
 #ifdef ENDS
     if (t + h > 0.5)
+        return Discard;
+#endif
+#ifdef ENDS_AT
+    const int ends = t + h > ENDS_AT - 1e-9;
+    it->time = t + h < ENDS_AT ? t + h : ENDS_AT;
+    it->sum += (it->time - t) * (1.0 + it->reals[U]);
+#ifdef MUTE
+    it->is_mute = ends;
+#endif
+    if (ends)
         return Discard;
 #endif
     if (t + h > it->end)
@@ -240,6 +256,10 @@ Status fmi2GetBooleanStatus(Component c, int kind, int *value)
 
 Status fmi2GetRealStatus(Component c, int kind, double *value)
 {
+#ifdef ENDS_AT
+    *value = ((Instance *)c)->time;
+#else
     *value = 0.5;
+#endif
     return OK;
 }

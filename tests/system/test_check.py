@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -10,7 +11,16 @@ import fmpy
 import pytest
 
 from orchestrator.commands.main import main
+from orchestrator.errors import InputError
+from orchestrator.experiments.preparation import Request, load, loaded, prepare
+from orchestrator.experiments.result import simulate
+from orchestrator.experiments.scenario import names
+from orchestrator.system.component import read_component
+from orchestrator.system.examination import open_inputs
 from orchestrator.system.ssp import STRUCTURE
+from orchestrator.system.ssp.writing import write_ssp
+from orchestrator.system.structure import System
+from support.others import build
 
 SCENARIO = """
 title = "a mistake a line"
@@ -104,6 +114,75 @@ def test_archive_may_leave_the_stop_time_open(dist, workplace, capsys):
     path = changed(dist / "auv.ssp", (' stopTime="100.0"', ""))
     assert main(["check", str(path)]) == 0
     assert "--stop-time" in lines(capsys)[0]
+
+
+_FORGOTTEN = '[components]\ncontroller = "PdController"\n'
+_SAID = 'nothing feeds or sets controller.dy.*; wire "controller.dy" = "plant.dy"'
+
+
+def test_a_forgotten_wire_is_named(workplace, capsys):
+    Path("pd.toml").write_text(_FORGOTTEN)
+    assert main(["check", "pd.toml"]) == 0
+    assert lines(capsys) == [f"to know: {_SAID}", "pd.toml: nothing is wrong with it"]
+    run = ["run", "pd.toml", "--stop-time", "0.1", "--no-figures"]
+    assert main(run) == 0
+    assert f"warning: pd: {_SAID}" in capsys.readouterr().err
+    assert main([*run, "--strict"]) == 2
+    assert _SAID in capsys.readouterr().err
+    for call in (load, lambda name: simulate(name, stop_time=0.1)):
+        with pytest.warns(UserWarning, match="wire") as told:
+            call("pd.toml")
+        assert [str(warning.message) for warning in told] == [_SAID]
+        assert told[0].filename == __file__
+    with pytest.raises(InputError, match="nothing feeds or sets"):
+        load("pd.toml", strict=True)
+
+
+def test_a_forgotten_connection_of_an_archive_is_named(workplace, capsys):
+    system = load("fig5-pd")
+    wires = tuple(c for c in system.connections if c.target.port != "dy.z")
+    [path] = write_ssp(replace(system, connections=wires), workplace)
+    assert main(["check", str(path)]) == 0
+    assert lines(capsys)[0] == "to know: nothing feeds or sets controller.dy.z"
+
+
+def test_who_could_feed_a_group_is_named_if_it_is_one(tmp_path):
+    """A wire has a group of ports on each side; two that have the outputs are one too many."""
+    change = ('name="u"', 'name="y.y"'), ('name="y"', 'name="y.y"')
+    taking, giving = (tmp_path / name for name in ("taking", "giving"))
+    for folder in (taking, giving):
+        folder.mkdir()
+    a, b = (
+        read_component(name, build(folder, change=one))
+        for name, folder, one in zip("ab", (taking, giving), change, strict=True)
+    )
+    system = System("open", {"a": a, "b": b}, ())
+    ours = "nothing feeds or sets a.y.*, a.mode, a.on, a.said, b.u and 3 more"
+    assert open_inputs(system) == f'{ours}; wire "a.y" = "b.y"'
+    twice = replace(system, components={"a": a, "b": b, "c": replace(b, name="c")})
+    assert "wire" not in str(open_inputs(twice))
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        '[wires]\n"controller.dy" = "plant.dy"\n"plant.tau_w" = false\n',
+        "[parameters]\ncontroller.dy = { x = 0.0, y = 0.0, z = 0.0 }\n",
+        "[[events]]\nat = 1.0\noverride = { controller.dy = 0.0 }\n",
+        '[inputs]\nfile = "dy.csv"\n',
+    ],
+)
+def test_inputs_that_somebody_sets_or_leaves_open_are_not_named(workplace, capsys, more):
+    Path("dy.csv").write_text("time,controller.dy.x,controller.dy.y,controller.dy.z\n0,0,0,0\n")
+    Path("pd.toml").write_text(_FORGOTTEN + more)
+    assert main(["check", "pd.toml"]) == 0
+    assert lines(capsys) == ["pd.toml: nothing is wrong with it"]
+
+
+@pytest.mark.parametrize("name", names())
+def test_nothing_is_open_in_a_ready_scenario(name):
+    prepared = prepare(*loaded(name), Request(strict=True))
+    assert prepared.open_inputs() is None
 
 
 @pytest.mark.parametrize("ending", ["fmu", "ssp", "toml"])

@@ -8,13 +8,16 @@ import platform
 from pathlib import Path
 from zipfile import ZipFile
 
+import fmpy
 import numpy as np
 import pytest
 
 from orchestrator.commands.main import main
 from orchestrator.errors import InputError
+from orchestrator.experiments.inputs import Inputs, read_inputs
 from orchestrator.experiments.stored import read_result
 from orchestrator.findings import Findings
+from orchestrator.master.playback import Playback
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.ssp.writing import write_ssp
@@ -358,3 +361,26 @@ def test_no_description_makes_integers_longer(tmp_path):
     with pytest.raises(InputError, match=r"a.count = -2147483649: must be at least"):
         with_values(system_of(wide), {"count": -(2**31) - 1})
     assert with_values(system_of(wide), {"count": -(2**31)})
+
+
+@EVERY_WAY
+@pytest.mark.parametrize("variability", ["continuous", "discrete"])
+def test_real_inputs_follow_a_table_as_their_variability_says(tmp_path, variability, way):
+    """As with fmpy, which interpolates what is continuous and holds what is discrete."""
+    change = (
+        '"0" causality="input"><Real',
+        f'"0" causality="input" variability="{variability}"><Real',
+    )
+    fmu = build(tmp_path, change=change)
+    rows = [(0.0, 0.0), (0.4, 1.0), (0.75, 3.0)]
+    file = tmp_path / "inputs.csv"
+    file.write_text("time,a.u\n" + "".join(f"{t},{u}\n" for t, u in rows))
+    system, course = read_inputs(Inputs(file), system_of(fmu), ())
+    table = run(system, attendants=[Playback(course)], **way)
+    told = np.array(rows, dtype=[("time", float), ("u", float)])
+    theirs = fmpy.simulate_fmu(
+        str(fmu), stop_time=1.0, output_interval=0.1, input=told, output=["y"], validate=False
+    )
+    # Its last step may be one of a rounding error.
+    np.testing.assert_allclose(table["a.y"][1:], theirs["y"][1 : len(table)], atol=1e-12)
+    assert set(table["a.y"]) <= {0.0, 1.0, 3.0} or variability == "continuous"
