@@ -21,6 +21,7 @@ from orchestrator.findings import Findings
 from orchestrator.master.attendant import Attendant
 from orchestrator.master.events import Event, Events
 from orchestrator.master.experiment import ORDERS, Experiment, Order
+from orchestrator.master.identity import Identity, identity
 from orchestrator.master.isolated import Isolation
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
 from orchestrator.master.observer import Ending
@@ -90,6 +91,11 @@ class Prepared:
     real_time: float | None = None
     events: tuple[Event, ...] = ()
     course: Course | None = None
+
+    @property
+    def identity(self) -> Identity:
+        """All that its rows depend on."""
+        return identity(self.system, self.experiment, self.events, self.course)
 
     def attendants(self) -> list[Attendant]:
         """Who acts on one run of it between its steps."""

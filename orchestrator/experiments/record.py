@@ -14,6 +14,7 @@ from typing import Any
 
 from orchestrator.experiments.bundle import NATIVE, PYTHON
 from orchestrator.experiments.preparation import Prepared
+from orchestrator.master import identity
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observer import Ending, Header, Occurrence
 from orchestrator.system.ledger import RECORD
@@ -24,7 +25,7 @@ from orchestrator.system.unpacking import runs_python
 METRICS = "metrics.json"
 
 #: Packages whose versions a result depends on.
-PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy", "matplotlib")
+PACKAGES = (*identity.PACKAGES, "matplotlib")
 
 
 class Clock:
@@ -74,6 +75,7 @@ def write_record(
         "title": prepared.scenario.title,
         "label": prepared.scenario.label,
         "sha256": prepared.scenario.digest,
+        "identity": identity.digest_of(prepared.identity),
         "command": list(command),
         **clock.times(),
         "failure": ending.failure,

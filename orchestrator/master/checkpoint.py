@@ -26,6 +26,7 @@ import numpy as np
 
 from orchestrator.errors import InputError, reason
 from orchestrator.master.attendant import NEVER, Lasting, Run
+from orchestrator.master.identity import Identity
 from orchestrator.master.log import Log
 from orchestrator.master.observer import Ending, Header, NotKept
 from orchestrator.master.spool import Spool, begins
@@ -36,9 +37,6 @@ from orchestrator.system.structure import System
 
 #: The file that grows, and the one that is replaced.
 _ROWS, _STATE = "rows.bin", "state.json"
-
-#: What makes a run the one that it is: by names in words, each as text.
-Identity = Mapping[str, str]
 
 
 class _Stored(NamedTuple):

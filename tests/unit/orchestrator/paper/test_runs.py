@@ -61,6 +61,8 @@ def test_what_is_set_goes_for_the_companion_too():
 def test_keys_tell_what_is_run_and_not_how_it_is_called(tmp_path):
     copy = tmp_path / "copy.toml"
     copy.write_text('title = "Another"\nstop_time = 100.0\n')
+    slow = tmp_path / "slow.toml"
+    slow.write_text("stop_time = 100.0\n[steps]\ncontroller = 0.2\n")
     key = key_of(Run("fig4").prepared())
     assert key_of(Run("fig4", {"plant.noise.std": 0.001}).prepared()) == key
     assert key_of(Run(str(copy), {"plant.noise.std": 0.001}).prepared()) == key
@@ -71,6 +73,7 @@ def test_keys_tell_what_is_run_and_not_how_it_is_called(tmp_path):
         Run("fig4", step=0.01),
         Run("fig5"),
         Run("fig5-pd"),
+        Run(str(slow)),
     ]
     assert len({key, *(key_of(run.prepared()) for run in others)}) == 1 + len(others)
 
