@@ -6,6 +6,7 @@ import json
 import platform
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -69,7 +70,6 @@ def write_record(
         remarks: what else there is to say of it.
 
     """
-    experiment = header.experiment
     content = {
         "scenario": prepared.scenario.name,
         "title": prepared.scenario.title,
@@ -81,13 +81,7 @@ def write_record(
         "failure": ending.failure,
         "remark": ending.remark,
         "messages": list(ending.messages),
-        "experiment": {
-            "stop_time": experiment.stop_time,
-            "step": experiment.step,
-            "order": experiment.order,
-            "start_time": experiment.start_time,
-            "steps": dict(prepared.system.steps),
-        },
+        "experiment": {**vars(header.experiment), "steps": dict(prepared.system.steps)},
         "loop": header.loop,
         "texts": sorted(header.texts),
         **(remarks or {}),
@@ -127,15 +121,11 @@ def read_ending(record: dict[str, Any]) -> Ending:
 
 def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
     """The header of a table, from the record beside it."""
-    experiment = record["experiment"]
+    stated = record["experiment"]
+    known = {field.name: stated[field.name] for field in fields(Experiment) if field.name in stated}
     return Header(
         columns,
-        Experiment(
-            experiment["stop_time"],
-            experiment["step"],
-            experiment["order"],
-            experiment.get("start_time", 0.0),
-        ),
+        Experiment(**known),
         {port_name(name): value for name, value in record["parameters"].items()},
         record.get("loop", "python"),
     )

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -157,6 +158,22 @@ def test_stored_result_is_read_again_with_its_parameters():
     assert name == "fig4"
     assert np.array_equal(table.rows, again.rows)
     assert {str(name): value for name, value in table.parameters.items()} == again.parameters
+
+
+def test_record_tells_by_its_identity_whether_numbers_are_the_same():
+    def recorded(name: str, **how: object) -> dict[str, Any]:
+        result = simulate("fig4", stop_time=0.1, kind="native", **how)
+        return json.loads((result.save(name) / "run.json").read_text())
+
+    first = recorded("first")
+    same = [
+        recorded("loop", loop="python"),
+        recorded("isolated", isolate=True),
+        recorded("own", parameters={"plant.noise.std": 0.001}),
+    ]
+    assert {record["identity"] for record in same} == {first["identity"]}
+    other = recorded("other", steps={"controller": 0.04})
+    assert other["identity"] != first["identity"]
 
 
 def peak_memory(*arguments: str) -> int:
