@@ -23,7 +23,7 @@ from time import perf_counter, process_time
 from typing import NamedTuple
 from unittest.mock import patch
 
-from orchestrator.experiments.preparation import loaded
+from orchestrator.experiments.preparation import Prepared, Request, loaded, prepare
 from orchestrator.studies import cluster
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.cluster import making
@@ -86,6 +86,11 @@ def cost(engine: Engine, runs: Iterable[Run], workers: int) -> Cost:
         return Cost(median(seconds), (perf_counter() - start) / len(seconds))
 
 
+def prepared(kind: str) -> Prepared:
+    """The scenario with FMUs of a kind."""
+    return prepare(*loaded(SCENARIO, kind), Request(kind=kind))
+
+
 def starts(n: int, stop_time: float) -> Space:
     """Runs from random starts."""
     ranges = {"plant.eta0.y": [-10.0, 10.0], "plant.eta0.z": [-10.0, 10.0]}
@@ -139,8 +144,8 @@ def main() -> None:
         f"{os.cpu_count()} cores, runs of {options.stop_time:g} s"
     )
     engines: dict[str, Callable[[], Engine]] = {
-        "FMUs in Python": lambda: FmuEngine({SCENARIO: loaded(SCENARIO, "python")[1]}),
-        "FMUs in C": lambda: FmuEngine({SCENARIO: loaded(SCENARIO, "native")[1]}),
+        "FMUs in Python": lambda: FmuEngine({SCENARIO: prepared("python")}),
+        "FMUs in C": lambda: FmuEngine({SCENARIO: prepared("native")}),
         "equations": lambda: BatchEngine({SCENARIO: loaded(SCENARIO)[1]}),
     }
     costs = {}

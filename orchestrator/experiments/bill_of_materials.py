@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+
+from orchestrator.system.ledger import digest_of
 
 CHECKSUMS, BILL = "SHA256SUMS", "bom.cdx.json"
 
@@ -61,8 +62,3 @@ def _package(name: str) -> dict[str, Any]:
         "licenses": [{"license": {"id": "MIT"}}],
         "purl": reference,
     }
-
-
-def digest_of(path: Path) -> str:
-    """SHA-256 of a file."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()

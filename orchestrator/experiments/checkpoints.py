@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from importlib.metadata import version
 from pathlib import Path
 
 from orchestrator.errors import InputError
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.master.checkpoint import (
     Checkpoints,
-    Identity,
     check_gives_states,
     interval_in,
 )
@@ -59,7 +57,7 @@ def checkpoints_of(
     for prepared in runs:
         check_gives_states(prepared.system)
     found = [
-        Checkpoints(folder, _identity(prepared), every, resume, force, token)
+        Checkpoints(folder, prepared.identity, every, resume, force, token)
         for folder, prepared in zip(folders, runs, strict=True)
     ]
     for checkpoints in found:
@@ -99,19 +97,3 @@ def _shown(folder: Path) -> Path:
     with suppress(OSError, ValueError):
         return folder.relative_to(Path.cwd())
     return folder
-
-
-def _identity(prepared: Prepared) -> Identity:
-    """All that the rows of a run depend on."""
-    system, experiment = prepared.system, prepared.experiment
-    return {
-        "auv-fmu": version("auv-fmu"),
-        "the components": ", ".join(system.components),
-        **{f"the FMU of {name}": of.digest for name, of in system.components.items()},
-        **{f"what feeds {wire.target}": repr(wire) for wire in system.connections},
-        "the events": repr(prepared.events),
-        "the inputs": "" if prepared.course is None else prepared.course.digest,
-        **{f"the step of {name}": repr(step) for name, step in system.steps.items()},
-        **{str(name): repr(value) for name, value in system.parameters.items()},
-        **{name: repr(value) for name, value in vars(experiment).items()},
-    }

@@ -24,6 +24,7 @@ from orchestrator.findings import Findings
 from orchestrator.master.attendant import Attendant
 from orchestrator.master.events import Alter, Event, Events, Set
 from orchestrator.master.experiment import GAUSS_SEIDEL, LINEAR, ORDERS, SOLVE, Experiment, Order
+from orchestrator.master.identity import Identity, identity
 from orchestrator.master.isolated import Isolation
 from orchestrator.master.linear import check_linear
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
@@ -112,6 +113,11 @@ class Prepared:
         given |= {port for one in actions if isinstance(one, Alter) for port, _ in one.values}
         given |= {port for one in actions if isinstance(one, Set) for port, _ in one.inputs}
         return _open_inputs(self.scenario, self.system, given)
+
+    @property
+    def identity(self) -> Identity:
+        """All that its rows depend on."""
+        return identity(self.system, self.experiment, self.events, self.course)
 
     def attendants(self) -> list[Attendant]:
         """Who acts on one run of it between its steps."""

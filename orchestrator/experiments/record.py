@@ -6,6 +6,7 @@ import json
 import platform
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -14,6 +15,7 @@ from typing import Any
 
 from orchestrator.experiments.bundle import NATIVE, PYTHON
 from orchestrator.experiments.preparation import Prepared
+from orchestrator.master import identity
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observer import Ending, Header, Occurrence
 from orchestrator.system.ledger import RECORD
@@ -24,7 +26,7 @@ from orchestrator.system.unpacking import runs_python
 METRICS = "metrics.json"
 
 #: Packages whose versions a result depends on.
-PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy", "matplotlib")
+PACKAGES = (*identity.PACKAGES, "matplotlib")
 
 
 class Clock:
@@ -68,25 +70,18 @@ def write_record(
         remarks: what else there is to say of it.
 
     """
-    experiment = header.experiment
     content = {
         "scenario": prepared.scenario.name,
         "title": prepared.scenario.title,
         "label": prepared.scenario.label,
         "sha256": prepared.scenario.digest,
+        "identity": identity.digest_of(prepared.identity),
         "command": list(command),
         **clock.times(),
         "failure": ending.failure,
         "remark": ending.remark,
         "messages": list(ending.messages),
-        "experiment": {
-            "stop_time": experiment.stop_time,
-            "step": experiment.step,
-            "order": experiment.order,
-            "start_time": experiment.start_time,
-            "coupling": experiment.coupling,
-            "steps": dict(prepared.system.steps),
-        },
+        "experiment": {**vars(header.experiment), "steps": dict(prepared.system.steps)},
         "loop": header.loop,
         "texts": sorted(header.texts),
         **(remarks or {}),
@@ -126,16 +121,11 @@ def read_ending(record: dict[str, Any]) -> Ending:
 
 def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
     """The header of a table, from the record beside it."""
-    experiment = record["experiment"]
+    stated = record["experiment"]
+    known = {field.name: stated[field.name] for field in fields(Experiment) if field.name in stated}
     return Header(
         columns,
-        Experiment(
-            experiment["stop_time"],
-            experiment["step"],
-            experiment["order"],
-            experiment.get("start_time", 0.0),
-            experiment.get("coupling"),
-        ),
+        Experiment(**known),
         {port_name(name): value for name, value in record["parameters"].items()},
         record.get("loop", "python"),
     )

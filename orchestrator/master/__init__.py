@@ -4,6 +4,7 @@
 module                  what it holds
 ======================  ==============================================================
 :mod:`.experiment`      start, stop and step of a run: t_k = k h
+:mod:`.identity`        all that decides the numbers of a run
 :mod:`.simulation`      a run from the first exchange to the last step
 :mod:`.instance`        what a run asks of a component
 :mod:`.binary`          the library of an FMU, loaded once a process

@@ -26,19 +26,17 @@ import numpy as np
 
 from orchestrator.errors import InputError, reason
 from orchestrator.master.attendant import NEVER, Lasting, Run
+from orchestrator.master.identity import Identity
 from orchestrator.master.log import Log
 from orchestrator.master.observer import Ending, Header, NotKept
 from orchestrator.master.spool import Spool, begins
-from orchestrator.system.atomic import to_disk
-from orchestrator.system.ledger import moved_aside, write_new
+from orchestrator.system.atomic import write_whole
+from orchestrator.system.ledger import moved_aside
 from orchestrator.system.sealed import sealed, unsealed
 from orchestrator.system.structure import System
 
 #: The file that grows, and the one that is replaced.
 _ROWS, _STATE = "rows.bin", "state.json"
-
-#: What makes a run the one that it is: by names in words, each as text.
-Identity = Mapping[str, str]
 
 
 class _Stored(NamedTuple):
@@ -239,13 +237,7 @@ class Checkpoints:
         return self.folder / f".auv-fmu-{self._identity}.json"
 
     def _store(self, content: _Stored) -> None:
-        # Under a name that nobody else has: what a killed process left there is ours.
-        partial = self._partial
-        partial.unlink(missing_ok=True)
-        write_new(partial, sealed(content._asdict()))
-        to_disk(partial)
-        partial.replace(self.folder / _STATE)
-        to_disk(self.folder)
+        write_whole(self.folder / _STATE, sealed(content._asdict()), self._partial)
 
     def _resume(self, run: Run, found: _Stored) -> None:
         # First of all what rows mean, who is told them wants to know.

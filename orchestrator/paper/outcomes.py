@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
-from functools import cache, partial
-from importlib.metadata import version
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import orchestrator
 from orchestrator.analysis.metrics import Metrics
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.folder import opened
 from orchestrator.experiments.preparation import Prepared
-from orchestrator.experiments.record import PACKAGES
 from orchestrator.experiments.run import metrics_json
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.identity import code_of, digest_of
 from orchestrator.master.observer import Ending, Header, Occurrence
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
@@ -31,9 +27,6 @@ from orchestrator.paper.runs import Run
 from orchestrator.paper.workers import Workers
 from orchestrator.system.ledger import Ledger
 from orchestrator.system.names import port_name
-
-#: Rooms whose code says what is kept of a run.
-_ROOMS = ("system", "master", "analysis", "experiments")
 
 
 @dataclass(frozen=True)
@@ -143,34 +136,8 @@ def _file(key: str) -> str:
 
 def key_of(prepared: Prepared) -> str:
     """Digest of all that an outcome depends on."""
-    system = prepared.system
-    content = {
-        "components": {name: part.digest for name, part in system.components.items()},
-        "connections": sorted(f"{wire.source} {wire.target}" for wire in system.connections),
-        "parameters": sorted(
-            (str(name), value)
-            for name, value in system.parameters.items()
-            if value != system.component(name.component).start(name.port)
-        ),
-        "experiment": asdict(prepared.experiment),
-        "events": repr(prepared.events),
-        "inputs": prepared.course.digest if prepared.course else "",
-        "versions": [sys.version, *map(version, PACKAGES)],
-        "code": _code(),
-    }
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
-
-
-@cache
-def _code() -> str:
-    """Digest of the code that makes an outcome."""
-    digest = hashlib.sha256()
-    [root] = orchestrator.__path__
-    for room in _ROOMS:
-        for path in sorted(Path(root, room).rglob("*.py")):
-            digest.update(f"{room}/{path.name}\0".encode())
-            digest.update(path.read_bytes())
-    return digest.hexdigest()
+    kept = {"what is kept": code_of("orchestrator.analysis", "orchestrator.experiments")}
+    return digest_of(prepared.identity, kept)[:32]
 
 
 def _make(run: Run, key: str) -> Outcome:

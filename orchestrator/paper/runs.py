@@ -17,7 +17,7 @@ from orchestrator.experiments.preparation import (
     with_companion,
 )
 from orchestrator.experiments.scenario import read_scenario
-from orchestrator.master.experiment import ORDERS, Order, written_order
+from orchestrator.master.experiment import Order, written_order
 from orchestrator.system.names import port_name
 from orchestrator.system.values import Value, literal
 
@@ -29,22 +29,24 @@ class Run:
     Attributes:
         scenario: its name, or the path of its file.
         parameters: values that win over the scenario's, by `component.parameter`.
-        order: of evaluation.
+        order: of evaluation; None: the scenario's own.
         stop_time, step: experiment [s]; None: the scenario's own.
         kind: of the bundle's FMUs.
         events: the scenario whose events happen; empty: its own.
         inputs: the table that inputs follow; empty: the scenario's own.
+        steps: of components that take longer ones [s]; they win over the scenario's.
 
     """
 
     scenario: str
     parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
-    order: Order = ORDERS[0]
+    order: Order | None = None
     stop_time: float | None = None
     step: float | None = None
     kind: str = PYTHON
     events: str = ""
     inputs: str = ""
+    steps: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     @property
     def label(self) -> str:
@@ -52,14 +54,16 @@ class Run:
         options = [
             *(("--stop-time", _text(self.stop_time)) if self.stop_time is not None else ()),
             *(("--step", _text(self.step)) if self.step is not None else ()),
-            *(("--order", written_order(self.order)) if self.order != ORDERS[0] else ()),
+            *(("--order", written_order(self.order)) if self.order is not None else ()),
             *(("--kind", self.kind) if self.kind != PYTHON else ()),
             *(("--events", self.events) if self.events else ()),
             *(("--inputs", self.inputs) if self.inputs else ()),
         ]
         for name, value in self.parameters.items():
             options += ["--set", f"{name}={_text(value)}"]
-        return shlex.join((self.scenario, *options))
+        # For these there is no option.
+        steps = ", ".join(f"{name} = {_text(step)} s" for name, step in self.steps.items())
+        return shlex.join((self.scenario, *options)) + f" (steps: {steps})" * bool(steps)
 
     @property
     def request(self) -> Request:
@@ -71,6 +75,7 @@ class Run:
             self.order,
             parameters,
             kind=self.kind,
+            steps=self.steps,
             events=read_scenario(self.events).events if self.events else None,
             inputs=inputs_of(self.inputs or None),
         )
@@ -110,12 +115,17 @@ class Run:
                 for name, value in prepared.system.parameters.items()
                 if own.system.value(name) != value and name not in played
             },
-            experiment.order,
+            None if experiment.order == own.experiment.order else experiment.order,
             None if experiment.stop_time == own.experiment.stop_time else experiment.stop_time,
             None if experiment.step == own.experiment.step else experiment.step,
             self.kind,
             "" if prepared.events == own.events else self.events or self.scenario,
             str(inputs.file) if inputs and inputs != own.scenario.inputs else "",
+            {
+                name: step
+                for name, step in prepared.system.steps.items()
+                if own.system.steps.get(name) != step
+            },
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from hashlib import sha256
+from importlib.metadata import version
 from math import isnan, sqrt
 from threading import local
 from typing import NamedTuple
@@ -19,6 +19,7 @@ from orchestrator.analysis.signals import ACTUATORS, AXES, DY_HAT
 from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import PYTHON, current_fmus
 from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.identity import digest_of
 from orchestrator.master.observer import Ending, Header
 from orchestrator.master.schedule import stages
 from orchestrator.master.table import Table
@@ -71,9 +72,8 @@ class BatchEngine:
 
     @property
     def digest(self) -> str:
-        """Of the equations, and of the parameters of the systems."""
-        parameters = [(name, system.parameters) for name, system in self._systems.items()]
-        return sha256(f"{digest()} {parameters}".encode()).hexdigest()
+        """Of the equations, and of what compiles them."""
+        return digest_of({"equations": digest(), "numba": version("numba")})
 
     def outcomes(self, runs: Iterable[Run]) -> Iterator[Outcome]:
         """Make some runs, in their order."""

@@ -97,7 +97,7 @@ class Engine(Protocol):
     the runs that follow.
 
     Attributes:
-        digest: of everything that the numbers depend on; it also names what is kept on workers.
+        digest: of what the numbers depend on besides the identities of what is run.
 
     """
 

@@ -13,9 +13,8 @@ from fmpy.model_description import ModelVariable
 
 from orchestrator.errors import InputError, reason, shortened
 from orchestrator.experiments.entries import is_finite
-from orchestrator.experiments.preparation import Request, prepare
+from orchestrator.experiments.preparation import Prepared, Request, prepare
 from orchestrator.experiments.scenario import Scenario
-from orchestrator.master.experiment import Experiment
 from orchestrator.studies.engine import Run
 from orchestrator.studies.study import (
     LATIN_HYPERCUBE,
@@ -43,6 +42,7 @@ class Space:
 
     Attributes:
         columns: the types of what varies, by name.
+        prepared: the shortest run of each scenario, by its name.
         has_scenarios: whether there are several.
 
     """
@@ -84,13 +84,11 @@ class Space:
             name: known.those_of(system, (*study.parameters, *study.varied))
             for name, (_, system) in systems.items()
         }
-        self._experiments = {
-            name: self._experiment(name, study, *system) for name, system in systems.items()
+        self.prepared = {
+            name: self._prepared(name, study, *system) for name, system in systems.items()
         }
 
-    def _experiment(
-        self, name: str, study: Study, scenario: Scenario, system: System
-    ) -> Experiment:
+    def _prepared(self, name: str, study: Study, scenario: Scenario, system: System) -> Prepared:
         """The shortest run of a scenario, which can be prepared like any run of it."""
         _, point = self.point(0)
         shortest = study.stop_time and study.stop_time.base + sum(
@@ -102,11 +100,11 @@ class Space:
             for target, value in {**self._constants, **point}.items()
             if target in self._has[name]
         }
-        request = Request(shortest, study.step, study.order, values)
-        experiment = prepare(scenario, system, request).experiment
+        request = Request(shortest, point.get(STEP, study.step), study.order, values)
+        prepared = prepare(scenario, system, request)
         for step in self._ends(STEP) if STEP in self.columns else ():
-            replace(experiment, step=step)
-        return experiment
+            replace(prepared.experiment, step=step)
+        return prepared
 
     def _ends(self, name: str) -> Sequence[float]:
         """The values of a grid, or the two ends of a range."""
@@ -121,7 +119,7 @@ class Space:
         if not 0 <= number < self._n:
             raise IndexError(number)
         scenario, point = self.point(number)
-        experiment, has = self._experiments[scenario], self._has[scenario]
+        experiment, has = self.prepared[scenario].experiment, self._has[scenario]
         return Run(
             number,
             scenario,

@@ -84,7 +84,8 @@ checksum. What was changed is refused in a line that names the file; `--force`, 
 - **The same command goes on.** However a study was ended, by Ctrl-C, a crash or `kill -9`: what was
   done is not done again, no run is lost or there twice, and the table is that of a study that was
   never ended. A study that is done is only drawn again. Another study, or the same one after a
-  change of the equations, is refused in one line: it needs another folder.
+  change of anything that decides its numbers, in its scenarios, their FMUs, the equations or the
+  versions of what runs them, is refused in one line: it needs another folder.
 - **The number of a run fixes what it is**, for good: the samples follow from method and seed.
 - **A run that fails is a row**, with `failure` and without indices, and never the end of a study.
   So is a run whose FMU ends the process that makes it.

@@ -16,9 +16,10 @@ from tqdm import tqdm
 
 from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import PYTHON
-from orchestrator.experiments.events import read_events
-from orchestrator.experiments.preparation import loaded
+from orchestrator.experiments.preparation import Prepared, loaded
 from orchestrator.experiments.scenario import Scenario
+from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.identity import PACKAGES, digest_of
 from orchestrator.master.loop import LOOPS
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Engine
@@ -27,10 +28,9 @@ from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import Store, StudyResult, read_record, store
 from orchestrator.studies.study import BATCH, ENGINES, FMU, Study, read_study, study_of
-from orchestrator.system.structure import System
 
-#: Packages whose versions the runs depend on.
-_PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numba", "numpy", "distributed", "pyarrow", "scipy")
+#: Packages whose versions the runs and their table depend on.
+_PACKAGES = (*PACKAGES, "numba", "distributed", "pyarrow", "scipy")
 
 #: What a study says of its runs.
 _STATED = ("vary", "sample", "parameters", "stop_time", "step", "order")
@@ -139,7 +139,7 @@ def swept(
     systems = {name: loaded(name, means.kind) for name in study.scenario}
     space = Space(study, systems)
     plans = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
-    engine = _engine(means.engine or study.engine, systems, means)
+    engine = _engine(means.engine or study.engine, space.prepared, means)
     record = _record(study, means, space, engine, [one for one, _ in systems.values()], command)
     with store(folder, record, means.force) as kept:
         kept.ledger.check(figure_files(plans))
@@ -168,22 +168,29 @@ def check_installed() -> None:
         raise InputError(f"studies need {', '.join(missing)}: pip install 'auv-fmu[studies]'")
 
 
-def _engine(name: str, systems: Mapping[str, tuple[Scenario, System]], means: Means) -> Engine:
-    alone = {scenario: system for scenario, (_, system) in systems.items()}
-    events = {
-        scenario: read_events(scenario, told.events, system)
-        for scenario, (told, system) in systems.items()
-    }
-    for scenario, (told, _) in systems.items():
-        if told.inputs is not None:
+def _engine(name: str, prepared: Mapping[str, Prepared], means: Means) -> Engine:
+    if name not in ENGINES:
+        raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
+    for scenario, one in prepared.items():
+        if one.course is not None:
             raise InputError(f"{scenario}: has a table of inputs, which no study can follow")
-        if events[scenario] and name == BATCH:
+        if name == BATCH and one.events:
             raise InputError(f"{scenario}: has events, which engine {BATCH!r} cannot have happen")
+        if name == BATCH and (more := _unknown_to_batch(one.experiment)):
+            raise InputError(
+                f"{scenario}: has {more}, which engine {BATCH!r} does not know; use --engine {FMU}"
+            )
     if name == FMU:
-        return FmuEngine(alone, means.loop, events)
-    if name == BATCH:
-        return BatchEngine(alone, means.kind)
-    raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
+        return FmuEngine(prepared, means.loop)
+    return BatchEngine({scenario: one.system for scenario, one in prepared.items()}, means.kind)
+
+
+def _unknown_to_batch(experiment: Experiment) -> str:
+    """What the batch engine would not do of an experiment, in words."""
+    order = experiment.order if experiment.order in ORDERS else ORDERS[0]
+    made = vars(Experiment(experiment.stop_time, experiment.step, order))
+    different = [name for name, value in vars(experiment).items() if value != made[name]]
+    return ", ".join(f"{name} = {getattr(experiment, name)!r}" for name in different)
 
 
 def _record(
@@ -208,6 +215,7 @@ def _record(
             "engine": means.engine or study.engine,
             **{name: stated[name] for name in _STATED},
             "points": space.digest,
+            "systems": digest_of(*(prepared.identity for prepared in space.prepared.values())),
             "version": engine.digest,
         },
         "versions": {"python": sys.version.split()[0]}

@@ -10,6 +10,36 @@ from pathlib import Path
 _CANNOT = (errno.EINVAL, errno.ENOTSUP)
 
 
+def write_new(path: Path, text: str) -> None:
+    """Write a text into a file that is not there yet; nor may a link be, which could lead anywhere.
+
+    Raises:
+        OSError: it is there, or cannot be written.
+
+    """
+    with path.open("x", encoding="utf-8") as file:
+        file.write(text)
+
+
+def write_whole(path: Path, text: str, partial: Path) -> None:
+    """Have a file hold a text: whatever happens meanwhile, it is the one before or this one.
+
+    Args:
+        path: of the file.
+        text: that it shall hold.
+        partial: beside it, a name that nobody else has: what a killed process left there is ours.
+
+    Raises:
+        OSError: it cannot be written.
+
+    """
+    partial.unlink(missing_ok=True)
+    write_new(partial, text)
+    to_disk(partial)
+    partial.replace(path)
+    to_disk(path.parent)
+
+
 def to_disk(path: Path) -> None:
     """Have a file, or the names in a folder, outlast a power cut.
 

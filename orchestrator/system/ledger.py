@@ -27,7 +27,7 @@ from typing import NamedTuple
 from uuid import uuid4
 
 from orchestrator.errors import InputError
-from orchestrator.system.atomic import to_disk
+from orchestrator.system.atomic import to_disk, write_new, write_whole
 from orchestrator.system.sealed import sealed, unsealed
 
 #: The ledger of a folder; what is being written there begins with the same letters.
@@ -236,15 +236,15 @@ class Ledger:
         return found
 
     def _write(self) -> None:
-        path, partial = self.folder / LEDGER, self._partial
-        partial.unlink(missing_ok=True)
+        path = self.folder / LEDGER
         content = _Content(self.identity, self._files, self._moving, self._leaving)
-        # Nobody knows the identity yet under which the first one could be written.
-        write_new(partial if os.path.lexists(path) else path, sealed(content._asdict()))
-        if partial.exists():
-            to_disk(partial)
-            partial.replace(path)
-        to_disk(self.folder)
+        text = sealed(content._asdict())
+        if os.path.lexists(path):
+            write_whole(path, text, self._partial)
+        else:
+            # Nobody knows the identity yet under which the first one could be written.
+            write_new(path, text)
+            to_disk(self.folder)
         self._is_there = True
 
     def _remove(self) -> None:
@@ -336,17 +336,6 @@ def _is_plain(folder: Path, name: str) -> bool:
         if path.is_symlink():
             return False
     return path.is_file()
-
-
-def write_new(path: Path, text: str) -> None:
-    """Write a text into a file that is not there yet; nor may a link be, which could lead anywhere.
-
-    Raises:
-        OSError: it is there, or cannot be written.
-
-    """
-    with path.open("x", encoding="utf-8") as file:
-        file.write(text)
 
 
 def moved_aside(path: Path) -> Path:

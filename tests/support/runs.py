@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.analysis.metrics import indices
+from orchestrator.experiments.preparation import Prepared, Request, loaded, prepare
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.files import CsvFile
 from orchestrator.master.loop import chosen
@@ -26,6 +27,11 @@ def run(
     table, experiment = Table(), Experiment(stop_time, step, order)
     simulate(system, experiment, [table], loop=chosen(loop, experiment))
     return table
+
+
+def prepared(name: str | Path, kind: str = "native", request: Request | None = None) -> Prepared:
+    """A scenario, ready to be run."""
+    return prepare(*loaded(str(name), kind), request or Request(kind=kind))
 
 
 def write(table: Table, path: Path) -> None:

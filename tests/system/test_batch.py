@@ -25,6 +25,7 @@ from orchestrator.studies.space import Space
 from orchestrator.studies.study import read_study, ready_studies
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
+from support.runs import prepared
 from support.straight import straight_rows
 
 pytest.importorskip("numba", reason="needs numba: the extra `studies`")
@@ -41,7 +42,8 @@ def systems(*names: str) -> dict[str, System]:
 
 
 def engines(*names: str) -> tuple[BatchEngine, FmuEngine]:
-    return BatchEngine(systems(*names), KIND), FmuEngine(systems(*names), "compiled")
+    fmus = FmuEngine({name: prepared(name, KIND) for name in names}, "compiled")
+    return BatchEngine(systems(*names), KIND), fmus
 
 
 @cache
@@ -202,10 +204,6 @@ def test_threads_have_noise_of_their_own():
     with ThreadPoolExecutor(4) as pool:
         side_by_side = list(pool.map(lambda run: next(batch.outcomes([run])), runs))
     assert side_by_side == list(batch.outcomes(runs))
-
-
-def test_digest_is_that_of_the_systems_too():
-    assert BatchEngine(systems("fig4"), KIND).digest != BatchEngine(systems("fig5"), KIND).digest
 
 
 def test_other_systems_are_refused_by_what_differs(tmp_path):

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,8 +18,12 @@ import pytest
 from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.errors import InputError
+from orchestrator.experiments.preparation import Prepared
+from orchestrator.experiments.scenario import Scenario
 from orchestrator.experiments.stored import read_result
+from orchestrator.master.experiment import Experiment
 from orchestrator.master.files import read_columns, read_rows
+from orchestrator.studies.engine import Run
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.system.unpacking import unpacked
 from support.others import build, system_of
@@ -136,12 +141,14 @@ def test_an_fmu_that_has_another_content_is_another_one(workplace: Path):
 
 def test_who_takes_fmus_along_takes_those_that_were_read(workplace: Path):
     fmu = build(workplace)
-    engine = FmuEngine({"s": system_of(fmu)})
-    assert pickle.loads(pickle.dumps(engine)).digest == engine.digest
+    experiment = Experiment(0.2, 0.1)
+    prepared = Prepared(Scenario("s"), system_of(fmu), experiment)
+    engine, run = FmuEngine({"s": prepared}), Run(0, "s", {}, 0.2, 0.1)
+    assert list(pickle.loads(pickle.dumps(engine)).outcomes([run])) == list(engine.outcomes([run]))
     replace_by_another(fmu)
     with pytest.raises(InputError, match=r"plain\.fmu: has changed since it was read"):
         pickle.dumps(engine)
-    assert FmuEngine({"s": system_of(fmu)}).digest != engine.digest
+    assert Prepared(Scenario("s"), system_of(fmu), experiment).identity != prepared.identity
 
 
 def test_stored_result_is_read_again_with_its_parameters():
@@ -151,6 +158,22 @@ def test_stored_result_is_read_again_with_its_parameters():
     assert name == "fig4"
     assert np.array_equal(table.rows, again.rows)
     assert {str(name): value for name, value in table.parameters.items()} == again.parameters
+
+
+def test_record_tells_by_its_identity_whether_numbers_are_the_same():
+    def recorded(name: str, **how: object) -> dict[str, Any]:
+        result = simulate("fig4", stop_time=0.1, kind="native", **how)
+        return json.loads((result.save(name) / "run.json").read_text())
+
+    first = recorded("first")
+    same = [
+        recorded("loop", loop="python"),
+        recorded("isolated", isolate=True),
+        recorded("own", parameters={"plant.noise.std": 0.001}),
+    ]
+    assert {record["identity"] for record in same} == {first["identity"]}
+    other = recorded("other", steps={"controller": 0.04})
+    assert other["identity"] != first["identity"]
 
 
 def peak_memory(*arguments: str) -> int:

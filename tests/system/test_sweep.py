@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,12 @@ import pytest
 from orchestrator import sweep
 from orchestrator.commands.main import main
 from orchestrator.experiments.preparation import loaded
+from orchestrator.experiments.scenario import Scenario
 from orchestrator.studies.engine import INDICES
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import read_study
+from orchestrator.studies.study import BATCH, ENGINES, read_study, study_of
+from support import others
 from support.machine import contents
 
 pytest.importorskip("distributed", reason="needs Dask: the extra `studies`")
@@ -44,9 +47,8 @@ def files(folder: Path) -> dict[str, int]:
 def straight(path: Path) -> list[Any]:
     """The outcomes of all runs, made one after the other in this process."""
     study = read_study(str(path))
-    systems = {name: loaded(name, "native") for name in study.scenario}
-    space = Space(study, systems)
-    engine = FmuEngine({name: system for name, (_, system) in systems.items()})
+    space = Space(study, {name: loaded(name, "native") for name in study.scenario})
+    engine = FmuEngine(space.prepared)
     return list(engine.outcomes([space[i] for i in range(len(space))]))
 
 
@@ -86,7 +88,7 @@ def test_command_makes_what_is_missing_and_nothing_twice(study, capfd):
     assert main(command) == 2
     err = capfd.readouterr().err.splitlines()
     assert [line.split("; ")[0] for line in err] == [
-        "auv-fmu: results/mine holds another study, which differs in version",
+        "auv-fmu: results/mine holds another study, which differs in systems",
         "auv-fmu: results/mine holds another study, which differs in vary, points",
     ]
     assert files(folder)["runs.parquet"] == before["runs.parquet"]
@@ -105,3 +107,62 @@ def test_what_cannot_be_done_is_one_line(study, capfd, arguments, words):
     assert main(["sweep", *arguments, "--kind", "native"]) == 2
     [line] = capfd.readouterr().err.splitlines()
     assert words in line
+
+
+OWN = """
+scenario = "own.toml"
+engine = "{}"
+[vary]
+plant.eta0.y = [0.0, 4.0]
+"""
+
+#: Of a scenario, and what the batch engine says of what it does not know.
+CHANGES = {
+    "stop_time = 2.0": "",
+    "stop_time = 1.0\nstep = 0.01": "",
+    'stop_time = 1.0\norder = "jacobi"': "",
+    'stop_time = 1.0\n[components]\ncontroller = "PdController"\n[wires]\n'
+    '"controller.dy" = "plant.dy"': "",
+    "stop_time = 1.0\n[steps]\ncontroller = 0.2": "its controller has a step of its own",
+    'stop_time = 1.0\norder = ["plant", "disturbance", "planner", "controller"]': "has order = ",
+    'stop_time = 1.0\n[[events]]\nat = 0.5\nfreeze = "plant.y"': "has events",
+}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_another_scenario_of_the_same_name_is_another_study(workplace, capfd, engine):
+    """Nothing that decides the numbers may change between two rows."""
+    (workplace / "mine.toml").write_text(OWN.format(engine))
+    own, folder = workplace / "own.toml", workplace / "results" / "mine"
+    own.write_text("stop_time = 1.0\n")
+    command = ["sweep", "mine.toml", "--kind", "native", "--workers", "1"]
+    assert main(command) == 0
+    before = contents(folder)
+    for change, unknown in CHANGES.items():
+        own.write_text(change)
+        capfd.readouterr()
+        assert main(command) == 2, change
+        [line] = capfd.readouterr().err.splitlines()
+        words = unknown if engine == BATCH and unknown else "which differs in systems; choose"
+        assert words in line
+        assert contents(folder) == before
+    own.write_text("title = 'Another'\nstop_time = 1.0\n")
+    assert main(command) == 0
+    assert contents(folder)["runs.parquet"] == before["runs.parquet"]
+
+
+def test_runs_have_the_steps_that_a_system_is_given_where_it_names_none(tmp_path):
+    """Those that its FMUs were made for, as a run by itself has them."""
+    named = ('guid="others">', 'guid="others"><DefaultExperiment stepSize="{}"/>')
+    fmus = []
+    for name, step in (("a", "0.1"), ("b", "0.2")):
+        (tmp_path / name).mkdir()
+        fmus.append(others.build(tmp_path / name, change=(named[0], named[1].format(step))))
+    a, b = (others.system_of(fmu, name) for fmu, name in zip(fmus, "ab", strict=True))
+    system = replace(a, components={**a.components, **b.components})
+    study = study_of("mine", {"scenario": "own", "stop_time": 1.0})
+    space = Space(study, {"own": (Scenario("own"), system)})
+    assert space[0].step == 0.1
+    assert space.prepared["own"].system.steps == {"a": 0.1, "b": 0.2}
+    varied = study_of("mine", {"scenario": "own", "stop_time": 1.0, "vary": {"step": [0.05]}})
+    assert not Space(varied, {"own": (Scenario("own"), system)}).prepared["own"].system.steps

@@ -9,11 +9,11 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from hashlib import sha256
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from auv_fmu.closed_loop import LAWS, Law
+from orchestrator.master.identity import code_of
 from orchestrator.studies.batch import kernel
 from orchestrator.studies.batch.kernel import Moment
 from orchestrator.system.cache import keep, kept
@@ -87,15 +87,6 @@ class _Kept:
         return f"{digest()}-{sha256(text.encode()).hexdigest()[:16]}"
 
 
-@cache
 def digest() -> str:
     """Of the text of all that is compiled."""
-    found = sha256()
-    for package in ("auv_fmu", "orchestrator.studies.batch"):
-        specification = find_spec(package)
-        assert specification is not None and specification.submodule_search_locations
-        [root] = specification.submodule_search_locations
-        for path in sorted(Path(root).rglob("*.py")):
-            found.update(f"{package}/{path.relative_to(root)}\0".encode())
-            found.update(path.read_bytes())
-    return found.hexdigest()[:16]
+    return code_of("auv_fmu", "orchestrator.studies.batch")[:16]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import InputError
+from orchestrator.experiments.preparation import with_companion
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
 from orchestrator.paper.outcomes import Outcomes, key_of
@@ -58,9 +59,26 @@ def test_what_is_set_goes_for_the_companion_too():
     assert Run("fig5", order="jacobi").companions() == [Run("fig5-pd", order="jacobi")]
 
 
+def test_a_scenario_and_its_companion_are_run_as_it_says(tmp_path):
+    own = tmp_path / "own.toml"
+    own.write_text(
+        'compare = "fig5-pd"\norder = "jacobi"\nstop_time = 1.0\n[steps]\ncontroller = 0.2\n'
+    )
+    run = Run(str(own))
+    [companion] = run.companions()
+    for one in (run.prepared(), companion.prepared()):
+        assert one.experiment.order == "jacobi"
+        assert one.system.steps == {"controller": 0.2}
+    [as_one] = with_companion(run.prepared(), run.request)[1:]
+    assert companion.prepared().identity == as_one.identity
+    assert companion.label == ("fig5-pd --stop-time 1 --order jacobi (steps: controller = 0.2 s)")
+
+
 def test_keys_tell_what_is_run_and_not_how_it_is_called(tmp_path):
     copy = tmp_path / "copy.toml"
     copy.write_text('title = "Another"\nstop_time = 100.0\n')
+    slow = tmp_path / "slow.toml"
+    slow.write_text("stop_time = 100.0\n[steps]\ncontroller = 0.2\n")
     key = key_of(Run("fig4").prepared())
     assert key_of(Run("fig4", {"plant.noise.std": 0.001}).prepared()) == key
     assert key_of(Run(str(copy), {"plant.noise.std": 0.001}).prepared()) == key
@@ -71,6 +89,7 @@ def test_keys_tell_what_is_run_and_not_how_it_is_called(tmp_path):
         Run("fig4", step=0.01),
         Run("fig5"),
         Run("fig5-pd"),
+        Run(str(slow)),
     ]
     assert len({key, *(key_of(run.prepared()) for run in others)}) == 1 + len(others)
 

@@ -11,16 +11,16 @@ import threading
 import pytest
 
 from orchestrator import simulate
-from orchestrator.experiments.preparation import load
 from orchestrator.studies.engine import Run
 from orchestrator.studies.fmu_engine import FmuEngine
+from support.runs import prepared
 
 CHANGES = {"plant.eta0.y": 3.0, "controller.eps_t": 2.0, "plant.noise.seed": 7}
 
 
 @pytest.fixture(scope="module")
 def engine():
-    return FmuEngine({name: load(name, "native") for name in ("fig5", "fig5-pd")})
+    return FmuEngine({name: prepared(name) for name in ("fig5", "fig5-pd")})
 
 
 @pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
@@ -63,30 +63,17 @@ def test_fmus_travel_with_the_engine(tmp_path, native):
     (tmp_path / "own.toml").write_text(
         '[components]\nplant = "AuvPlant.fmu"\ncontroller = "ObserverController.fmu"\n'
     )
-    engine = FmuEngine({"own": load(tmp_path / "own.toml", "native")})
+    engine = FmuEngine({"own": prepared(tmp_path / "own.toml")})
     sent = pickle.dumps(engine)
     shutil.rmtree(tmp_path)
     runs = [Run(0, "own", CHANGES, 1.0, 0.02)]
     arrived = pickle.loads(sent)
     [outcome] = arrived.outcomes(runs)
     assert outcome.failure is None
-    assert [outcome] == list(FmuEngine({"own": load("fig4", "native")}).outcomes(runs))
+    assert [outcome] == list(FmuEngine({"own": prepared("fig4")}).outcomes(runs))
     # And on from there: what has come by post can be posted.
     assert list(pickle.loads(pickle.dumps(arrived)).outcomes(runs)) == [outcome]
     assert arrived.digest == pickle.loads(sent).digest
-
-
-def test_digest_tells_systems_apart_and_not_their_places(tmp_path, native):
-    folders = [tmp_path / "a", tmp_path / "b"]
-    for folder in folders:
-        folder.mkdir()
-        shutil.copy(native / "auv.ssp", folder)
-    one, other = (FmuEngine({"auv": load(folder / "auv.ssp")}) for folder in folders)
-    assert one.digest == other.digest
-    changed = load("fig4", "native").with_parameters({})
-    assert FmuEngine({"auv": changed}).digest == FmuEngine({"auv": load("fig4", "native")}).digest
-    assert FmuEngine({"auv": load("fig5", "native")}).digest != one.digest
-    assert FmuEngine({"auv": load("fig4", "python")}).digest != one.digest
 
 
 def test_interrupt_is_no_failure_of_a_run(engine):
