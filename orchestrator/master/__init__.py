@@ -23,6 +23,10 @@ module                  what it holds
 :mod:`.mode`            the processor's floating-point mode, which FMUs can change
 :mod:`.paces`           which components take longer steps of their own
 :mod:`.schedule`        which components are stepped when, and on whose outputs
+:mod:`.ring`            rings of direct feedthroughs, solved at one time
+:mod:`.settling`        values handed along all connections at one time
+:mod:`.linear`          steps in which inputs change linearly
+:mod:`.growth`          values that a delayed ring lets grow without bound
 :mod:`.signals`         what is done to values on their way from outputs to inputs
 :mod:`.attendant`       who acts on a run between two steps
 :mod:`.events`          what happens to a run: at a time, or at a condition
@@ -31,6 +35,7 @@ module                  what it holds
 :mod:`.spool`           rows in a file that grows, to be read again
 :mod:`.real_time`       a run that goes no faster than a clock
 :mod:`.loop`            the steps in Python, one by one, and which loop makes them
+:mod:`.ends`            the last row of a run that a component ends within a step
 :mod:`.stepper`         the steps compiled, some hundred in one call of stepper.c
 :mod:`.layout`          what stepper.c works on
 :mod:`.library`         stepper.c as a library, kept in the user's cache folder

@@ -35,6 +35,7 @@ class Run:
         events: the scenario whose events happen; empty: its own.
         inputs: the table that inputs follow; empty: the scenario's own.
         steps: of components that take longer ones [s]; they win over the scenario's.
+        coupling: how rings are closed; None: as the scenario has it.
 
     """
 
@@ -47,6 +48,7 @@ class Run:
     events: str = ""
     inputs: str = ""
     steps: Mapping[str, float] = field(default_factory=dict, hash=False)
+    coupling: str | None = None
 
     @property
     def label(self) -> str:
@@ -55,6 +57,7 @@ class Run:
             *(("--stop-time", _text(self.stop_time)) if self.stop_time is not None else ()),
             *(("--step", _text(self.step)) if self.step is not None else ()),
             *(("--order", written_order(self.order)) if self.order is not None else ()),
+            *(("--coupling", self.coupling) if self.coupling is not None else ()),
             *(("--kind", self.kind) if self.kind != PYTHON else ()),
             *(("--events", self.events) if self.events else ()),
             *(("--inputs", self.inputs) if self.inputs else ()),
@@ -78,6 +81,7 @@ class Run:
             steps=self.steps,
             events=read_scenario(self.events).events if self.events else None,
             inputs=inputs_of(self.inputs or None),
+            coupling=self.coupling,
         )
 
     def prepared(self) -> Prepared:
@@ -126,6 +130,7 @@ class Run:
                 for name, step in prepared.system.steps.items()
                 if own.system.steps.get(name) != step
             },
+            None if experiment.coupling == own.experiment.coupling else experiment.coupling,
         )
 
 

@@ -103,11 +103,14 @@ def test_files_hold_texts_and_give_the_numbers_beside_them_again(workplace, form
 
 @EVERY_WAY
 def test_texts_that_change_in_every_step_arrive(tmp_path, way):
-    """Each of two FMUs says the number of its steps, and hears the other's of the step before."""
+    """Each of two FMUs says the number of its steps, and hears the other's of the step before.
+
+    At first each holds the start value of its description.
+    """
     wires = {"a.said": "b.heard", "b.said": "a.heard"}
     table = run(system_of(build(tmp_path, "SPEAKS"), "ab", wires), **way)
-    assert table["a.heard"].tolist()[:4] == ["", "a1 ", "a2 b1 ", "a3 b2 a1 "]
-    assert table["b.heard"].tolist()[:4] == ["", "b1 ", "b2 a1 ", "b3 a2 b1 "]
+    assert table["a.heard"].tolist()[:4] == ["start", "a1 start", "a2 b1 start", "a3 b2 a1 start"]
+    assert table["b.heard"].tolist()[:4] == ["start", "b1 start", "b2 a1 start", "b3 a2 b1 start"]
 
 
 @HERE
