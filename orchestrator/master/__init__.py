@@ -23,6 +23,7 @@ module                  what it holds
 :mod:`.mode`            the processor's floating-point mode, which FMUs can change
 :mod:`.paces`           which components take longer steps of their own
 :mod:`.schedule`        which components are stepped when, and on whose outputs
+:mod:`.coupling`        how components are coupled: at the start, and in every step
 :mod:`.ring`            rings of direct feedthroughs, solved at one time
 :mod:`.settling`        values handed along all connections at one time
 :mod:`.linear`          steps in which inputs change linearly

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from orchestrator.errors import InputError
 from orchestrator.master.observer import Ending, Header
-from orchestrator.system.graph import has_feedthrough
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
 
 #: A value grows without bound if it doubles at least so often in each of so many intervals, one
 #: after the other, and so often in all of them together. What grows with a power of time does not.
@@ -64,18 +62,3 @@ class Growth:
 
     def end(self, ending: Ending) -> None:
         """Nothing is kept."""
-
-
-def delayed_ports(
-    system: System, whole: Sequence[Sequence[str]], solved: Sequence[Sequence[str]]
-) -> list[PortName]:
-    """The inputs that rings feed by themselves which are not solved as a whole."""
-    left = [ring for ring in whole if set(ring) not in map(set, solved)]
-    ring_of = {name: i for i, ring in enumerate(left) for name in ring}
-    return [
-        connection.target
-        for connection in system.connections
-        if connection.source.component in ring_of
-        and ring_of[connection.source.component] == ring_of.get(connection.target.component)
-        and has_feedthrough(system, connection)
-    ]

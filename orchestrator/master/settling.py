@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-import numpy as np
-
 from orchestrator.errors import shortened
 from orchestrator.master.instance import ComponentFailed, Instance
 from orchestrator.master.ring import Ring
@@ -31,7 +29,7 @@ class _Single:
         values, targets = self._row.values, self._gather.targets
         before = values[targets]
         self._gather(values)
-        if not always and np.array_equal(before, values[targets], equal_nan=True):
+        if not always and before.tobytes() == values[targets].tobytes():
             return False
         self._instance.exchange()
         self._row.show(self._instance.name)

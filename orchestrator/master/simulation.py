@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from math import lcm
@@ -12,26 +12,24 @@ import numpy as np
 
 from orchestrator.errors import InputError, StartError, reason, unforeseen
 from orchestrator.master.attendant import Attendance, Attendant, Run
+from orchestrator.master.coupling import Coupling
 from orchestrator.master.ends import to_its_end
-from orchestrator.master.experiment import DELAY, GAUSS_SEIDEL, LINEAR, SOLVE, Experiment
-from orchestrator.master.growth import Growth, delayed_ports
+from orchestrator.master.experiment import LINEAR, Experiment
+from orchestrator.master.growth import Growth
 from orchestrator.master.instance import ComponentFailed, Ended, Instance
 from orchestrator.master.interrupts import held_interrupts
 from orchestrator.master.isolated import Isolation
-from orchestrator.master.linear import LinearSteps, check_linear
+from orchestrator.master.linear import check_linear
 from orchestrator.master.log import Log
 from orchestrator.master.loop import PYTHON_LOOP, Loop
 from orchestrator.master.mode import default_mode
 from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.paces import paces
 from orchestrator.master.placing import placed
-from orchestrator.master.ring import Ring
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import Action, Stage, delays, schedule, stages
-from orchestrator.master.settling import Settling
-from orchestrator.master.signals import Gathering, Signals
+from orchestrator.master.schedule import stages
+from orchestrator.master.signals import Signals
 from orchestrator.master.surroundings import Surroundings
-from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import literal, same
@@ -80,15 +78,14 @@ def simulate(
             stack.enter_context(surroundings)
             loop = _possible_loop(loop, instances, log)
             row = Row(system, instances, slow)
-            whole = [Ring(ring, system, instances, row) for ring in rings(system)]
-            solved = _initialise(system, instances, row, whole, experiment, slow, log)
+            coupling = Coupling(system, experiment, instances, row, log)
+            coupling.initialise()
             names = tuple(map(str, row.columns))
             parameters = _parameters(system, instances, log)
             texts = dict.fromkeys(map(str, row.text_ports), row.texts)
             header = Header(names, experiment, parameters, loop.name, texts)
-        scheduled, gatherings = _scheduled(system, experiment, instances, row, solved)
-        parts = [[ring.names for ring in some] for some in (whole, solved)]
-        if watched := delayed_ports(system, *parts):
+        scheduled, gatherings = coupling.schedule()
+        if watched := coupling.delayed_ports():
             observers = [*observers, Growth(watched)]
         with _told(header, observers, surroundings) as tell:
             blocks = Blocks(len(row.shown), observers, surroundings.ours)
@@ -107,8 +104,7 @@ def simulate(
                 interrupts,
                 attendants,
             )
-            plan = stages(system, experiment.order, [ring.names for ring in solved])
-            order = [name for names in plan for name in names]
+            order = [name for names in coupling.plan for name in names]
             remark = None
             try:
                 failure = _advance(run, loop, Attendance(run), order, surroundings)
@@ -173,105 +169,6 @@ def _possible_loop(loop: Loop, instances: Mapping[str, Instance], log: Log) -> L
         "process; steps are made in Python"
     )
     return PYTHON_LOOP
-
-
-def _initialise(
-    system: System,
-    instances: Mapping[str, Instance],
-    row: Row,
-    whole: Sequence[Ring],
-    experiment: Experiment,
-    slow: Collection[str],
-    log: Log,
-) -> list[Ring]:
-    """Set parameters, exchange values in initialisation mode until they rest, leave that mode.
-
-    Returns:
-        The rings that are solved in every step.
-
-    Raises:
-        InputError: the values do not come to rest, or an FMU refused a value.
-        StartError: a value is not finite.
-
-    """
-    for name, instance in instances.items():
-        instance.enter_initialization(system.parameters_of(name), experiment.start_time)
-        held = instance.read(system.open_inputs(name))
-        row.enter({PortName(name, port): value for port, value in held.items()})
-    _settling(system, instances, row, whole).begin()
-    _check_finite(instances, row, experiment)
-    for instance in instances.values():
-        instance.exit_initialization()
-    solved = _solvable(system, instances, row, whole, experiment, slow, log)
-    _settling(system, instances, row, solved).hand_on(everything=True)
-    _check_finite(instances, row, experiment)
-    if log.refusals:
-        raise InputError("; ".join(log.refusals))
-    return solved
-
-
-def _settling(
-    system: System, instances: Mapping[str, Instance], row: Row, solved: Sequence[Ring]
-) -> Settling:
-    plan = stages(system, GAUSS_SEIDEL, [ring.names for ring in solved])
-    return Settling(system, instances, row, plan, solved)
-
-
-def _solvable(
-    system: System,
-    instances: Mapping[str, Instance],
-    row: Row,
-    whole: Sequence[Ring],
-    experiment: Experiment,
-    slow: Collection[str],
-    log: Log,
-) -> list[Ring]:
-    """The rings that can be solved in every step, as far as that is wanted.
-
-    Raises:
-        InputError: it is wanted of all, and one cannot be.
-
-    """
-    if experiment.coupling == LINEAR:
-        # Where outputs are computed in steps only, the second one has them right.
-        return list(whole)
-    reasons: dict[str, str] = {}
-    if experiment.coupling == DELAY:
-        reasons = dict.fromkeys(system.components, "")
-    else:
-        for ring in whole:
-            reasons |= ring.unsolved()
-        reasons |= {name: f"{name} takes longer steps" for name in slow}
-    solved = rings(system, system.components.keys() - reasons.keys())
-    if experiment.coupling == SOLVE:
-        for delay in delays(system, GAUSS_SEIDEL, solved, reasons):
-            raise InputError(f"coupling solve: {delay}")
-    for delay in delays(system, experiment.order, solved, reasons):
-        log.remark(delay)
-    return [Ring(names, system, instances, row) for names in solved]
-
-
-def _scheduled(
-    system: System,
-    experiment: Experiment,
-    instances: Mapping[str, Instance],
-    row: Row,
-    solved: Sequence[Ring],
-) -> tuple[list[Stage], list[Gathering]]:
-    """The stages of every step, and all that is gathered in one."""
-    if experiment.coupling == LINEAR:
-        settling = _settling(system, instances, row, solved)
-        steps = LinearSteps(system, instances, row, settling)
-        return [Stage(Gathering.along(row, ()), [Action(steps.step).member])], settling.gatherings
-    plan = stages(system, experiment.order, [ring.names for ring in solved])
-    found = schedule(system, experiment, plan, instances, row, solved)
-    own = [gather for ring in solved for gather in ring.gatherings]
-    return found, [stage.gather for stage in found] + own
-
-
-def _check_finite(instances: Mapping[str, Instance], row: Row, experiment: Experiment) -> None:
-    if wrong := row.wrong(instances):
-        raise StartError(f"stopped at t = {experiment.start_time:g} s: {wrong}")
 
 
 def _parameters(

@@ -71,7 +71,9 @@ def test_a_scenario_and_its_companion_are_run_as_it_says(tmp_path):
         assert one.system.steps == {"controller": 0.2}
     [as_one] = with_companion(run.prepared(), run.request)[1:]
     assert companion.prepared().identity == as_one.identity
-    assert companion.label == ("fig5-pd --stop-time 1 --order jacobi (steps: controller = 0.2 s)")
+    assert companion.label == (
+        "fig5-pd --stop-time 1 --order jacobi --set planner.eta0.z=-2 (steps: controller = 0.2 s)"
+    )
 
 
 def test_keys_tell_what_is_run_and_not_how_it_is_called(tmp_path):

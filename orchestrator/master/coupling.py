@@ -1,0 +1,138 @@
+"""How the components of a run are coupled: at its start, and in every step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from orchestrator.errors import InputError, StartError
+from orchestrator.master.experiment import DELAY, GAUSS_SEIDEL, LINEAR, SOLVE, Experiment
+from orchestrator.master.instance import Instance
+from orchestrator.master.linear import LinearSteps
+from orchestrator.master.log import Log
+from orchestrator.master.paces import paces
+from orchestrator.master.ring import Ring
+from orchestrator.master.row import Row
+from orchestrator.master.schedule import Action, Stage, delays, schedule, stages
+from orchestrator.master.settling import Settling
+from orchestrator.master.signals import Gathering
+from orchestrator.system.graph import has_feedthrough, rings
+from orchestrator.system.names import PortName
+from orchestrator.system.structure import System
+
+
+class Coupling:
+    """The rings of direct feedthroughs of a system, and what follows from them."""
+
+    def __init__(
+        self,
+        system: System,
+        experiment: Experiment,
+        instances: Mapping[str, Instance],
+        row: Row,
+        log: Log,
+    ) -> None:
+        """Find the rings.
+
+        Args:
+            system: that is run.
+            experiment: says how rings are closed.
+            instances: of its components.
+            row: that they are tied to.
+            log: takes where a ring is delayed.
+
+        """
+        self._system, self._experiment = system, experiment
+        self._instances, self._row, self._log = instances, row, log
+        self._rings = [self._ring(names) for names in rings(system)]
+        self._solved: list[Ring] = []
+
+    def initialise(self) -> None:
+        """Set parameters, exchange values in initialisation mode until they rest, leave that mode.
+
+        Raises:
+            InputError: the values do not come to rest, an FMU refused a value, or a ring is to be
+                solved that cannot be.
+            StartError: a value is not finite.
+
+        """
+        system, instances, start = self._system, self._instances, self._experiment.start_time
+        for name, instance in instances.items():
+            instance.enter_initialization(system.parameters_of(name), start)
+            held = instance.read(system.open_inputs(name))
+            self._row.enter({PortName(name, port): value for port, value in held.items()})
+        self._settling(self._rings).begin()
+        self._check_finite()
+        for instance in instances.values():
+            instance.exit_initialization()
+        self._solved = self._solvable()
+        self._settling(self._solved).hand_on(everything=True)
+        self._check_finite()
+        if self._log.refusals:
+            raise InputError("; ".join(self._log.refusals))
+
+    @property
+    def plan(self) -> list[list[str]]:
+        """All components in stages."""
+        return self._plan(self._experiment.order, self._solved)
+
+    def schedule(self) -> tuple[list[Stage], list[Gathering]]:
+        """The stages of every step, and all that is gathered in one."""
+        system, instances, row = self._system, self._instances, self._row
+        if self._experiment.coupling == LINEAR:
+            settling = self._settling(self._solved)
+            steps = LinearSteps(system, instances, row, settling)
+            stage = Stage(Gathering.along(row, ()), [Action(steps.step).member])
+            return [stage], settling.gatherings
+        found = schedule(system, self._experiment, self.plan, instances, row, self._solved)
+        own = [gather for ring in self._solved for gather in ring.gatherings]
+        return found, [stage.gather for stage in found] + own
+
+    def delayed_ports(self) -> list[PortName]:
+        """The inputs that a ring feeds by itself, of rings that are not solved as a whole."""
+        solved = [set(ring.names) for ring in self._solved]
+        left = [ring.names for ring in self._rings if set(ring.names) not in solved]
+        ring_of = {name: i for i, names in enumerate(left) for name in names}
+        return [
+            connection.target
+            for connection in self._system.connections
+            if connection.source.component in ring_of
+            and ring_of[connection.source.component] == ring_of.get(connection.target.component)
+            and has_feedthrough(self._system, connection)
+        ]
+
+    def _solvable(self) -> list[Ring]:
+        """The rings that are solved in every step."""
+        system, coupling = self._system, self._experiment.coupling
+        if coupling == LINEAR:
+            # Where outputs are computed in steps only, the second one has them right.
+            return self._rings
+        reasons: dict[str, str] = {}
+        if coupling == DELAY:
+            reasons = dict.fromkeys(system.components, "")
+        else:
+            for ring in self._rings:
+                reasons |= ring.unsolved()
+            for name, n in paces(system, self._experiment.step).items():
+                if n > 1:
+                    reasons[name] = f"{name} takes longer steps"
+        solved = rings(system, system.components.keys() - reasons.keys())
+        if coupling == SOLVE:
+            for delay in delays(system, GAUSS_SEIDEL, solved, reasons):
+                raise InputError(f"coupling solve: {delay}")
+        for delay in delays(system, self._experiment.order, solved, reasons):
+            self._log.remark(delay)
+        return [self._ring(names) for names in solved]
+
+    def _ring(self, names: Sequence[str]) -> Ring:
+        return Ring(names, self._system, self._instances, self._row)
+
+    def _plan(self, order: str | Sequence[str], solved: Sequence[Ring]) -> list[list[str]]:
+        return stages(self._system, order, [ring.names for ring in solved])
+
+    def _settling(self, solved: Sequence[Ring]) -> Settling:
+        plan = self._plan(GAUSS_SEIDEL, solved)
+        return Settling(self._system, self._instances, self._row, plan, solved)
+
+    def _check_finite(self) -> None:
+        if wrong := self._row.wrong(self._instances):
+            raise StartError(f"stopped at t = {self._experiment.start_time:g} s: {wrong}")
