@@ -54,9 +54,9 @@ class Growth:
                 grows &= doublings.sum(axis=-1) >= _IN_ALL
                 if found := np.flatnonzero(grows.any(axis=0)).tolist():
                     raise InputError(
-                        f"{self._names[found[0]]} grows without bound: what goes round a ring of "
-                        "direct feedthroughs arrives one step late; --coupling solve, where the "
-                        "FMUs allow it, or another --order helps"
+                        f"{self._names[found[0]]} grows without bound, in a ring of direct "
+                        "feedthroughs that is delayed by a step; --coupling solve, if its FMUs "
+                        "allow it, or another --order may help"
                     )
         self._rows += len(rows)
 

@@ -12,7 +12,6 @@ from contextlib import suppress
 from math import inf
 
 import numpy as np
-from fmpy.model_description import ModelVariable
 
 from orchestrator.errors import shortened
 from orchestrator.master.instance import ComponentFailed, Instance
@@ -58,24 +57,23 @@ class _Part:
         feeds: list[int],
         references: tuple[list[int], list[int]],
         nominals: list[float],
+        limits: list[float],
     ) -> None:
         self.instance, self.gather = instance, gather
         self.unknowns, self.feeds = unknowns, feeds
         self.block = np.ix_(feeds, unknowns)
         self._outputs, self._inputs = references
-        self._nominals = nominals
+        self._nominals, self._limits = nominals, limits
 
     def changes(self, values: np.ndarray, targets: np.ndarray, sources: np.ndarray) -> np.ndarray:
         """How its outputs change with its inputs, by differences: (feeds, unknowns)."""
         places = sources[self.feeds]
         found = np.zeros((len(self.feeds), len(self.unknowns)))
         here = values[places]
-        for column, (unknown, nominal) in enumerate(
-            zip(self.unknowns, self._nominals, strict=True)
-        ):
-            target = targets[unknown]
+        for column, target in enumerate(targets[self.unknowns]):
             held = values[target]
-            values[target] = held + _CHANGE * max(abs(held), nominal)
+            change = _CHANGE * max(abs(held), self._nominals[column])
+            values[target] = held + (change if held + change <= self._limits[column] else -change)
             self.instance.exchange()
             found[:, column] = (values[places] - here) / (values[target] - held)
             values[target] = held
@@ -145,7 +143,8 @@ class Ring:
                         [variables[connections[i].source.port].valueReference for i in feeds[name]],
                         [variable.valueReference for variable in inputs],
                     ),
-                    [_nominal(variable) for variable in inputs],
+                    [abs(_number(variable.nominal, 1.0)) or 1.0 for variable in inputs],
+                    [_number(variable.max, inf) for variable in inputs],
                 )
             )
 
@@ -309,8 +308,8 @@ def _is_real(system: System, connection: Connection) -> bool:
     )
 
 
-def _nominal(variable: ModelVariable) -> float:
-    """The nominal value of a variable, one where it names none."""
+def _number(text: str | None, otherwise: float) -> float:
+    """What a description says of a variable, if it says a number."""
     with suppress(ValueError):
-        return abs(real(variable.nominal or "1")) or 1.0
-    return 1.0
+        return otherwise if text is None else real(text)
+    return otherwise
