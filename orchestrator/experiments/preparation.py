@@ -432,6 +432,9 @@ def _beside(
 def _open_inputs(
     scenario: Scenario, system: System, given: Collection[PortName] = ()
 ) -> str | None:
+    if len(system.components) == 1:
+        # No other one could feed it.
+        return None
     # A file of the closed loop says which of its wires are not to be.
     on_purpose = left_open(scenario, system) if scenario.digest else ()
     return open_inputs(system, {*given, *on_purpose})

@@ -87,6 +87,7 @@ def foreign_system(fmu: Path, act: str = "BEHAVE", phase: str = "STEP", at: floa
             PortName("bad", "act"): ACTS[act],
             PortName("bad", "phase"): PHASES[phase],
             PortName("bad", "at"): at,
+            PortName("bad", "u"): 0.0,
         }
     )
 

@@ -86,7 +86,13 @@ def test_record_says_what_was_run_and_with_what():
     record = json.loads(Path("results/fig5/run.json").read_text())
     assert record["command"][:3] == ["auv-fmu", "run", "fig5"]
     assert record["scenario"] == "fig5"
-    experiment = {"start_time": 0.0, "stop_time": 0.2, "step": 0.02, "order": "gauss-seidel"}
+    experiment = {
+        "start_time": 0.0,
+        "stop_time": 0.2,
+        "step": 0.02,
+        "order": "gauss-seidel",
+        "coupling": None,
+    }
     assert record["experiment"] == experiment | {"steps": {}}
     assert record["parameters"]["plant.m11"] == 26.0
     assert record["fmus"].keys() == {"plant", "controller", "disturbance", "planner"}
