@@ -1,0 +1,278 @@
+"""What a large system costs before its first step: `python benchmarks/planning.py`.
+
+Chains, stars, and neighbours that feed one another, of one small FMU in C that does not say what
+its outputs depend on. Ours is the default order, which has to be found; libcosim and ecos step all
+at once. Every run is a process of its own, which is ended after a stated time. Printed are
+
+- `load`: from the file to what can be run,
+- `start`: plan, instances, initialisation and first exchange of values,
+- `10 steps`: these; libcosim starts in its first step, of which what the others take is taken off,
+- `memory`: the most that the process has had.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import importlib
+import json
+import resource
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+from zipfile import ZipFile
+
+from orchestrator.experiments.preparation import Request, load, prepare
+from orchestrator.experiments.scenario import Scenario
+from orchestrator.master.observer import Ending, Header
+from orchestrator.master.simulation import simulate
+from orchestrator.master.table import Table
+from orchestrator.system.component import read_component
+from orchestrator.system.names import PortName
+from orchestrator.system.osp import write_osp
+from orchestrator.system.ssp.writing import write_ssp
+from orchestrator.system.structure import Connection, System
+
+STEP, STEPS = 0.01, 10
+
+#: Instances, and how long a process may take [s].
+SIZES, LIMIT = (100, 1_000, 10_000), 60.0
+
+#: First argument of this script where it times one run.
+_ONE = "--one"
+
+_SUPPORT = Path(__file__).parents[1] / "tests" / "support"
+
+#: Outputs are computed when they are asked for, or else when the FMU is stepped.
+_SOURCE = """
+#include <stdlib.h>
+#include "slave.h"
+typedef struct { double u, v, y, t; } Instance;
+static void compute(Instance *it) { it->y = 0.25 * (it->u + it->v) + 1.0 + it->t; }
+Status fmi2SetDebugLogging(Component c, int on, size_t n, const char *const *names) { return OK; }
+Component fmi2Instantiate(const char *name, int type, const char *guid, const char *location,
+                          const Callbacks *callbacks, int visible, int logging)
+{
+    return calloc(1, sizeof(Instance));
+}
+void fmi2FreeInstance(Component c) { free(c); }
+Status fmi2SetupExperiment(Component c, int given, double tolerance, double start, int ends,
+                           double end)
+{
+    ((Instance *)c)->t = start;
+    return OK;
+}
+Status fmi2EnterInitializationMode(Component c) { return OK; }
+Status fmi2ExitInitializationMode(Component c) { return OK; }
+Status fmi2Terminate(Component c) { return OK; }
+Status fmi2Reset(Component c) { return OK; }
+Status fmi2SetReal(Component c, const unsigned *r, size_t n, const double *values)
+{
+    size_t i;
+    for (i = 0; i < n; i++) (&((Instance *)c)->u)[r[i]] = values[i];
+    return OK;
+}
+Status fmi2GetReal(Component c, const unsigned *r, size_t n, double *values)
+{
+    size_t i;
+    if (RESPONDS || ((Instance *)c)->t == 0.0) compute(c);
+    for (i = 0; i < n; i++) values[i] = (&((Instance *)c)->u)[r[i]];
+    return OK;
+}
+Status fmi2DoStep(Component c, double t, double h, int no_rollback)
+{
+    ((Instance *)c)->t = t + h;
+    compute(c);
+    return OK;
+}
+ABSENT(fmi2GetInteger)
+ABSENT(fmi2SetInteger)
+ABSENT(fmi2GetBoolean)
+ABSENT(fmi2SetBoolean)
+"""
+
+_DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="Small" guid="small">
+  <CoSimulation modelIdentifier="small" canHandleVariableCommunicationStepSize="true"/>
+  <ModelVariables>
+    <ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="v" valueReference="1" causality="input"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="y" valueReference="2" causality="output"><Real/></ScalarVariable>
+  </ModelVariables>
+  <ModelStructure><Outputs><Unknown index="3"/></Outputs></ModelStructure>
+</fmiModelDescription>
+"""
+
+
+def chain(n: int) -> list[tuple[int, int, str]]:
+    """Each feeds the next."""
+    return [(i, i + 1, "u") for i in range(n - 1)]
+
+
+def star(n: int) -> list[tuple[int, int, str]]:
+    """The first feeds all others."""
+    return [(0, i, "u") for i in range(1, n)]
+
+
+def neighbours(n: int) -> list[tuple[int, int, str]]:
+    """Each feeds the next, and that one feeds it."""
+    return chain(n) + [(i + 1, i, "v") for i in range(n - 1)]
+
+
+SHAPES = {shape.__name__: shape for shape in (chain, star, neighbours)}
+
+
+def build(folder: Path, responds: bool) -> Path:
+    """The FMU."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        raise SystemExit("planning.py needs a C compiler, cc")
+    source, library = folder / "small.c", folder / "small.so"
+    source.write_text(_SOURCE, encoding="utf-8")
+    options = ("-shared", "-fPIC", "-O1", f"-I{_SUPPORT}", f"-DRESPONDS={responds:d}")
+    subprocess.run([compiler, *options, "-o", library, source], check=True)
+    fmu = folder / "small.fmu"
+    with ZipFile(fmu, "w") as archive:
+        archive.writestr("modelDescription.xml", _DESCRIPTION)
+        archive.write(library, "binaries/linux64/small.so")
+    return fmu
+
+
+def write(fmu: Path, shape: str, n: int, folder: Path) -> None:
+    """A system in the formats of all hosts."""
+    small = read_component("a", fmu)
+    names = [f"a{i}" for i in range(n)]
+    connections = [
+        Connection(PortName(names[source], "y"), PortName(names[target], port))
+        for source, target, port in SHAPES[shape](n)
+    ]
+    components = {name: replace(small, name=name) for name in names}
+    system = System("large", components, tuple(connections), step=STEP)
+    write_ssp(system, folder)
+    write_osp(system, folder)
+
+
+class _First(Table):
+    """A table that knows when the first exchange was over."""
+
+    at = 0.0
+
+    def begin(self, header: Header) -> None:
+        self.at = perf_counter()
+        super().begin(header)
+
+
+def ours(folder: Path) -> tuple[float, float, float]:
+    """Our master."""
+    begun = perf_counter()
+    system = load(str(folder / "large.ssp"))
+    read = perf_counter()
+    prepared = prepare(Scenario(system.name), system, Request(stop_time=STEPS * STEP, loop="auto"))
+    table = _First()
+    ending: Ending = simulate(prepared.system, prepared.experiment, [table], loop=prepared.loop)
+    end = perf_counter()
+    if ending.failure is not None:
+        raise SystemExit(ending.failure)
+    return read - begun, table.at - read, end - table.at
+
+
+def in_libcosim(folder: Path) -> tuple[float, float, float]:
+    """libcosim."""
+    from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level  # noqa: PLC0415
+
+    log_output_level(CosimLogLevel.ERROR)
+    begun = perf_counter()
+    execution = CosimExecution.from_osp_config_file(osp_path=str(folder))
+    read = perf_counter()
+    if not execution.step(1):
+        raise SystemExit("libcosim ended the run")
+    first = perf_counter()
+    if not execution.step(STEPS - 1):
+        raise SystemExit("libcosim ended the run")
+    one = (perf_counter() - first) / (STEPS - 1)
+    return read - begun, first - read - one, STEPS * one
+
+
+def in_ecos(folder: Path) -> tuple[float, float, float]:
+    """ecos."""
+    for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
+        ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
+    ecospy: Any = importlib.import_module("ecospy")
+    begun = perf_counter()
+    with ecospy.EcosSimulation(step_size=STEP, ssp_path=str(folder / "large.ssp")) as simulation:
+        read = perf_counter()
+        simulation.init()
+        first = perf_counter()
+        simulation.step(STEPS)
+        return read - begun, first - read, perf_counter() - first
+
+
+HOSTS: dict[str, Callable[[Path], tuple[float, float, float]]] = {
+    "here": ours,
+    "libcosim": in_libcosim,
+    "ecos": in_ecos,
+}
+
+
+def measured(host: str, folder: Path, limit: float) -> str:
+    """What a process finds that makes one run, as the end of a line of the table."""
+    try:
+        process = subprocess.run(
+            [sys.executable, __file__, _ONE, host, str(folder)],
+            capture_output=True,
+            timeout=limit,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return f"not at its end after {limit:g} s"
+    for line in process.stdout.decode(errors="replace").splitlines():
+        if line.startswith(_ONE):
+            *times, memory = json.loads(line.removeprefix(_ONE))
+            return "".join(f"{seconds:10.3f} s" for seconds in times) + f"{memory:9.0f} MB"
+    said = process.stderr.decode(errors="replace").strip().splitlines()
+    return f"failed ({process.returncode}): {said[-1][:80] if said else 'without a word'}"
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sizes", nargs="+", type=int, default=SIZES, metavar="N")
+    parser.add_argument("--shapes", nargs="+", choices=SHAPES, default=list(SHAPES))
+    parser.add_argument("--hosts", nargs="+", choices=HOSTS, default=list(HOSTS))
+    parser.add_argument(
+        "--limit", type=float, default=LIMIT, metavar="S", help="for one run (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--cached",
+        action="store_true",
+        help="outputs are computed in steps only, and do not respond to inputs between them",
+    )
+    given = parser.parse_args()
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    titles = "".join(f"{title:>12}" for title in ("load", "start", f"{STEPS} steps", "memory"))
+    print(f"{'':12}{'instances':>9}  {'':9}{titles}")
+    with TemporaryDirectory(prefix="auvfmu") as made:
+        fmu = build(Path(made), not given.cached)
+        for shape in given.shapes:
+            for n in given.sizes:
+                with TemporaryDirectory(prefix="auvfmu") as folder:
+                    write(fmu, shape, n, Path(folder))
+                    for host in given.hosts:
+                        found = measured(host, Path(folder), given.limit)
+                        print(f"{shape:12}{n:9,}  {host:9}{found}", flush=True)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == [_ONE]:
+        taken = HOSTS[sys.argv[2]](Path(sys.argv[3]))
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+        print(f"\n{_ONE}{json.dumps([*taken, peak])}", flush=True)
+    else:
+        main()

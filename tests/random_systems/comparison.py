@@ -1,0 +1,123 @@
+"""Runs of random systems beside what they must show."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Sequence
+from itertools import product
+from math import isclose
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from orchestrator import Result, load, simulate
+from random_systems.evaluator import DELAY, GAUSS_SEIDEL, JACOBI, SOLVE, NoSolution, evaluate
+from random_systems.generator import draw, write
+
+LOOPS = ("python", "compiled")
+
+#: A difference so small, as a share of the largest value that a signal has, is a rounding error.
+TOLERANCE = 1e-9
+
+#: The same where values grow from step to step, and what is left of the start with them.
+_GROWING = 1e-6
+
+#: How many of so many systems run isolated as well.
+_ISOLATED = 25
+
+#: What a run comes to; it is undecided where a system has no solution that is known well enough.
+EQUAL, DIFFERS, REFUSED, UNDECIDED = "equal", "differing", "refused", "undecided"
+
+
+class Outcome(NamedTuple):
+    """What one run came to.
+
+    Attributes:
+        seed: of the system.
+        how: it was run.
+        what: :data:`EQUAL` or another of these.
+        why: in a line.
+
+    """
+
+    seed: int
+    how: str
+    what: str
+    why: str = ""
+
+
+def outcomes(seed: int) -> Iterator[Outcome]:
+    """All runs of the system of a seed."""
+    drawn = draw(seed)
+    names = list(drawn.parts)
+    random = Random(seed)
+    random.shuffle(names)
+    with TemporaryDirectory(prefix="random") as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        path = write(drawn, Path(folder))
+        for order, coupling in product((GAUSS_SEIDEL, JACOBI, tuple(names)), (SOLVE, DELAY)):
+            text = order if isinstance(order, str) else ",".join(order)
+            text += f" {coupling}"
+            try:
+                evaluation = evaluate(drawn, order, coupling)
+            except (NoSolution, ArithmeticError, ValueError) as error:
+                yield Outcome(seed, text, UNDECIDED, repr(error))
+                continue
+            if coupling == SOLVE:
+                has_rings = bool(evaluation.rings)
+            elif not has_rings:
+                continue
+            ways: list[dict[str, Any]] = [{"loop": loop} for loop in LOOPS]
+            if seed % _ISOLATED == 0 and order == GAUSS_SEIDEL:
+                ways.append({"isolate": True})
+            for way in ways:
+                how = f"{text} {way.get('loop', 'isolated')}"
+                try:
+                    system = path if random.random() < 0.5 or drawn.as_scenario else load(path)
+                    result = simulate(
+                        system,
+                        order=order,
+                        step=drawn.step,
+                        stop_time=drawn.stop_time,
+                        # Rings that cannot be solved are delayed, if nothing is said.
+                        coupling=None if coupling == SOLVE else coupling,
+                        **way,
+                    )
+                except ValueError as error:
+                    yield Outcome(seed, how, REFUSED, str(error))
+                    continue
+                rows = evaluation.rows
+                if drawn.strong and coupling == DELAY:
+                    # It may have to end early.
+                    kept = rows[: len(result)] if result.failure else rows
+                    why = difference(result, kept, _GROWING)
+                else:
+                    why = result.failure or difference(result, rows)
+                yield Outcome(seed, how, DIFFERS if why else EQUAL, why or "")
+
+
+def difference(
+    result: Result, rows: Sequence[dict[str, Any]], tolerance: float = TOLERANCE
+) -> str | None:
+    """The first value that is not what it must be, in words."""
+    if len(result) != len(rows):
+        return f"{len(result)} rows, not {len(rows)}"
+    for name in rows[0]:
+        found, wanted = result[name], [row[name] for row in rows]
+        if isinstance(wanted[0], float):
+            # Terms of the size of a thousandth may cancel.
+            size = max(float(np.abs(wanted).max()), 1e-3)
+            wrong = [
+                k
+                for k, (a, b) in enumerate(zip(found, wanted, strict=True))
+                if not isclose(a, b, rel_tol=0.0, abs_tol=tolerance * size)
+            ]
+        else:
+            wrong = [k for k, (a, b) in enumerate(zip(found, wanted, strict=True)) if a != b]
+        if wrong:
+            k = wrong[0]
+            return f"{name} is {found[k]!r} in row {k}, not {wanted[k]!r}"
+    return None

@@ -1,0 +1,534 @@
+"""What a system shows in every row, by brute force: from its description, and from no schedule.
+
+An output is a list of values, each with the number of the time from which on it holds. Formulas
+are computed as they stand; nothing here is taken from the master.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import pairwise
+from math import floor, fmod, isfinite, log, sin, sqrt, tanh
+from typing import Any
+
+import numpy as np
+
+from random_systems.generator import (
+    ABSENT,
+    ALL,
+    UNITS,
+    UNLISTED,
+    Drawn,
+    Fmu,
+    Formula,
+    Part,
+    Variable,
+    Wire,
+)
+
+GAUSS_SEIDEL, JACOBI = "gauss-seidel", "jacobi"
+DELAY, SOLVE = "delay", "solve"
+
+#: Rounds of a ring until its values must be at rest, and what counts as rest.
+_ROUNDS, _REST = 500, 2e-16
+
+#: Condition of a ring beyond which its solution is not known well enough.
+_WORST = 1e5
+
+Port = tuple[str, str]
+
+
+class NoSolution(Exception):
+    """The values of a ring do not come to rest."""
+
+
+_OPERATORS: dict[str, Callable[..., Any]] = {
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: a - b,
+    "*": lambda a, b: a * b,
+    "/": lambda a, b: a / b,
+    "sin": sin,
+    "tanh": tanh,
+    "sqrt": sqrt,
+    "log": log,
+    "max": max,
+    "mod": fmod,
+    "floor": floor,
+    ">": lambda a, b: a > b,
+    "or": lambda a, b: bool(a or b),
+    "not": lambda a: not a,
+    "same": lambda a, b: a == b,
+    "pick": lambda a, b, c: b if a else c,
+}
+
+
+def value_of(formula: Formula, scope: Mapping[Any, Any]) -> Any:
+    """A formula, with values of what it is computed from."""
+    operator, *rest = formula
+    match operator:
+        case "number" | "text":
+            return rest[0]
+        case "input" | "parameter" | "state":
+            return scope[operator, rest[0]]
+        case "time" | "length":
+            return scope[operator]
+    return _OPERATORS[operator](*(value_of(operand, scope) for operand in rest))
+
+
+def arriving(drawn: Drawn, wire: Wire, value: Any) -> Any:
+    """A value at the end of a wire."""
+    source = drawn.parts[wire.source[0]].fmu.named(wire.source[1])
+    target = drawn.parts[wire.target[0]].fmu.named(wire.target[1])
+    unit = source.unit
+    for hop in wire.hops:
+        if hop.unit != unit:
+            a, b = UNITS[unit], UNITS[hop.unit]
+            value = (a.factor * value + a.offset - b.offset) / b.factor
+            unit = hop.unit
+        if hop.linear is not None:
+            value = hop.linear[0] * value + hop.linear[1]
+        if hop.mapped:
+            value = dict(hop.mapped).get(value, value)
+    return typed(target, value)
+
+
+def typed(variable: Variable, value: Any) -> Any:
+    match variable.type:
+        case "Real":
+            return float(value)
+        case "Boolean":
+            return bool(value)
+        case "String":
+            return str(value)
+    return int(value)
+
+
+class Machine:
+    """A component at work."""
+
+    def __init__(self, part: Part, start_time: float) -> None:
+        self.fmu, self.time = part.fmu, start_time
+        self.values = {
+            one.name: typed(one, part.values.get(one.name, one.start))
+            for one in part.fmu.variables
+            if one.causality != "output"
+        }
+        self.states = [state.start for state in part.fmu.states]
+
+    def _scope(self, h: float = 0.0) -> dict[Any, Any]:
+        scope: dict[Any, Any] = {"time": self.time, "length": h}
+        for one in self.fmu.variables:
+            if one.causality != "output":
+                scope[one.causality, one.name] = self.values[one.name]
+        for i, state in enumerate(self.states):
+            scope["state", i] = state
+        return scope
+
+    def output(self, name: str) -> Any:
+        """An output with the inputs, states and time of now."""
+        value = value_of(self.fmu.outputs[name], self._scope())
+        if isinstance(value, float) and not isfinite(value):
+            raise NoSolution(name)
+        return typed(self.fmu.named(name), value)
+
+    def step(self, t: float, h: float) -> None:
+        """One step, with the inputs that it has."""
+        scope = self._scope(h)
+        self.states = [value_of(state.next, scope) for state in self.fmu.states]
+        self.time = t + h
+
+
+def has_feedthrough(fmu: Fmu, output: str) -> bool:
+    """Whether an output depends on an input of the same instant, as far as is declared."""
+    if fmu.declares in (ABSENT, UNLISTED):
+        return True
+    return bool(fmu.having("input") if fmu.declares == ALL else fmu.needs(output))
+
+
+def components(nodes: Sequence[Any], edges: Iterable[tuple[Any, Any]]) -> list[list[Any]]:
+    """The strongly connected components of a graph, what feeds others before them."""
+    after: dict[Any, set[Any]] = {node: set() for node in nodes}
+    for a, b in edges:
+        after[a].add(b)
+    reach = {}
+    for node in nodes:
+        found: set[Any] = set()
+        ahead = [node]
+        while ahead:
+            new = after[ahead.pop()] - found
+            found |= new
+            ahead += new
+        reach[node] = found
+    groups: list[list[Any]] = []
+    for node in nodes:
+        for group in groups:
+            if node in reach[group[0]] and group[0] in reach[node]:
+                group.append(node)
+                break
+        else:
+            groups.append([node])
+    found_groups: list[list[Any]] = []
+    while groups:
+        for group in groups:
+            others = [one for one in groups if one is not group]
+            if not any(group[0] in reach[one[0]] for one in others):
+                break
+        groups.remove(group)
+        found_groups.append(group)
+    return found_groups
+
+
+def is_ring(group: Sequence[Any], edges: Iterable[tuple[Any, Any]]) -> bool:
+    return len(group) > 1 or (group[0], group[0]) in set(edges)
+
+
+class Evaluation:
+    """One run of a system.
+
+    Attributes:
+        rows: values of all ports by `component.port`, one for each time.
+        rings: the solved rings, as sets of components.
+
+    """
+
+    def __init__(self, drawn: Drawn, order: str | Sequence[str], coupling: str) -> None:
+        self.drawn, self.order, self.coupling = drawn, order, coupling
+        self.fed = {wire.target: wire for wire in drawn.wires}
+        self.machines = {
+            name: Machine(part, drawn.start_time) for name, part in drawn.parts.items()
+        }
+        self.rings = self._solved_rings()
+        self.unit = {name: name for name in drawn.parts}
+        for ring in self.rings:
+            for name in ring:
+                self.unit[name] = ring[0]
+        self.late = self._late()
+        self.rows: list[dict[str, Any]] = []
+        self._run()
+
+    # What depends on what
+
+    def _feedthrough(self, wire: Wire) -> bool:
+        return has_feedthrough(self.drawn.parts[wire.source[0]].fmu, wire.source[1])
+
+    def _edges(self) -> list[tuple[str, str]]:
+        return [
+            (wire.source[0], wire.target[0]) for wire in self.drawn.wires if self._feedthrough(wire)
+        ]
+
+    def _solved_rings(self) -> list[list[str]]:
+        if self.coupling != SOLVE:
+            return []
+        names, edges = list(self.drawn.parts), self._edges()
+        responding = set()
+        for ring in components(names, edges):
+            if is_ring(ring, edges):
+                responding |= {name for name in ring if self._responds(name, ring)}
+        rest = [(a, b) for a, b in edges if a in responding and b in responding]
+        found = components([name for name in names if name in responding], rest)
+        return [sorted(ring, key=names.index) for ring in found if is_ring(ring, rest)]
+
+    def _responds(self, name: str, ring: Sequence[str]) -> bool:
+        """Whether a Real output that a ring takes follows a Real input that it gives, at once."""
+        part = self.drawn.parts[name]
+        if not part.fmu.responds or part.pace > 1:
+            return False
+        inputs = {
+            wire.target[1]
+            for wire in self.drawn.wires
+            if wire.target[0] == name and wire.source[0] in ring
+        }
+        outputs = {
+            wire.source[1]
+            for wire in self.drawn.wires
+            if wire.source[0] == name and wire.target[0] in ring
+        }
+        return any(
+            part.fmu.named(output).type == "Real"
+            and any(part.fmu.named(one).type == "Real" for one in part.fmu.needs(output) & inputs)
+            for output in outputs
+        )
+
+    def _late(self) -> set[int]:
+        """The wires with feedthrough that arrive one step late, by their identities."""
+        names = list(self.drawn.parts)
+        wires = {
+            id(wire): (self.unit[wire.source[0]], self.unit[wire.target[0]])
+            for wire in self.drawn.wires
+            if self._feedthrough(wire)
+            and (
+                self.unit[wire.source[0]] != self.unit[wire.target[0]]
+                or not any(wire.source[0] in ring for ring in self.rings)
+            )
+        }
+        if self.order == JACOBI:
+            return set(wires)
+        if not isinstance(self.order, str):
+            place: dict[str, int] = {}
+            for i, name in enumerate(self.order):
+                place.setdefault(self.unit[name], i)
+            return {i for i, (a, b) in wires.items() if place[a] >= place[b]}
+        units = [name for name in names if self.unit[name] == name]
+        late: set[int] = set()
+        while True:
+            left = {i: ends for i, ends in wires.items() if i not in late}
+            opened = set()
+            for group in components(units, left.values()):
+                if is_ring(group, left.values()):
+                    first = min(group, key=names.index)
+                    opened |= {i for i, (a, b) in left.items() if b == first and a in group}
+            if not opened:
+                return late
+            late |= opened
+
+    def _sequence(self) -> list[list[str]]:
+        """What is stepped one after the other: components, and rings as one."""
+        names = list(self.drawn.parts)
+        members: dict[str, list[str]] = {}
+        for name in names:
+            members.setdefault(self.unit[name], []).append(name)
+        if self.order == JACOBI:
+            return list(members.values())
+        if not isinstance(self.order, str):
+            units = list(dict.fromkeys(self.unit[name] for name in self.order))
+            return [members[unit] for unit in units]
+        edges = [
+            (self.unit[wire.source[0]], self.unit[wire.target[0]])
+            for wire in self.drawn.wires
+            if self._feedthrough(wire) and id(wire) not in self.late
+        ]
+        edges = [(a, b) for a, b in edges if a != b]
+        # Rings come after all that does not wait for them.
+        rings = {ring[0] for ring in self.rings}
+        left, found = list(members), []
+        while left:
+            ready = [one for one in left if not any(a in left and b == one for a, b in edges)]
+            taken = [one for one in ready if one not in rings] or ready
+            left = [one for one in left if one not in taken]
+            found += [members[one] for one in taken]
+        return found
+
+    # Values
+
+    def _hand(self, wire: Wire, value: Any) -> Any:
+        """Let an input take a value, and say what arrived."""
+        arrived = arriving(self.drawn, wire, value)
+        self.machines[wire.target[0]].values[wire.target[1]] = arrived
+        return arrived
+
+    def _settle(self, wires: Sequence[Wire]) -> None:
+        """Let inputs be what feeds them, whatever follows from what."""
+        by_target = {wire.target: wire for wire in wires}
+        sources = list(dict.fromkeys(wire.source for wire in wires))
+        edges = [
+            (by_target[source[0], needed].source, source)
+            for source in sources
+            for needed in self.drawn.parts[source[0]].fmu.needs(source[1])
+            if (source[0], needed) in by_target
+        ]
+        for group in components(sources, edges):
+            own = [wire for wire in wires if wire.source in group]
+            if is_ring(group, edges):
+                inner = [
+                    wire
+                    for wire in own
+                    if any(
+                        wire.target[0] == name
+                        and wire.target[1] in self.drawn.parts[name].fmu.needs(output)
+                        for name, output in group
+                    )
+                ]
+                self._close(inner)
+            for wire in own:
+                self._hand(wire, self.machines[wire.source[0]].output(wire.source[1]))
+
+    def _close(self, wires: Sequence[Wire]) -> None:
+        """Close wires that form a ring: in rounds, or else by Newton's method."""
+        begin = [self.machines[wire.target[0]].values[wire.target[1]] for wire in wires]
+        try:
+            for _ in range(_ROUNDS):
+                if self._round(wires) <= _REST:
+                    return
+        except (ArithmeticError, ValueError, NoSolution):
+            pass
+        for wire, value in zip(wires, begin, strict=True):
+            self.machines[wire.target[0]].values[wire.target[1]] = value
+        self._newton(wires)
+
+    def _round(self, wires: Sequence[Wire]) -> float:
+        """One after the other; the largest change, as a share."""
+        most = 0.0
+        for wire in wires:
+            machine, port = self.machines[wire.target[0]], wire.target[1]
+            before = machine.values[port]
+            now = self._hand(wire, self.machines[wire.source[0]].output(wire.source[1]))
+            if isinstance(now, float):
+                most = max(most, abs(now - before) / max(abs(now), 1.0))
+            elif now != before:
+                most = 1.0
+        return most
+
+    def _newton(self, wires: Sequence[Wire]) -> None:
+        real = [
+            wire
+            for wire in wires
+            if self.drawn.parts[wire.target[0]].fmu.named(wire.target[1]).type == "Real"
+        ]
+        others = [wire for wire in wires if wire not in real]
+
+        def put(x: np.ndarray) -> None:
+            for wire, value in zip(real, x, strict=True):
+                self.machines[wire.target[0]].values[wire.target[1]] = float(value)
+
+        def arrived() -> np.ndarray:
+            return np.array(
+                [
+                    arriving(self.drawn, wire, self.machines[wire.source[0]].output(wire.source[1]))
+                    for wire in real
+                ]
+            )
+
+        x = np.array([self.machines[wire.target[0]].values[wire.target[1]] for wire in real])
+        for _ in range(100):
+            put(x)
+            settled = self._round(others) == 0.0
+            residual = arrived() - x
+            if settled and np.all(np.abs(residual) <= 1e-13 * np.maximum(np.abs(x), 1.0)):
+                return
+            slopes = np.empty((len(x), len(x)))
+            for j in range(len(x)):
+                moved = x.copy()
+                moved[j] += 1e-6 * max(abs(x[j]), 1.0)
+                put(moved)
+                slopes[:, j] = (arrived() - moved - residual) / (moved[j] - x[j])
+            if np.linalg.cond(slopes) > _WORST:
+                raise NoSolution("hardly any solution")
+            step = np.linalg.solve(slopes, -residual)
+            share = 1.0
+            while share > 1e-6:
+                put(x + share * step)
+                try:
+                    if np.abs(arrived() - x - share * step).max() < np.abs(residual).max():
+                        break
+                except (ArithmeticError, ValueError, NoSolution):
+                    pass
+                share /= 2.0
+            else:
+                if np.all(np.abs(residual) <= 1e-11 * np.maximum(np.abs(x), 1.0)):
+                    put(x)
+                    return
+            x = x + share * step
+        raise NoSolution(", ".join(f"{wire.source} -> {wire.target}" for wire in real))
+
+    # The run
+
+    def _steps(self) -> list[tuple[float, float]]:
+        """Beginning and end of every step."""
+        drawn = self.drawn
+        times = [drawn.start_time]
+        while times[-1] + 1e-6 * drawn.step < drawn.stop_time:
+            end = drawn.start_time + len(times) * drawn.step
+            times.append(min(end, drawn.stop_time))
+        return list(pairwise(times))
+
+    def _run(self) -> None:
+        drawn = self.drawn
+        self._settle(drawn.wires)
+        shown = self._computed(list(drawn.parts))
+        self._show(shown)
+        spans, sequence = self._steps(), self._sequence()
+        # What will be shown once the time has come that it belongs to.
+        waiting: dict[Port, tuple[int, Any]] = {}
+        for k, (t, _) in enumerate(spans):
+            before = dict(shown)
+            for members in sequence:
+                pace = drawn.parts[members[0]].pace
+                if k % pace:
+                    continue
+                end = min(k + pace, len(spans))
+                self._advance(members, t, spans[end - 1][1], shown, before)
+                for port, value in self._computed(members).items():
+                    waiting[port] = end, value
+                    if pace == 1 or self._at_once(port):
+                        shown[port] = value
+            shown |= {port: value for port, (end, value) in waiting.items() if end == k + 1}
+            # Every row shows the solution of a ring.
+            for ring in self.rings:
+                self._renew(ring, shown)
+                shown |= self._computed(ring)
+            self._show(shown)
+
+    def _advance(
+        self,
+        members: Sequence[str],
+        t: float,
+        end: float,
+        shown: Mapping[Port, Any],
+        before: Mapping[Port, Any],
+    ) -> None:
+        """Step a component, or the components of a ring as one.
+
+        Args:
+            members: the components.
+            t, end: of the step.
+            shown: outputs as they are seen now.
+            before: as they were seen at the beginning of the communication step.
+
+        """
+        for wire in self._outer(members):
+            new = self._at_once(wire.source) and id(wire) not in self.late
+            self._hand(wire, (shown if new else before)[wire.source])
+        self._settle(self._inner(members))
+        for name in members:
+            self.machines[name].step(t, end - t)
+        if self.order != JACOBI:
+            self._renew(members, shown)
+
+    def _computed(self, members: Sequence[str]) -> dict[Port, Any]:
+        """The outputs of some components."""
+        return {
+            (name, one.name): self.machines[name].output(one.name)
+            for name in members
+            for one in self.drawn.parts[name].fmu.having("output")
+        }
+
+    def _at_once(self, port: Port) -> bool:
+        """Whether an output is seen as soon as it is computed."""
+        return self.order != JACOBI and has_feedthrough(self.drawn.parts[port[0]].fmu, port[1])
+
+    def _renew(self, members: Sequence[str], shown: Mapping[Port, Any]) -> None:
+        """Let a ring have the latest of what feeds it."""
+        if inner := self._inner(members):
+            for wire in self._outer(members):
+                self._hand(wire, shown[wire.source])
+            self._settle(inner)
+
+    def _inner(self, members: Sequence[str]) -> list[Wire]:
+        """The wires of a solved ring."""
+        return [
+            wire for wire in self.drawn.wires if wire.target[0] in members and self._is_inner(wire)
+        ]
+
+    def _outer(self, members: Sequence[str]) -> list[Wire]:
+        return [
+            wire
+            for wire in self.drawn.wires
+            if wire.target[0] in members and not self._is_inner(wire)
+        ]
+
+    def _is_inner(self, wire: Wire) -> bool:
+        return any(wire.source[0] in ring and wire.target[0] in ring for ring in self.rings)
+
+    def _show(self, outputs: Mapping[Port, Any]) -> None:
+        row = {".".join(port): value for port, value in outputs.items()}
+        for name, machine in self.machines.items():
+            for one in machine.fmu.having("input"):
+                row[f"{name}.{one.name}"] = machine.values[one.name]
+        self.rows.append(row)
+
+
+def evaluate(
+    drawn: Drawn, order: str | Sequence[str] = GAUSS_SEIDEL, coupling: str = DELAY
+) -> Evaluation:
+    """A run."""
+    return Evaluation(drawn, order, coupling)

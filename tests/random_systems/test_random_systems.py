@@ -1,0 +1,17 @@
+"""Random systems show what they must; `python tests/random_systems` runs thousands of them."""
+
+from __future__ import annotations
+
+import pytest
+
+from random_systems.comparison import EQUAL, UNDECIDED, outcomes
+
+#: Systems, and how many of them a test runs: tests go to several processes.
+SYSTEMS, BLOCK = 200, 10
+
+
+@pytest.mark.parametrize("first", range(0, SYSTEMS, BLOCK))
+def test_every_value_of_every_row_is_the_right_one(first):
+    runs = [run for seed in range(first, first + BLOCK) for run in outcomes(seed)]
+    assert len([run for run in runs if run.what == EQUAL]) > 4 * BLOCK
+    assert [run for run in runs if run.what not in (EQUAL, UNDECIDED)] == []
