@@ -52,6 +52,7 @@ class _Part:
     def __init__(
         self,
         instance: Instance,
+        row: Row,
         gather: Gathering,
         unknowns: list[int],
         feeds: list[int],
@@ -60,10 +61,16 @@ class _Part:
         limits: list[float],
     ) -> None:
         self.instance, self.gather = instance, gather
+        self._row = row
         self.unknowns, self.feeds = unknowns, feeds
         self.block = np.ix_(feeds, unknowns)
         self._outputs, self._inputs = references
         self._nominals, self._limits = nominals, limits
+
+    def exchange(self) -> None:
+        """Set its inputs and read its outputs, also those that are shown later in a step."""
+        self.instance.exchange()
+        self._row.show(self.instance.name)
 
     def changes(self, values: np.ndarray, targets: np.ndarray, sources: np.ndarray) -> np.ndarray:
         """How its outputs change with its inputs, by differences: (feeds, unknowns)."""
@@ -74,10 +81,10 @@ class _Part:
             held = values[target]
             change = _CHANGE * max(abs(held), self._nominals[column])
             values[target] = held + (change if held + change <= self._limits[column] else -change)
-            self.instance.exchange()
+            self.exchange()
             found[:, column] = (values[places] - here) / (values[target] - held)
             values[target] = held
-        self.instance.exchange()
+        self.exchange()
         return found
 
     def derivatives(
@@ -136,6 +143,7 @@ class Ring:
             self._parts.append(
                 _Part(
                     instances[name],
+                    row,
                     Gathering.along(row, [connections[i] for i in inner[name]]),
                     unknowns,
                     feeds[name],
@@ -238,12 +246,12 @@ class Ring:
 
     def _exchange(self) -> None:
         for part in self._parts:
-            part.instance.exchange()
+            part.exchange()
 
     def _go_round(self) -> None:
         for part in self._parts:
             part.gather(self._values)
-            part.instance.exchange()
+            part.exchange()
 
     def _looked(self) -> tuple[np.ndarray, np.ndarray]:
         """What the inputs have, and what arrives there."""

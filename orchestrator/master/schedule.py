@@ -9,10 +9,11 @@ outputs of a component are read as soon as it was stepped.
   without feedthrough are states: everybody takes them at t_k.
 - the names of all components: the same in the order that they stand in.
 
-A ring of feedthroughs that is solved is a stage by itself. It is closed before its components are
-stepped, with their states of t_k, after that, with those of t_k+1 and the latest of what feeds it,
-and again when all have been stepped: every row shows its solution. One that is not solved is opened
-before the one of its components that stands first in the system, which takes what feeds it at t_k.
+Rings of feedthroughs that are solved have stages of their own. Each is closed before its components
+are stepped, with their states of t_k, after that, with those of t_k+1 and the latest of what feeds
+it, and again when all have been stepped: every row shows its solution. One that is not solved is
+opened before the one of its components that stands first in the system, which takes what feeds it
+at t_k.
 
 A component may take n communication steps in one of its own. It is stepped at every n-th t_k, with
 the inputs of that time, which it holds. What it computes waits in hidden columns of the row: from
@@ -160,7 +161,7 @@ def stages(system: System, order: Order, solved: Sequence[Sequence[str]] = ()) -
     Args:
         system: that is stepped.
         order: of its components.
-        solved: rings of them that are stepped as one, each a stage by itself.
+        solved: rings of them that are stepped as one, in stages of their own.
 
     Raises:
         InputError: an order that does not name each component once.
@@ -263,7 +264,7 @@ def schedule(
         plan: its components in :func:`stages`.
         instances: of all components.
         row: that they are tied to.
-        rings: that are solved, each a stage of the plan.
+        rings: that are solved, in stages of their own.
 
     """
     pace = paces(system, experiment.step)
@@ -283,10 +284,13 @@ def schedule(
         )
         # All inputs are gathered before anybody is stepped.
         found += [Stage(Gathering.along(row, some), [], Pace(n)) for n, some in taken.items()]
-        if ring := ring_of.get(names[0]):
-            found += [Stage(fast.gather, [_action(ring.check)]), Stage(nothing, fast.members)]
+        here = [ring_of[name] for name in names if name in ring_of]
+        if here:
+            # All are stepped before one takes what another has come to.
+            checked = Stage(fast.gather, [_action(ring.check) for ring in here])
+            found += [checked, Stage(nothing, fast.members)]
             if experiment.order != JACOBI:
-                found.append(Stage(nothing, [_action(partial(ring.renew, True))]))
+                found.append(Stage(nothing, [_action(partial(ring.renew, True)) for ring in here]))
         else:
             found.append(fast)
         for name in names:

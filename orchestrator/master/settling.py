@@ -54,17 +54,15 @@ class Settling:
             instances: of its components.
             row: that they are tied to.
             plan: its components in the order of their feedthroughs.
-            rings: of them that are solved, each a stage of the plan.
+            rings: of them that are solved, in stages of their own.
 
         """
         self._system, self._instances, self._row = system, instances, row
         ring_of = {ring.names[0]: ring for ring in rings}
         self._units: list[Ring | _Single] = []
         for stage in plan:
-            if stage[0] in ring_of:
-                self._units.append(ring_of[stage[0]])
-            else:
-                self._units += [_Single(name, system, instances[name], row) for name in stage]
+            ringed = [ring_of[name] for name in stage if name in ring_of]
+            self._units += ringed or [_Single(one, system, instances[one], row) for one in stage]
 
     @property
     def gatherings(self) -> list[Gathering]:

@@ -92,7 +92,7 @@ def in_stages(
 ) -> list[list[str]]:
     """An order in stages: no component takes what another one of its stage has just computed.
 
-    A solved ring is a stage by itself, in the place of its component that comes first.
+    Solved rings have stages of their own, each in the place of its component that comes first.
     """
     ring_of = {name: ring for ring in map(list, solved) for name in ring}
     units: dict[str, list[str]] = {}
@@ -108,8 +108,8 @@ def in_stages(
     stage_of: dict[str, int] = {}
     for first, unit in units.items():
         present = len(stages) - 1
-        alone = first in ring_of or (stages and stages[-1][0] in ring_of)
-        if alone or not stages or any(stage_of.get(name) == present for name in feeding[first]):
+        fits = stages and (first in ring_of) == (stages[-1][0] in ring_of)
+        if not fits or any(stage_of.get(s) == present for name in unit for s in feeding[name]):
             stages.append([])
         stages[-1] += unit
         stage_of |= dict.fromkeys(unit, len(stages) - 1)

@@ -281,6 +281,27 @@ class Evaluation:
                 return late
             late |= opened
 
+    def _batches(self) -> list[list[list[str]]]:
+        """What is stepped one after the other; rings that do not feed each other, together."""
+        found: list[list[list[str]]] = []
+        rings = [set(ring) for ring in self.rings]
+        for members in self._sequence():
+            if found and set(members) in rings and set(found[-1][-1]) in rings:
+                before = {name for other in found[-1] for name in other}
+                if not any(a in before and b in members for a, b in self._at_once_along()):
+                    found[-1].append(members)
+                    continue
+            found.append([members])
+        return found
+
+    def _at_once_along(self) -> list[tuple[str, str]]:
+        """Which component takes the new outputs of which."""
+        return [
+            (wire.source[0], wire.target[0])
+            for wire in self.drawn.wires
+            if self._feedthrough(wire) and id(wire) not in self.late
+        ]
+
     def _sequence(self) -> list[list[str]]:
         """What is stepped one after the other: components, and rings as one."""
         names = list(self.drawn.parts)
@@ -292,11 +313,7 @@ class Evaluation:
         if not isinstance(self.order, str):
             units = list(dict.fromkeys(self.unit[name] for name in self.order))
             return [members[unit] for unit in units]
-        edges = [
-            (self.unit[wire.source[0]], self.unit[wire.target[0]])
-            for wire in self.drawn.wires
-            if self._feedthrough(wire) and id(wire) not in self.late
-        ]
+        edges = [(self.unit[a], self.unit[b]) for a, b in self._at_once_along()]
         edges = [(a, b) for a, b in edges if a != b]
         # Rings come after all that does not wait for them.
         rings = {ring[0] for ring in self.rings}
@@ -436,21 +453,27 @@ class Evaluation:
         self._settle(drawn.wires)
         shown = self._computed(list(drawn.parts))
         self._show(shown)
-        spans, sequence = self._steps(), self._sequence()
+        spans, batches = self._steps(), self._batches()
         # What will be shown once the time has come that it belongs to.
         waiting: dict[Port, tuple[int, Any]] = {}
         for k, (t, _) in enumerate(spans):
             before = dict(shown)
-            for members in sequence:
-                pace = drawn.parts[members[0]].pace
-                if k % pace:
-                    continue
-                end = min(k + pace, len(spans))
-                self._advance(members, t, spans[end - 1][1], shown, before)
-                for port, value in self._computed(members).items():
-                    waiting[port] = end, value
-                    if pace == 1 or self._at_once(port):
-                        shown[port] = value
+            for batch in batches:
+                for members in batch:
+                    pace = drawn.parts[members[0]].pace
+                    if k % pace:
+                        continue
+                    end = min(k + pace, len(spans))
+                    self._advance(members, t, spans[end - 1][1], shown, before)
+                    for port, value in self._computed(members).items():
+                        waiting[port] = end, value
+                        if pace == 1 or self._at_once(port):
+                            shown[port] = value
+                for members in batch if self.order != JACOBI else ():
+                    self._renew(members, shown)
+                for members in batch:
+                    if members in self.rings or self._inner(members):
+                        shown |= self._computed(members)
             shown |= {port: value for port, (end, value) in waiting.items() if end == k + 1}
             # Every row shows the solution of a ring.
             for ring in self.rings:
@@ -481,8 +504,6 @@ class Evaluation:
         self._settle(self._inner(members))
         for name in members:
             self.machines[name].step(t, end - t)
-        if self.order != JACOBI:
-            self._renew(members, shown)
 
     def _computed(self, members: Sequence[str]) -> dict[Port, Any]:
         """The outputs of some components."""
