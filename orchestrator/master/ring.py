@@ -232,7 +232,7 @@ class Ring:
                 derivative = self._derivative()
             near = not _differ(held, arriving, _REST).any()
             left = self._step(held, arriving, derivative, 1 if near else _MOST_HALVINGS)
-            if left >= 1.0 or steps == _MOST_STEPS:
+            if left >= 1.0 or steps == _MOST_STEPS or (near and left > _GOOD_STEP):
                 break
             if left > _GOOD_STEP:
                 derivative = None

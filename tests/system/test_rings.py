@@ -18,6 +18,7 @@ from orchestrator.master.library import made
 from orchestrator.master.loop import PYTHON_LOOP, Loop, chosen
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
+from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from support.linear import QUARTER_TRUCK, SINE, TWO_MASSES, Model, Part, error, linear, system_of
 
@@ -95,6 +96,24 @@ def test_what_hangs_on_a_ring_takes_its_new_outputs(folder):
             table = run(system_of(fmus, parts, wires), Experiment(2.0, H, coupling=coupling))
             np.testing.assert_array_equal(table["sink.u0"], table["a.y1"])
             np.testing.assert_array_equal(table["sink.y1"], 3.0 * table["a.y1"])
+
+
+@pytest.mark.parametrize("names", list(permutations("abs")))
+def test_of_two_solved_rings_neither_is_the_first(folder, names):
+    """What b takes of a is no feedthrough, but new, wherever the two stand."""
+    itself = [[0.0, 0.0], [0.5, 1.0]]
+    parts = {
+        "a": Part(B=[[0.0, 1.0], [0.0, 0.0]], C=[[1.0, 0.0], [0.0, 0.0]], D=itself, x=[1.0, 0.0]),
+        "b": Part(D=itself),
+        "s": Part(B=[[1.0, 0.0], [0.0, 0.0]], C=[[1.0, 0.0], [0.0, 0.0]]),
+    }
+    wires = {"a.u0": "a.y1", "b.u0": "b.y1", "b.u1": "a.y0", "s.u0": "b.y1"}
+    system = system_of({name: linear(folder) for name in names}, parts, wires)
+    system = system.with_parameters({PortName("a", "u1"): 1.0})
+    table = run(system, Experiment(0.3, H))
+    # a.y0 = 1 + t, b.y1 = 2 a.y0, which s takes at the end of each step.
+    np.testing.assert_allclose(table["b.y1"], 2.0 + 2.0 * table.time, rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(table["s.y0"], [0.0, 0.22, 0.46, 0.72], rtol=0.0, atol=1e-14)
 
 
 def test_fmus_that_compute_outputs_in_steps_only_are_delayed_and_one_line_says_so(folder):
