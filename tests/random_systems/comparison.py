@@ -23,7 +23,7 @@ LOOPS = ("python", "compiled")
 TOLERANCE = 1e-9
 
 #: The same where values grow from step to step, and what is left of the start with them.
-_GROWING = 1e-6
+_GROWING = 1e-4
 
 #: How many of so many systems run isolated as well.
 _ISOLATED = 25
