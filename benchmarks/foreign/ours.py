@@ -18,6 +18,7 @@ from fmpy.model_description import ModelVariable
 from orchestrator import Result, load, simulate
 from orchestrator.errors import InputError
 from orchestrator.experiments.preparation import DEFAULT_STEP
+from orchestrator.master.experiment import DELAY, JACOBI
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value
@@ -78,7 +79,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
             step=step,
             order=options.order,
             # Other masters open rings by a delay.
-            coupling="delay" if options.order else None,
+            coupling=DELAY if options.order == JACOBI else None,
         )
     outputs = [
         (name, variable.name, variable.valueReference)

@@ -52,11 +52,11 @@ first; a folder with a `SystemStructure.ssd` is zipped as it is, and each furthe
 archive of its own. FMUs are run alone, for {steps} steps of the size that they name, else of 20 ms,
 with all inputs at their start values. What holds the same bytes is counted once.
 
-Systems that libcosim or ecos can run as well are held against them in Jacobi order, with the same
-steps: as they are, and in libcosim also as `auv-fmu export --format osp` writes what we have read.
-FMUs are held against a plain host of {host} lines that shares nothing with the master, as t_k = k h
-has it. A deviation is the largest over all Real outputs and steps, relative to the size of an
-output where that is above one. Compared with: {tools}.
+Systems that libcosim or ecos can run as well are held against them in Jacobi order, with rings
+delayed and the same steps: as they are, and in libcosim also as `auv-fmu export --format osp`
+writes what we have read. FMUs are held against a plain host of {host} lines that shares nothing
+with the master, as t_k = k h has it. A deviation is the largest over all Real outputs and steps,
+relative to the size of an output where that is above one. Compared with: {tools}.
 """
 
 

@@ -12,11 +12,14 @@ from contextlib import suppress
 from math import inf
 
 import numpy as np
+from fmpy.model_description import ModelVariable
 
 from orchestrator.errors import shortened
 from orchestrator.master.instance import ComponentFailed, Instance
 from orchestrator.master.row import Row
 from orchestrator.master.signals import Gathering
+from orchestrator.system.component import Component
+from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.values import real
 
@@ -56,16 +59,14 @@ class _Part:
         gather: Gathering,
         unknowns: list[int],
         feeds: list[int],
-        references: tuple[list[int], list[int]],
-        nominals: list[float],
-        limits: list[float],
+        outputs: list[ModelVariable],
+        inputs: list[ModelVariable],
     ) -> None:
         self.instance, self.gather = instance, gather
         self._row = row
         self.unknowns, self.feeds = unknowns, feeds
         self.block = np.ix_(feeds, unknowns)
-        self._outputs, self._inputs = references
-        self._nominals, self._limits = nominals, limits
+        self._outputs, self._inputs = outputs, inputs
 
     def exchange(self) -> None:
         """Set its inputs and read its outputs, also those that are shown later in a step."""
@@ -79,8 +80,7 @@ class _Part:
         here = values[places]
         for column, target in enumerate(targets[self.unknowns]):
             held = values[target]
-            change = _CHANGE * max(abs(held), self._nominals[column])
-            values[target] = held + (change if held + change <= self._limits[column] else -change)
+            values[target] = _near(held, self._inputs[column])
             self.exchange()
             found[:, column] = (values[places] - here) / (values[target] - held)
             values[target] = held
@@ -93,7 +93,11 @@ class _Part:
         """How its outputs change with its inputs, as the FMU says it, or by differences."""
         if self.feeds and self.instance.gives_derivatives:
             with suppress(ComponentFailed):
-                columns = [self.instance.derivatives(self._outputs, i) for i in self._inputs]
+                outputs = [variable.valueReference for variable in self._outputs]
+                columns = [
+                    self.instance.derivatives(outputs, variable.valueReference)
+                    for variable in self._inputs
+                ]
                 return np.array(columns).reshape(len(self.unknowns), len(self.feeds)).T
         return self.changes(values, targets, sources)
 
@@ -120,7 +124,8 @@ class Ring:
 
         """
         self.names = list(names)
-        self._values = row.values
+        self._values, self._columns = row.values, row.columns
+        self._components = system.components
         own = set(names)
         feeding = [connection for name in names for connection in system.feeding[name]]
         connections = [c for c in feeding if c.source.component in own]
@@ -139,7 +144,6 @@ class Ring:
         for name in names:
             variables = system.components[name].variables
             unknowns = [i for i in inner[name] if self._real[i]]
-            inputs = [variables[connections[i].target.port] for i in unknowns]
             self._parts.append(
                 _Part(
                     instances[name],
@@ -147,12 +151,8 @@ class Ring:
                     Gathering.along(row, [connections[i] for i in inner[name]]),
                     unknowns,
                     feeds[name],
-                    (
-                        [variables[connections[i].source.port].valueReference for i in feeds[name]],
-                        [variable.valueReference for variable in inputs],
-                    ),
-                    [abs(_number(variable.nominal, 1.0)) or 1.0 for variable in inputs],
-                    [_number(variable.max, inf) for variable in inputs],
+                    [variables[connections[i].source.port] for i in feeds[name]],
+                    [variables[connections[i].target.port] for i in unknowns],
                 )
             )
 
@@ -172,8 +172,32 @@ class Ring:
         return {
             name: f"no output of {name} follows an input of it between steps"
             for name, part in zip(self.names, self._parts, strict=True)
-            if not part.changes(self._values, self._targets, self._sources).any()
+            if not self._responds(self._components[name], part)
         }
+
+    def _responds(self, component: Component, part: _Part) -> bool:
+        """Whether any output that is a Real follows any such input at the same time."""
+        inputs, outputs = (
+            {
+                self._columns[PortName(component.name, variable.name)]: variable
+                for variable in component.having(causality)
+                if variable.type == "Real"
+            }
+            for causality in ("input", "output")
+        )
+        values, places = self._values, list(outputs)
+        here = values[places]
+        follows = False
+        for column, variable in inputs.items():
+            held = values[column]
+            values[column] = _near(held, variable)
+            part.exchange()
+            follows = not np.array_equal(values[places], here)
+            values[column] = held
+            if follows:
+                break
+        part.exchange()
+        return follows
 
     @property
     def is_closed(self) -> bool:
@@ -314,6 +338,12 @@ def _is_real(system: System, connection: Connection) -> bool:
         system.components[end.component].variables[end.port].type == "Real"
         for end in (connection.source, connection.target)
     )
+
+
+def _near(held: float, variable: ModelVariable) -> float:
+    """A value of an input beside the one that it has."""
+    change = _CHANGE * max(abs(held), abs(_number(variable.nominal, 1.0)) or 1.0)
+    return held + (change if held + change <= _number(variable.max, inf) else -change)
 
 
 def _number(text: str | None, otherwise: float) -> float:

@@ -223,30 +223,21 @@ class Evaluation:
         responding = set()
         for ring in components(names, edges):
             if is_ring(ring, edges):
-                responding |= {name for name in ring if self._responds(name, ring)}
+                responding |= {name for name in ring if self._responds(name)}
         rest = [(a, b) for a, b in edges if a in responding and b in responding]
         found = components([name for name in names if name in responding], rest)
         return [sorted(ring, key=names.index) for ring in found if is_ring(ring, rest)]
 
-    def _responds(self, name: str, ring: Sequence[str]) -> bool:
-        """Whether a Real output that a ring takes follows a Real input that it gives, at once."""
+    def _responds(self, name: str) -> bool:
+        """Whether any output that is a Real follows any input that is one, at once."""
         part = self.drawn.parts[name]
         if not part.fmu.responds or part.pace > 1:
             return False
-        inputs = {
-            wire.target[1]
-            for wire in self.drawn.wires
-            if wire.target[0] == name and wire.source[0] in ring
-        }
-        outputs = {
-            wire.source[1]
-            for wire in self.drawn.wires
-            if wire.source[0] == name and wire.target[0] in ring
-        }
         return any(
-            part.fmu.named(output).type == "Real"
-            and any(part.fmu.named(one).type == "Real" for one in part.fmu.needs(output) & inputs)
-            for output in outputs
+            part.fmu.named(one).type == "Real"
+            for output in part.fmu.having("output")
+            if output.type == "Real"
+            for one in part.fmu.needs(output.name)
         )
 
     def _late(self) -> set[int]:

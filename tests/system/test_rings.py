@@ -86,6 +86,18 @@ def test_both_loops_and_isolation_make_the_same_rows(folder, coupling):
         assert other.rows.tobytes() == table.rows.tobytes()
 
 
+def test_a_ring_of_components_that_is_none_of_ports_is_no_step_late(folder):
+    """Each output follows one input only, and the FMU says that both follow both."""
+    passes = Part(D=np.eye(2))
+    parts = {"s": SINE, "a": passes, "b": passes}
+    wires = {"a.u0": "s.y0", "a.u1": "b.y0", "b.u0": "a.y0", "b.u1": "a.y1"}
+    for names in ("sab", "bas"):
+        fmus = {name: linear(folder, "all", can=False) for name in names}
+        table = run(system_of(fmus, parts, wires), Experiment(2.0, H))
+        for output in ("a.y0", "a.y1", "b.y0", "b.y1"):
+            np.testing.assert_array_equal(table[output], table["s.y0"])
+
+
 def test_what_hangs_on_a_ring_takes_its_new_outputs(folder):
     """Wherever it stands; it is in no ring itself."""
     parts = {"sink": Part(D=[[0.0, 0.0], [3.0, 0.0]]), **gains(0.5, 0.9)}
