@@ -48,7 +48,7 @@ T = TypeVar("T")
 #: Communication step of the paper [s], for systems that name none.
 DEFAULT_STEP = STEP
 
-#: How long a run could last that nobody makes [s].
+#: Stop time of a system that names none, where it is only checked or exported [s].
 SOME_TIME = 1.0
 
 
@@ -107,7 +107,7 @@ class Prepared:
     course: Course | None = None
 
     def open_inputs(self) -> str | None:
-        """The inputs that nothing feeds and nobody sets, in words; None: there are none."""
+        """The inputs that nothing feeds or sets, in words; None: there are none."""
         actions = [event.action for event in self.events]
         given = {*(self.course.targets if self.course else ())}
         given |= {port for one in actions if isinstance(one, Alter) for port, _ in one.values}
@@ -372,7 +372,7 @@ def _beside(
 ) -> tuple[Scenario, System]:
     """A companion in the surroundings of a scenario, whose controllers are compared.
 
-    Where both have the same controller, something else is compared, and the reference alone is
+    Where both have the same controller, something else is compared, and only the reference is
     the scenario's.
 
     Args:

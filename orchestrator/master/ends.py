@@ -24,8 +24,8 @@ def to_its_end(steps: Steps, run: Run) -> Iterator[None]:
         Nothing, when Python may look.
 
     Raises:
-        Ended: somebody has ended the run, which has the rows until then.
-        ComponentFailed: by the step behind them.
+        Ended: the run has been ended, and has the rows until then.
+        ComponentFailed: by the step after them.
 
     """
     try:
@@ -56,7 +56,7 @@ def _finished(run: Run, end: Ended) -> Iterator[None]:
     every = _every(stage)
     end = _stepped_on(stage, end, run.time, planned.length(k, every))
     latest = planned.time(min(k + every, planned.rows - 1))
-    # A time that an FMU has added up is that of the step but for rounding.
+    # An FMU that adds up its time is off by rounding.
     stop = latest if end.time > latest - ROUNDING * planned.step else end.time
     if stop <= run.time or (cut := replace(planned, stop_time=stop)).rows - 1 == k:
         raise Ended(str(end))

@@ -334,7 +334,7 @@ def step(members: Sequence[Member], t: float, h: float, is_final: bool = True) -
     Args:
         members: the components.
         t, h: beginning and length of the step [s].
-        is_final: whether nobody will go back to its beginning.
+        is_final: whether no component will go back to its beginning.
 
     """
     # Converted once for all of them.

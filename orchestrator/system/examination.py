@@ -63,7 +63,7 @@ def surprises(component: Component) -> Iterator[str]:
 
 
 def open_inputs(system: System, settled: Collection[PortName] = ()) -> str | None:
-    """The inputs that nothing feeds and nobody sets, in words, with wires that could feed them.
+    """The inputs that nothing feeds or sets, in words, with wires that could feed them.
 
     Args:
         system: that is looked at.

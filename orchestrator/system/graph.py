@@ -192,8 +192,8 @@ def _opened(ring: Sequence[str], sources: _Sources, place: Mapping[str, int]) ->
 
     What is left of a ring may be rings again, and so on inwards. They are found from the inmost
     outwards: components are added to a graph, the last first, and each of them becomes one with
-    those that it closes a ring with. That takes the time of the connections, but for rings that
-    are made for it.
+    those that it closes a ring with. That takes time in proportion to the connections, except
+    for rings that are made to be slow.
     """
     lead: dict[str, str] = {}
     feeding: dict[str, set[str]] = {}

@@ -246,7 +246,7 @@ def _parameters(
     components: Mapping[str, Component],
     connections: tuple[Connection, ...],
 ) -> dict[PortName, Value]:
-    """Initial values, but for those that have no effect."""
+    """Initial values, without the ones that have no effect."""
     fed = {connection.target: connection.source for connection in connections}
     parameters: dict[PortName, Value] = {}
     for name, simulator in _simulators(root):

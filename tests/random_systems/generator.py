@@ -284,12 +284,12 @@ class _Draw:
         # Shares of FMUs that compute outputs when asked, and of outputs with feedthrough.
         self.responding = self.random.choice((0.0, 0.5, 1.0, 1.0))
         self.feedthrough = self.random.choice((0.4, 0.7, 1.0))
-        # Rings of Reals alone that can be solved; of some, fixed points are not to be had.
+        # Rings of Reals only, which can be solved; a fixed-point iteration of some diverges.
         self.tight = self.chance(0.3)
         self.strong = self.tight and self.chance(0.5)
         if self.tight:
             self.responding = self.feedthrough = 1.0
-        # Formulas of whoever is in a ring are such that it has one solution, and does not grow.
+        # Formulas in a ring are such that it has one solution, and does not grow.
         self.ringed: set[str] = set()
 
     def chance(self, share: float) -> bool:

@@ -1,7 +1,7 @@
 /* A linear system as an FMI 2.0 slave: see linear.py.
 
    x' = A x + B u, y = C x + D u, with two states, inputs and outputs, exact for inputs that change
-   linearly. With CACHED its outputs are computed by steps alone. */
+   linearly. With CACHED its outputs are computed in steps only. */
 
 #include <stdlib.h>
 #include <string.h>
@@ -153,7 +153,7 @@ ABSENT(fmi2SetInteger)
 ABSENT(fmi2GetBoolean)
 ABSENT(fmi2SetBoolean)
 
-/* The exponential series of the states with the inputs and their slopes behind them. */
+/* The exponential series of the states with the inputs and their slopes after them. */
 Status fmi2DoStep(Component c, double t, double h, int no_rollback)
 {
     Instance *it = c;

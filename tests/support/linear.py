@@ -119,7 +119,7 @@ def linear(
         folder: for it.
         says: of its outputs' dependencies: `dependencies`: first output none, second both inputs;
             `all`: both of both; `nothing`: no attribute; `no outputs`: not even the outputs.
-        cached: whether its outputs are computed by steps alone.
+        cached: whether its outputs are computed in steps only.
         can: give its state and derivatives, and let inputs change in a step.
 
     """
