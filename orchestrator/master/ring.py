@@ -170,7 +170,7 @@ class Ring:
         if len(self._targets) > _MOST_INPUTS:
             return dict.fromkeys(self.names, f"it has more than {_MOST_INPUTS} inputs")
         return {
-            name: f"no output of {name} follows an input of it between steps"
+            name: f"no Real output of {name} follows a Real input between steps"
             for name, part in zip(self.names, self._parts, strict=True)
             if not self._responds(self._components[name], part)
         }
