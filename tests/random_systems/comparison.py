@@ -91,7 +91,7 @@ def outcomes(seed: int) -> Iterator[Outcome]:
                     yield Outcome(seed, how, REFUSED, str(error))
                     continue
                 rows = evaluation.rows
-                if drawn.strong and coupling == DELAY:
+                if drawn.strong and evaluation.late:
                     # It may have to end early.
                     soon = min(_SOON, len(result))
                     why = difference(result, rows[:soon], _GROWING)
