@@ -331,28 +331,4 @@ Status fmi2SetFMUstate(Component c, void *state)
     return OK;
 }
 
-Status fmi2FreeFMUstate(Component c, void **state)
-{
-    free(*state);
-    *state = NULL;
-    return OK;
-}
-
-Status fmi2SerializedFMUstateSize(Component c, void *state, size_t *size)
-{
-    *size = sizeof(Live);
-    return OK;
-}
-
-Status fmi2SerializeFMUstate(Component c, void *state, char *bytes, size_t size)
-{
-    memcpy(bytes, state, sizeof(Live));
-    return OK;
-}
-
-Status fmi2DeSerializeFMUstate(Component c, const char *bytes, size_t size, void **state)
-{
-    *state = malloc(sizeof(Live));
-    memcpy(*state, bytes, sizeof(Live));
-    return OK;
-}
+STATE_IS(Live)

@@ -217,30 +217,7 @@ Status fmi2SetFMUstate(Component c, void *state)
     return OK;
 }
 
-Status fmi2FreeFMUstate(Component c, void **state)
-{
-    free(*state);
-    *state = NULL;
-    return OK;
-}
-
-Status fmi2SerializedFMUstateSize(Component c, void *state, size_t *size)
-{
-    *size = sizeof(Instance);
-    return OK;
-}
-
-Status fmi2SerializeFMUstate(Component c, void *state, char bytes[], size_t size)
-{
-    memcpy(bytes, state, size);
-    return OK;
-}
-
-Status fmi2DeSerializeFMUstate(Component c, const char bytes[], size_t size, void **state)
-{
-    *state = memcpy(malloc(size), bytes, size);
-    return OK;
-}
+STATE_IS(Instance)
 
 Status fmi2GetStatus(Component c, int kind, Status *value)
 {

@@ -17,6 +17,31 @@ typedef struct {
 const char *fmi2GetTypesPlatform(void) { return "default"; }
 const char *fmi2GetVersion(void) { return "2.0"; }
 
+/* What is the same for all states that are one block of memory: its type is given. The FMU has
+   fmi2GetFMUstate and fmi2SetFMUstate of its own. */
+#define STATE_IS(type) \
+    Status fmi2FreeFMUstate(Component c, void **state) \
+    { \
+        free(*state); \
+        *state = NULL; \
+        return OK; \
+    } \
+    Status fmi2SerializedFMUstateSize(Component c, void *state, size_t *size) \
+    { \
+        *size = sizeof(type); \
+        return OK; \
+    } \
+    Status fmi2SerializeFMUstate(Component c, void *state, char *bytes, size_t size) \
+    { \
+        memcpy(bytes, state, size); \
+        return OK; \
+    } \
+    Status fmi2DeSerializeFMUstate(Component c, const char *bytes, size_t size, void **state) \
+    { \
+        *state = memcpy(malloc(size), bytes, size); \
+        return OK; \
+    }
+
 /* What a host may look for, and nobody here calls. */
 #define ABSENT(name) \
     Status name(void) { return Error; }
