@@ -21,7 +21,12 @@ from orchestrator.system.structure import System
 
 
 class Coupling:
-    """The rings of direct feedthroughs of a system, and what follows from them."""
+    """The rings of direct feedthroughs of a system, and what follows from them.
+
+    Attributes:
+        plan: all components in stages, once they are initialised.
+
+    """
 
     def __init__(
         self,
@@ -45,6 +50,7 @@ class Coupling:
         self._instances, self._row, self._log = instances, row, log
         self._rings = [self._ring(names) for names in rings(system)]
         self._solved: list[Ring] = []
+        self.plan: list[list[str]] = []
 
     def initialise(self) -> None:
         """Set parameters, exchange values in initialisation mode until they rest, leave that mode.
@@ -60,20 +66,19 @@ class Coupling:
             instance.enter_initialization(system.parameters_of(name), start)
             held = instance.read(system.open_inputs(name))
             self._row.enter({PortName(name, port): value for port, value in held.items()})
-        self._settling(self._rings).begin()
+        settling = self._settling(self._rings)
+        settling.begin()
         self._check_finite()
         for instance in instances.values():
             instance.exit_initialization()
         self._solved = self._solvable()
-        self._settling(self._solved).hand_on(everything=True)
+        self.plan = self._plan(self._experiment.order, self._solved)
+        if self._rings:
+            settling = self._settling(self._solved)
+        settling.hand_on(everything=True)
         self._check_finite()
         if self._log.refusals:
             raise InputError("; ".join(self._log.refusals))
-
-    @property
-    def plan(self) -> list[list[str]]:
-        """All components in stages."""
-        return self._plan(self._experiment.order, self._solved)
 
     def schedule(self) -> tuple[list[Stage], list[Gathering]]:
         """The stages of every step, and all that is gathered in one."""
