@@ -11,8 +11,10 @@ from typing import Any, NamedTuple
 
 import fmpy
 from fmpy.fmi2 import FMU2Slave
+from pythonfmu.enums import Fmi2Status
 
 from fmus.packaging.discovery import components
+from fmus.slave.callbacks import ANSWER
 from fmus.slave.component import Component
 
 #: Names of all components, and of those with inputs.
@@ -25,6 +27,16 @@ def component(name: str) -> type[Component[Any, Any, Any, Any]]:
     found: type[Component[Any, Any, Any, Any]]
     found = getattr(import_module(components()[name]), name)
     return found
+
+
+def messages_of(slave: Component[Any, Any, Any, Any]) -> list[str]:
+    """What a slave has logged for the host."""
+    return [entry.msg for entry in slave.log_queue if entry.category != ANSWER]
+
+
+def answers_of(slave: Component[Any, Any, Any, Any]) -> list[Fmi2Status]:
+    """The statuses that a slave has told the native loader."""
+    return [entry.status for entry in slave.log_queue if entry.category == ANSWER]
 
 
 class Variable(NamedTuple):
@@ -94,11 +106,19 @@ class Instance(ABC):
 
 
 class ClassInstance(Instance):
-    """A component as a Python class, initialised with some values."""
+    """A component as a Python class, initialised with some values.
 
-    def __init__(self, name: str, **values: object) -> None:
+    Args:
+        name: of the component.
+        plain: whether it is as in an FMU without the native loader.
+        values: of ports, by their names, with two underscores for a dot.
+
+    """
+
+    def __init__(self, name: str, plain: bool = False, **values: object) -> None:
         self.component = component(name)
         self.slave = self.component(instance_name="under_test")
+        self.slave._has_loader = not plain
         self.ports = self.slave._store.ports
         super().__init__(
             {
@@ -122,7 +142,10 @@ class ClassInstance(Instance):
         return self.slave.do_step(self.time, h)
 
     def messages(self) -> list[str]:
-        return [entry.msg for entry in self.slave.log_queue]
+        return messages_of(self.slave)
+
+    def answers(self) -> list[Fmi2Status]:
+        return answers_of(self.slave)
 
 
 class FmuInstance(Instance):

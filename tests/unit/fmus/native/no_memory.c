@@ -4,21 +4,26 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-static int left;
+static int left, failures;
 
-static void *allocated(size_t size) { return left-- > 0 ? malloc(size) : NULL; }
+static int succeeds(void) {
+    if (left > 0) return left--;
+    failures++;
+    return 0;
+}
 
-static void *cleared(size_t n, size_t size) { return left-- > 0 ? calloc(n, size) : NULL; }
+static void *allocated(size_t size) { return succeeds() ? malloc(size) : NULL; }
+
+static void *cleared(size_t n, size_t size) { return succeeds() ? calloc(n, size) : NULL; }
 
 #define malloc allocated
 #define calloc cleared
 #include "fmi2.c"
 
-static int failures;
-
-static void note(int status) {
-    if (status == FMI_ERROR) failures++;
-    if (status == FMI_FATAL) exit(1);
+/* What there is enough memory for is answered as ever. */
+static void note(int status, int expected) {
+    if (status != FMI_ERROR && status != expected) exit(1);
+    if (status != expected && failures == 0) exit(3);
 }
 
 static void hear(void *environment, string name, int status, string category, string text, ...) {
@@ -34,28 +39,25 @@ static void play(void) {
     void *states[3] = {NULL, NULL, NULL}, *c;
     size_t size = 0;
     c = fmi2Instantiate("little", CO_SIMULATION, NULL, NULL, &functions, 0, 1);
-    if (c == NULL) {
-        failures++;
-        return;
-    }
-    note(fmi2SetDebugLogging(c, 1, 2, categories));
-    note(fmi2Reset(c));
-    note(fmi2GetReal(c, &unknown, 1, &value));
-    note(fmi2Reset(c));
-    note(fmi2GetReal(c, &unknown, 1, &value));
-    note(fmi2GetFMUstate(c, &states[0]));
-    note(fmi2GetFMUstate(c, &states[0]));
+    if (c == NULL) return;
+    note(fmi2SetDebugLogging(c, 1, 2, categories), FMI_OK);
+    note(fmi2Reset(c), FMI_OK);
+    note(fmi2GetReal(c, &unknown, 1, &value), FMI_ERROR);
+    note(fmi2Reset(c), FMI_OK);
+    note(fmi2GetReal(c, &unknown, 1, &value), FMI_ERROR);
+    note(fmi2GetFMUstate(c, &states[0]), FMI_OK);
+    note(fmi2GetFMUstate(c, &states[0]), FMI_OK);
     if (states[0] != NULL) {
-        note(fmi2SerializedFMUstateSize(c, states[0], &size));
-        note(fmi2SerializeFMUstate(c, states[0], bytes, size));
-        note(fmi2DeSerializeFMUstate(c, bytes, size, &states[1]));
-        note(fmi2SetFMUstate(c, states[0]));
+        note(fmi2SerializedFMUstateSize(c, states[0], &size), FMI_OK);
+        note(fmi2SerializeFMUstate(c, states[0], bytes, size), FMI_OK);
+        note(fmi2DeSerializeFMUstate(c, bytes, size, &states[1]), FMI_OK);
+        note(fmi2SetFMUstate(c, states[0]), FMI_OK);
     }
-    note(fmi2DeSerializeFMUstate(c, "garbage", 7, &states[2]));
-    if (states[2] != NULL) note(fmi2SetFMUstate(c, states[2]));
-    note(fmi2Reset(c));
-    note(fmi2EnterInitializationMode(c));
-    note(fmi2ExitInitializationMode(c));
+    note(fmi2DeSerializeFMUstate(c, "garbage", 7, &states[2]), FMI_OK);
+    if (states[2] != NULL) note(fmi2SetFMUstate(c, states[2]), FMI_ERROR);
+    note(fmi2Reset(c), FMI_OK);
+    note(fmi2EnterInitializationMode(c), FMI_OK);
+    note(fmi2ExitInitializationMode(c), FMI_OK);
     if (fmi2DoStep(c, 0.0, 0.02, 1) != FMI_OK) exit(2);
     fmi2FreeInstance(c);
 }

@@ -55,7 +55,7 @@ def test_inputs_and_outputs_lie_in_their_order(package: str):
         ]
         assert places == [*range(len(places))]
         [found] = re.findall(rf"{causality.lower()}_references\[\] = \{{(.*)\}};", text)
-        names = [declared[int(reference)].name for reference in found.split(", ")]
+        names = [declared[int(n)].name for n in re.findall(r"FIRST_REFERENCE \+ (\d+)", found)]
         if places:
             real = [p.name for p in declared if p.causality.upper() == causality and p is not FAULT]
             assert names == real

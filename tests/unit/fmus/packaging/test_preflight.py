@@ -12,7 +12,7 @@ from fmus.packaging.loader.preflight import refusal
 
 SCRIPT = "preflighted"
 SLAVE = "class Fmi2Slave: pass\nclass Slave(Fmi2Slave): pass\n"
-GUID = "{01234567}"
+GUID = "{01234567abcdef}"
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def resources(tmp_path: Path) -> Iterator[Path]:
     assert sys.path == before
 
 
-@pytest.mark.parametrize("guid", ["", GUID, GUID.strip("{}")])
+@pytest.mark.parametrize("guid", ["", GUID, GUID.strip("{}"), GUID.upper(), "01234567ABCDEF"])
 def test_sound_folder_is_sound_again(resources: Path, guid: str):
     assert [refusal(str(resources), guid) for _ in range(3)] == ["", "", ""]
 

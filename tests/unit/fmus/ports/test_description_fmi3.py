@@ -44,30 +44,30 @@ DESCRIPTION = """
   </LogCategories>
   <DefaultExperiment startTime="0.0" stopTime="100.0" stepSize="0.02"/>
   <ModelVariables>
-    <Float64 name="a.x" valueReference="0" description="Place: x" causality="input"
+    <Float64 name="a.x" valueReference="1" description="Place: x" causality="input"
       variability="continuous" declaredType="Length" unit="m" start="0"/>
-    <Float64 name="y.x" valueReference="1" description="Output: x" causality="output"
+    <Float64 name="y.x" valueReference="2" description="Output: x" causality="output"
       variability="continuous" initial="calculated" declaredType="Length" unit="m"/>
-    <Float64 name="k" valueReference="2" description="Gain" causality="parameter"
+    <Float64 name="k" valueReference="3" description="Gain" causality="parameter"
       variability="tunable" initial="exact" declaredType="Dimensionless" unit="1" start="0.25"
       min="0" max="1000"/>
-    <Int32 name="n" valueReference="3" description="Number" causality="parameter"
+    <Int32 name="n" valueReference="4" description="Number" causality="parameter"
       variability="fixed" initial="exact" start="-3"/>
-    <Boolean name="on" valueReference="4" description="Switch" causality="parameter"
+    <Boolean name="on" valueReference="5" description="Switch" causality="parameter"
       variability="fixed" initial="exact" start="true"/>
-    <String name="kind" valueReference="5" description="Kind" causality="parameter"
+    <String name="kind" valueReference="6" description="Kind" causality="parameter"
       variability="fixed" initial="exact"><Start value="Soft"/></String>
-    <Boolean name="fault" valueReference="6" description="FAULT" causality="output"
+    <Boolean name="fault" valueReference="7" description="FAULT" causality="output"
       variability="discrete" initial="calculated"/>
-    <Float64 name="time" valueReference="7" description="Time" causality="independent"
+    <Float64 name="time" valueReference="8" description="Time" causality="independent"
       variability="continuous" declaredType="Time" unit="s"/>
   </ModelVariables>
   <ModelStructure>
-    <Output valueReference="1" dependencies="0 7" dependenciesKind="dependent dependent"/>
-    <Output valueReference="6" dependencies="" dependenciesKind=""/>
-    <InitialUnknown valueReference="1" dependencies="0 7 2 3 4 5"
+    <Output valueReference="2" dependencies="1 8" dependenciesKind="dependent dependent"/>
+    <Output valueReference="7" dependencies="" dependenciesKind=""/>
+    <InitialUnknown valueReference="2" dependencies="1 8 3 4 5 6"
       dependenciesKind="dependent dependent dependent dependent dependent dependent"/>
-    <InitialUnknown valueReference="6" dependencies="" dependenciesKind=""/>
+    <InitialUnknown valueReference="7" dependencies="" dependenciesKind=""/>
   </ModelStructure>
 </fmiModelDescription>
 """.replace("FAULT", FAULT.description).replace("VERSION", __version__)

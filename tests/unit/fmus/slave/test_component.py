@@ -5,8 +5,9 @@ from __future__ import annotations
 from math import inf, isfinite, nan, radians
 
 import pytest
+from pythonfmu.enums import Fmi2Status
 
-from support.instances import NAMES, WITH_INPUTS, ClassInstance, component
+from support.instances import NAMES, WITH_INPUTS, ClassInstance, answers_of, component, messages_of
 
 WITH_STEP_LIMIT = [name for name in NAMES if name != "DisturbanceGenerator"]
 
@@ -30,7 +31,7 @@ def test_nothing_is_refused_in_a_normal_run(driver):
         driver.excite(k)
         assert driver.step()
     assert driver.get("fault") is False
-    assert driver.messages() == []
+    assert driver.slave.log_queue == []
 
 
 def test_parameters_report_their_declared_start_values(driver):
@@ -40,40 +41,40 @@ def test_parameters_report_their_declared_start_values(driver):
 
 
 @pytest.mark.parametrize("bad", [nan, inf, -inf])
-def test_bad_input_is_refused_and_the_next_good_one_cures_it(driven, bad):
-    driven.excite(1)
-    driven.step()
+def test_bad_input_is_discarded_and_the_next_step_taken_with_the_value_before(driven, bad):
+    calm = ClassInstance(driven.component.__name__)
+    for driver in (driven, calm):
+        driver.excite(1)
+        driver.step()
     before, name = driven.outputs(), first_input(driven)
     value_before = driven.get(name)
     driven.slave.set_real([0], [bad])
+    assert driven.answers() == [Fmi2Status.discard]
+    assert name in driven.messages()[0]
     assert driven.get("fault") is True
     assert driven.get(name) == value_before
-    assert not driven.step()
     assert driven.outputs() == before
-    assert name in driven.messages()[0]
-    driven.slave.set_real([0], [0.25])
-    assert driven.step()
-    assert driven.get(name) == 0.25
+    assert driven.step() and calm.step()
+    assert driven.outputs() == calm.outputs()
     assert driven.get("fault") is True, "a fault stays until the component is reset"
 
 
 @pytest.mark.parametrize("bad", [nan, inf])
 def test_bad_input_among_good_ones_in_one_call_is_found(driven, bad):
     references = driven.references("input")
+    before = driven.slave.get_real(references)
     values = [0.5] * len(references)
     values[-1] = bad
     driven.slave.set_real(references, values)
-    assert not driven.step()
-    assert driven.get(first_input(driven)) == 0.5
-    driven.excite(3)
-    assert driven.step(), "a whole set of good inputs cures it"
+    assert driven.answers() == [Fmi2Status.discard]
+    assert driven.slave.get_real(references) == before
 
 
 def test_infinities_that_cancel_are_found():
     driver = ClassInstance("AuvPlant")
     references = driver.references("input")
     driver.slave.set_real(references, [inf, -inf] + [0.0] * (len(references) - 2))
-    assert not driver.step()
+    assert driver.answers() == [Fmi2Status.discard]
 
 
 @pytest.mark.parametrize(
@@ -95,23 +96,26 @@ def test_infinities_that_cancel_are_found():
         ("PdController", "sigma", -1.0),
     ],
 )
-def test_wrong_parameter_is_refused_and_no_step_is_made_with_another_value(name, parameter, value):
+def test_wrong_parameter_is_discarded_and_the_one_before_holds(name, parameter, value):
     driver = ClassInstance(name, **{parameter: value})
     dotted = parameter.replace("__", ".")
+    [port] = [port for port in driver.ports if port.name == dotted]
+    assert driver.answers() == [Fmi2Status.discard]
     assert driver.get("fault") is True
-    assert driver.get(dotted) != value
+    assert driver.get(dotted) == port.start
     assert dotted in driver.messages()[0]
-    assert not driver.step()
+    assert driver.step()
 
 
-def test_a_parameter_can_be_mended_before_the_initialisation():
-    slave = component("AuvPlant")(instance_name="under_test")
-    reference = [port.name for port in component("AuvPlant").ports].index("m11")
-    slave.set_real([reference], [-1.0])
-    slave.set_real([reference], [30.0])
-    slave.enter_initialization_mode()
-    slave.exit_initialization_mode()
-    assert slave.do_step(0.0, 0.02)
+@pytest.mark.parametrize(("name", "parameter", "value"), [("AuvPlant", "m11", 0.0)])
+def test_without_a_loader_no_step_is_made_with_another_value(name, parameter, value):
+    """The host has been answered fmi2OK, and shall not find out by its results."""
+    driver = ClassInstance(name, plain=True, **{parameter: value})
+    assert driver.answers() == []
+    for _ in range(2):
+        assert not driver.step()
+    driver.set(**{parameter: 30.0})
+    assert not driver.step(), "a good value is no answer"
 
 
 def test_outputs_and_fixed_parameters_cannot_be_set_during_the_run(driver):
@@ -120,10 +124,37 @@ def test_outputs_and_fixed_parameters_cannot_be_set_during_the_run(driver):
     driver.set(**{output.replace(".", "__"): 9.0})
     assert driver.get("fault") is True
     assert driver.outputs() == before
+    refusals = 1
     for port in driver.ports:
         if port.causality == "parameter" and port.variability == "fixed" and port.kind == "Real":
             driver.set(**{port.name.replace(".", "__"): port.start + 1.0})
+            refusals += 1
             assert driver.get(port.name) == port.start
+    assert driver.answers() == [Fmi2Status.discard] * refusals
+    assert driver.step()
+
+
+def test_fixed_parameters_can_be_set_to_what_they_are_during_the_run(driver):
+    """As a host does that sets all start values when it takes over a run."""
+    for port in driver.ports:
+        if port.causality == "parameter":
+            driver.set(**{port.name.replace(".", "__"): port.start})
+    assert driver.slave.log_queue == []
+    assert driver.get("fault") is False
+    assert driver.step()
+
+
+def test_integers_and_truth_values_can_be_read_as_numbers(driver):
+    """There are hosts that read all outputs with fmi2GetReal."""
+    for reference, port in enumerate(driver.ports):
+        if port.kind != "String":
+            [number] = driver.slave.get_real([reference])
+            assert type(number) is float
+            assert number == driver.get(port.name)
+    driver.slave.do_step(0.0, -1.0)
+    fault = [port.name for port in driver.ports].index("fault")
+    assert driver.slave.get_real([0, fault])[1] == 1.0
+    assert driver.answers() == [Fmi2Status.discard]
 
 
 def test_a_tunable_parameter_acts_from_the_next_step():
@@ -137,48 +168,140 @@ def test_a_tunable_parameter_acts_from_the_next_step():
     assert driver.get("fault") is False
 
 
-REFUSED_CALLS = {
-    "unknown reference read": lambda slave: slave.get_real([10_000]),
-    "negative reference read": lambda slave: slave.get_real([-1]),
-    "unknown reference set": lambda slave: slave.set_real([10_000], [1.0]),
-    "wrong type read": lambda slave: slave.get_boolean([0]),
-    "wrong type set": lambda slave: slave.set_string([0], ["one"]),
-    "output set": lambda slave: slave.set_real([output_of(slave)], [1.0]),
-    "fixed parameter set": lambda slave: slave.set_real([fixed_of(slave)], [1.0]),
-    "empty state": lambda slave: slave._set_fmu_state({}),
-    "truncated state": lambda slave: slave._set_fmu_state(
-        slave._fmu_state_from_bytes(slave._fmu_state_to_bytes(slave._get_fmu_state())[:-9])
-    ),
-    "experiment set up again": lambda slave: slave.setup_experiment(0.0),
-    "initialisation entered again": lambda slave: slave.enter_initialization_mode(),
-    "initialisation left again": lambda slave: slave.exit_initialization_mode(),
-}
-
-
 def output_of(slave) -> int:
     return slave._store.output_references[0]
 
 
-def fixed_of(slave) -> int:
-    return next(r for r, port in enumerate(slave.ports) if port.variability == "fixed")
+def set_a_fixed_parameter(slave) -> None:
+    reference, port = next(
+        (reference, port)
+        for reference, port in enumerate(slave.ports)
+        if (port.variability, port.kind) == ("fixed", "Real")
+    )
+    slave.set_real([reference], [port.start + 1.0])
 
 
-@pytest.mark.parametrize("call", REFUSED_CALLS)
-def test_after_a_refused_call_no_step_is_taken_until_a_state_is_restored(driver, call):
+#: Calls that get what cannot be given.
+REFUSED_GETS = {
+    "unknown reference": lambda slave: slave.get_real([10_000]),
+    "negative reference": lambda slave: slave.get_real([-1]),
+    "wrong type": lambda slave: slave.get_boolean([0]),
+}
+
+#: Calls that change nothing, and the status that each is answered with.
+REFUSED_CALLS = {
+    "unknown reference": (lambda slave: slave.set_real([10_000], [1.0]), Fmi2Status.error),
+    "wrong type": (lambda slave: slave.set_string([0], ["one"]), Fmi2Status.error),
+    "output": (lambda slave: slave.set_real([output_of(slave)], [1.0]), Fmi2Status.discard),
+    "fixed parameter": (set_a_fixed_parameter, Fmi2Status.discard),
+    "empty state": (lambda slave: slave._set_fmu_state({}), Fmi2Status.error),
+    "truncated state": (
+        lambda slave: slave._set_fmu_state(
+            slave._fmu_state_from_bytes(slave._fmu_state_to_bytes(slave._get_fmu_state())[:-9])
+        ),
+        Fmi2Status.error,
+    ),
+    "experiment set up again": (lambda slave: slave.setup_experiment(0.0), Fmi2Status.error),
+    "initialisation entered again": (
+        lambda slave: slave.enter_initialization_mode(), Fmi2Status.error,
+    ),
+    "initialisation left again": (
+        lambda slave: slave.exit_initialization_mode(), Fmi2Status.error,
+    ),
+}  # fmt: skip
+
+
+def stepped(name: str, call: str = "", **arguments: bool) -> ClassInstance:
+    """An instance in the middle of a run, in which a call can be refused."""
+    if call == "fixed parameter" and name == "DisturbanceGenerator":
+        pytest.skip("all of its parameters are tunable")
+    driver = ClassInstance(name, **arguments)
     driver.excite(1)
     driver.step()
+    return driver
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("call", REFUSED_CALLS)
+def test_refused_call_is_answered_each_time_and_changes_nothing(name, call):
+    driver, calm = stepped(name, call), stepped(name)
+    refused, status = REFUSED_CALLS[call]
+    before = driver.slave._get_fmu_state()
+    for _ in range(3):
+        refused(driver.slave)
+    assert driver.answers() == [status] * 3
+    assert len(driver.messages()) == 1, "what was said is not repeated, what is answered is"
+    raised = status == Fmi2Status.discard
+    assert driver.slave._get_fmu_state() == {**before, "fault": raised}
+    assert driver.step() and calm.step()
+    assert driver.outputs() == calm.outputs()
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("call", REFUSED_CALLS)
+def test_without_a_loader_no_step_is_taken_until_a_state_is_restored(name, call):
+    driver = stepped(name, call, plain=True)
     before, saved = driver.outputs(), driver.slave._get_fmu_state()
-    if call == "fixed parameter set" and driver.component.__name__ == "DisturbanceGenerator":
-        pytest.skip("all of its parameters are tunable")
-    REFUSED_CALLS[call](driver.slave)
-    assert driver.get("fault") is True
-    assert driver.messages()
+    REFUSED_CALLS[call][0](driver.slave)
+    [why] = driver.messages()
     for _ in range(2):
         assert not driver.step()
+    assert driver.messages() == [why], "what was said is not said again"
+    assert driver.answers() == []
+    assert driver.get("fault") is True
     assert driver.outputs() == before
     driver.slave._set_fmu_state(saved)
     assert driver.get("fault") is False
     assert driver.step()
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("plain", [False, True])
+@pytest.mark.parametrize("call", REFUSED_GETS)
+def test_refused_get_has_no_consequence(name, plain, call):
+    driver = stepped(name, plain=plain)
+    before = driver.slave._get_fmu_state()
+    for _ in range(2):
+        REFUSED_GETS[call](driver.slave)
+    assert driver.answers() == ([] if plain else [Fmi2Status.error] * 2)
+    assert len(driver.messages()) == 1
+    assert driver.slave._get_fmu_state() == before
+    assert driver.step()
+
+
+@pytest.mark.parametrize("plain", [False, True])
+def test_discarded_step_has_no_consequence_but_the_fault(driver, plain):
+    driver.slave._has_loader = not plain
+    for _ in range(2):
+        assert not driver.slave.do_step(0.0, -1.0)
+    assert driver.answers() == ([] if plain else [Fmi2Status.discard] * 2)
+    assert driver.get("fault") is True
+    assert driver.step()
+
+
+@pytest.mark.parametrize(
+    ("libraries", "plain"),
+    [
+        (["binaries/linux64/X.so", "binaries/linux64/X_pythonfmu.so"], False),
+        (["binaries/linux64/X.so"], True),
+        (["binaries/win64/X_pythonfmu.so"], True),
+        ([], True),
+    ],
+)
+def test_library_beside_the_loader_tells_a_slave_of_it(tmp_path, libraries, plain):
+    for library in libraries:
+        path = tmp_path / library
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    resources = tmp_path / "resources"
+    resources.mkdir()
+    slave = component("PdController")(instance_name="under_test", resources=str(resources))
+    slave.set_real([0], [nan])
+    slave.enter_initialization_mode()
+    slave.exit_initialization_mode()
+    assert len(messages_of(slave)) == 1
+    assert answers_of(slave) == ([] if plain else [Fmi2Status.discard])
+    assert slave.do_step(0.0, 0.02) is not plain
 
 
 def test_values_of_unknown_references_are_zero(driver):
@@ -192,31 +315,29 @@ def test_reference_beyond_two_to_the_31_is_named_as_the_host_knows_it(driver):
 
 
 @pytest.mark.parametrize("start", [nan, inf, -inf])
-def test_bad_start_time_is_refused_and_a_good_one_cures_it(start):
-    for mended in (False, True):
-        slave = component("DisturbanceGenerator")(instance_name="under_test")
-        slave.setup_experiment(start)
-        if mended:
-            slave.setup_experiment(1.0)
-        slave.enter_initialization_mode()
-        slave.exit_initialization_mode()
-        assert slave.do_step(1.0, 0.02) is mended
-        assert slave._store.fault is True
+def test_bad_start_time_is_refused(start):
+    slave = component("DisturbanceGenerator")(instance_name="under_test")
+    slave.setup_experiment(start)
+    assert messages_of(slave) == [f"start time {start}: must be finite"]
+    assert slave._get_fmu_state()["start_time"] == 0.0
+    assert slave._store.fault is False
 
 
 @pytest.mark.parametrize("stop", [nan, -1.0, -inf])
-def test_bad_stop_time_is_refused(driver, stop):
+def test_stop_time_is_not_looked_at(driver, stop):
+    """Nothing ends with it."""
     slave = driver.component(instance_name="under_test")
     slave.setup_experiment(0.0, stop)
-    assert slave._store.fault is True
+    assert slave.log_queue == []
 
 
 def test_initialisation_cannot_be_left_before_it_was_entered():
     slave = component("AuvPlant")(instance_name="under_test")
     slave.exit_initialization_mode()
+    assert messages_of(slave) == ["fmi2ExitInitializationMode is not allowed when instantiated"]
     slave.enter_initialization_mode()
     slave.exit_initialization_mode()
-    assert not slave.do_step(0.0, 0.02)
+    assert not slave.do_step(0.0, 0.02), "there is no loader"
 
 
 def test_after_the_end_nothing_is_set_or_stepped_and_everything_can_be_read(driven):
@@ -224,12 +345,29 @@ def test_after_the_end_nothing_is_set_or_stepped_and_everything_can_be_read(driv
     driven.step()
     before = driven.outputs()
     driven.slave.terminate()
-    assert driven.get("fault") is False
     assert not driven.step()
-    assert "terminated" in driven.messages()[0]
     driven.slave.set_real([0], [7.0])
+    assert driven.messages() == [
+        "fmi2DoStep is not allowed when terminated",
+        "fmi2SetReal is not allowed when terminated",
+    ]
+    assert driven.answers() == [Fmi2Status.error] * 2
+    assert driven.get("fault") is False
     assert driven.get(first_input(driven)) != 7.0
     assert driven.outputs() == before
+
+
+@pytest.mark.parametrize("calls", [0, 1, 2, 3])
+def test_run_can_be_ended_in_any_mode_and_again(driver, calls):
+    slave = driver.component(instance_name="under_test")
+    begin = (lambda: slave.setup_experiment(0.0), slave.enter_initialization_mode,
+             slave.exit_initialization_mode)  # fmt: skip
+    for call in begin[:calls]:
+        call()
+    slave.terminate()
+    slave.terminate()
+    assert slave.log_queue == []
+    assert slave._get_fmu_state()["mode"] == "terminated"
 
 
 @pytest.mark.parametrize(
@@ -246,6 +384,7 @@ def test_one_wild_sample_is_refused_and_the_run_goes_on_after_it(name, start, sa
     driver, calm = ClassInstance(name, **start), ClassInstance(name, **start)
     driver.set(**sample)
     assert not driver.step()
+    assert driver.answers() == [Fmi2Status.discard]
     driver.set(**dict.fromkeys(sample, 0.0))
     for k in range(3):
         for other in (driver, calm):
@@ -257,7 +396,13 @@ def test_one_wild_sample_is_refused_and_the_run_goes_on_after_it(name, start, sa
 def test_initial_values_without_a_next_step_are_refused():
     driver = ClassInstance("AuvPlant", nu0__p=1e160)
     assert "initialisation refused" in driver.messages()[0]
-    assert not driver.step()
+    assert driver.answers() == [Fmi2Status.error]
+    assert driver.get("fault") is False
+    assert driver.slave._get_fmu_state()["mode"] == "initialising"
+    assert driver.outputs() == [0.0] * len(driver.outputs())
+    driver.set(nu0__p=0.0)
+    driver.slave.exit_initialization_mode()
+    assert driver.step()
 
 
 def test_outputs_that_are_only_too_large_to_be_added_up_are_taken():
@@ -300,6 +445,7 @@ def test_each_seed_has_a_noise_of_its_own():
 def test_reference_does_not_start_steeper_than_its_equations_allow(pitch):
     driver = ClassInstance("MotionPlanner", eta0__theta=radians(pitch))
     assert f"{pitch:.1f} degrees" in driver.messages()[0]
+    assert driver.answers() == [Fmi2Status.error]
     assert not driver.step()
 
 
@@ -318,7 +464,7 @@ def test_messages_are_bounded():
     for k in range(1000):
         driver.slave.get_real([10_000 + k])
     assert len(driver.messages()) == 100
-    assert len(driver.slave._store.refused) == 1
+    assert driver.answers() == [Fmi2Status.error] * 1000
 
 
 @pytest.mark.parametrize("h", [-0.02, nan, inf, -inf])
@@ -339,13 +485,12 @@ def test_impossible_time_is_refused(driver):
 def test_step_before_the_initialisation_is_refused():
     slave = component("MotionPlanner")(instance_name="under_test")
     assert not slave.do_step(0.0, 0.02)
-    assert slave.get_boolean([len(component("MotionPlanner").ports)]) == [True]
-
-
-def test_refusal_before_the_initialisation_says_why():
-    slave = component("AuvPlant")(instance_name="under_test")
-    assert not slave.do_step(0.0, 0.02)
-    assert "not initialised" in slave.log_queue[0].msg
+    [entry] = slave.log_queue
+    assert (entry.msg, entry.status) == (
+        "fmi2DoStep is not allowed when instantiated",
+        Fmi2Status.error,
+    )
+    assert slave.get_boolean([len(component("MotionPlanner").ports)]) == [False]
 
 
 def test_zero_step_changes_nothing(driver):
