@@ -23,13 +23,13 @@ import pytest
 
 from fmus.packaging.loader import compiler
 from fmus.packaging.own import build_own
-from support import states
 from support.kinds import FIXTURES
 from support.raw_fmi import (
     DISCARD,
     ERROR,
     FATAL,
     MODEL_EXCHANGE,
+    OF_MODEL_EXCHANGE,
     OK,
     RawFmu,
 )  # fmt: skip
@@ -140,7 +140,8 @@ def test_place_without_a_slave_is_null_with_one_message(python_fmu, what, locati
 
 def test_guid_is_that_of_the_description_or_not_stated(fmu: RawFmu, folder: Path):
     stated = fmpy.read_model_description(folder).guid.encode()
-    for guid in (None, b"", stated, stated.strip(b"{}")):
+    bare = stated.strip(b"{}")
+    for guid in (None, b"", stated, bare, stated.upper(), bare.upper(), bare.lower()):
         made = fmu.instantiate(guid=guid)
         assert made
         fmu.FreeInstance(made)
@@ -316,6 +317,106 @@ def test_no_values_need_no_arrays(fmu: RawFmu, component: int):
     assert fmu.messages == []
 
 
+#: What is refused, as function, arguments of an initialised FMU, and answer.
+def refusals(folder: Path) -> list[tuple[str, tuple[Any, ...], int]]:
+    an_input, output, gain = (reference(folder, name) for name in ("y.x", "tau.u", "k_d"))
+    fixed, choice = reference(folder, "h_max"), reference(folder, "saturation")
+    unknown, nan, one = (c_uint * 1)(4711), (c_double * 1)(math.nan), (c_double * 1)(1.0)
+    return [
+        ("SetReal", (an_input, 1, nan), DISCARD),
+        ("SetReal", (gain, 1, (c_double * 1)(-1.0)), DISCARD),
+        ("SetReal", (output, 1, one), DISCARD),
+        ("SetReal", (fixed, 1, one), DISCARD),
+        ("SetString", (choice, 1, (c_char_p * 1)(b"sigmoid")), DISCARD),
+        ("DoStep", (0.0, -1.0, 1), DISCARD),
+        ("GetReal", (unknown, 1, one), ERROR),
+        ("GetBoolean", (an_input, 1, INTEGERS), ERROR),
+        ("CancelStep", (), ERROR),
+        ("EnterEventMode", (), ERROR),
+        ("SetReal", (unknown, 1, one), ERROR),
+        ("EnterInitializationMode", (), ERROR),
+    ]
+
+
+def test_what_is_refused_is_told_with_logging_off(fmu: RawFmu, folder: Path):
+    """Each in its call, and answered again where it is not told again."""
+    for function, arguments, answer in refusals(folder):
+        fmu.messages.clear()
+        made = fmu.instantiate(logging=0)
+        fmu.SetupExperiment(made, 0, 0.0, 0.0, 0, 0.0)
+        fmu.EnterInitializationMode(made)
+        assert fmu.ExitInitializationMode(made) == OK
+        assert fmu.messages == []
+        assert getattr(fmu, function)(made, *arguments) == answer, function
+        [message] = fmu.messages
+        assert message.status == answer
+        assert message.category == {DISCARD: "logStatusDiscard", ERROR: "logStatusError"}[answer]
+        assert getattr(fmu, function)(made, *arguments) == answer, function
+        fmu.FreeInstance(made)
+
+
+def test_fixed_parameters_may_be_set_to_what_they_are(fmu, folder, component):
+    """As a host does that sets all start values once more."""
+    fixed = [
+        variable
+        for variable in fmpy.read_model_description(folder).modelVariables
+        if (variable.causality, variable.variability) == ("parameter", "fixed")
+    ]
+    assert {variable.type for variable in fixed} >= {"Real", "Boolean", "String"}
+    types = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
+    for variable in fixed:
+        values = (types[variable.type] * 1)()
+        arguments = (component, (c_uint * 1)(variable.valueReference), 1, values)
+        assert getattr(fmu, f"Get{variable.type}")(*arguments) == OK
+        assert getattr(fmu, f"Set{variable.type}")(*arguments) == OK, variable.name
+    assert steps(fmu, component) == OK
+    assert fmu.messages == []
+
+
+@pytest.mark.parametrize(
+    ("bad", "value", "answer"),
+    [("y.y", math.nan, DISCARD), ("k_d", -1.0, DISCARD), ("h_max", 0.5, DISCARD),
+     ("tau.u", 0.0, DISCARD), (None, 0.0, ERROR)],
+)  # fmt: skip
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_of_several_values_all_are_taken_or_none(
+    fmu, folder, component, bad: str | None, value: float, answer: int, place: int
+):
+    """An input and a tunable parameter beside a value that is bad, wherever it stands."""
+    good = [reference(folder, "y.x")[0], reference(folder, "k_d")[0]]
+    read, all_three = (c_double * 2)(), [(r, v) for r, v in zip(good, (0.5, 60.0), strict=True)]
+    all_three.insert(place, (4711 if bad is None else reference(folder, bad)[0], value))
+    before = (c_double * 2)()
+    assert fmu.GetReal(component, (c_uint * 2)(*good), 2, before) == OK
+    names, values = (
+        (c_uint * 3)(*(r for r, _ in all_three)),
+        (c_double * 3)(*(v for _, v in all_three)),
+    )
+    assert fmu.SetReal(component, names, 3, values) == answer
+    assert fmu.GetReal(component, (c_uint * 2)(*good), 2, read) == OK
+    assert [*read] == [*before]
+    assert steps(fmu, component) == (OK if answer == DISCARD else ERROR)
+    assert len(fmu.messages) == 1
+
+
+def test_several_parameters_are_taken_in_one_call_while_stepping(fmu, folder, component):
+    names = (c_uint * 3)(*(reference(folder, name)[0] for name in ("k_d", "lambda", "y.x")))
+    values, read = (c_double * 3)(60.0, 0.5, 0.25), (c_double * 3)()
+    assert fmu.SetReal(component, names, 3, values) == OK
+    assert fmu.GetReal(component, names, 3, read) == OK
+    assert [*read] == [*values]
+    assert steps(fmu, component) == OK
+
+
+@pytest.mark.parametrize("function", OF_MODEL_EXCHANGE)
+def test_functions_of_model_exchange_are_there_and_do_nothing(fmu, component, function: str):
+    """Some hosts look for them in every FMU."""
+    assert getattr(fmu, function)(component, *CALLS[function]) == ERROR
+    [message] = fmu.messages
+    assert message.text == f"FMI function not supported: fmi2{function}"
+    assert steps(fmu, component) == OK
+
+
 def in_error(fmu: RawFmu, component: int) -> None:
     assert fmu.SetReal(component, None, 1, None) == ERROR
 
@@ -350,6 +451,12 @@ def test_error_state_lets_through_what_does_not_go_on(fmu, folder, component):
 
 # What is not alive
 
+
+def zero(kind: Any) -> Any:
+    """What nobody may look at."""
+    return kind() if kind in (c_int, c_double, c_size_t) else None
+
+
 #: Everything that takes a component, with arguments that are right, or that nobody may look at.
 CALLS = {
     **{f"{verb}{kind}": (ONE, 1, values)
@@ -373,6 +480,7 @@ CALLS = {
     "GetRealOutputDerivatives": (ONE, 1, INTEGERS, REALS),
     "DoStep": (0.0, 0.02, 1),
     "CancelStep": (),
+    **{name: tuple(zero(kind) for kind in kinds) for name, kinds in OF_MODEL_EXCHANGE.items()},
     **{f"Get{kind}Status": (2, values)
        for kind, values in (("", INTEGERS), ("Real", REALS), ("Integer", INTEGERS),
                             ("Boolean", INTEGERS), ("String", STRINGS))},
@@ -497,79 +605,20 @@ def test_size_is_that_of_the_state(fmu: RawFmu, component: int, difference: int)
     assert content.raw == bytes(size + 1000)
 
 
-def restore(fmu: RawFmu, component: int, content: bytes) -> list[str]:
-    """What is said of a state."""
-    state, before = c_void_p(), len(fmu.messages)
+@pytest.mark.parametrize("content", [b"nothing", b"{}", 1000 * b"x"])
+def test_bytes_that_are_no_state_end_in_the_error_state(fmu, component, content: bytes):
+    state, good = c_void_p(), c_void_p()
+    assert fmu.GetFMUstate(component, good) == OK
+    before = serialised(fmu, component, good)
     assert fmu.DeSerializeFMUstate(component, content, len(content), state) == OK
-    assert fmu.SetFMUstate(component, state) == OK
-    assert fmu.FreeFMUstate(component, state) == OK
-    return [message.text for message in fmu.messages[before:]]
-
-
-@pytest.fixture
-def said(fmu: RawFmu, component: int) -> dict[str, Any]:
-    """What a state of it says, with a fault."""
-    state = c_void_p()
+    assert fmu.SetFMUstate(component, state) == ERROR
+    [message] = fmu.messages
+    assert message.text.startswith("state refused: ")
     assert fmu.GetFMUstate(component, state) == OK
-    found = states.read(serialised(fmu, component, state))
-    assert found is not None
-    assert fmu.FreeFMUstate(component, state) == OK
-    found["fault"] = True
-    return found
-
-
-def test_state_holds_all_that_can_be_refused(fmu: RawFmu, component: int, folder: Path):
-    """Each port, each call, and what is neither; with the longest reasons."""
-    variables = fmpy.read_model_description(folder).modelVariables
-    bad = restore(fmu, component, b"nothing")
-    assert bad == ["state refused: the bytes are not those of a state"]
-    assert fmu.SetupExperiment(component, 0, 0.0, 0.0, 0, 0.0) in (OK, DISCARD)
-    assert fmu.EnterInitializationMode(component) in (OK, DISCARD)
-    assert fmu.ExitInitializationMode(component) in (OK, DISCARD)
-    assert fmu.Terminate(component) == OK
-    assert fmu.Terminate(component) in (OK, DISCARD)
-    for variable in variables:
-        kind = variable.type
-        values = STRINGS if kind == "String" else REALS if kind == "Real" else INTEGERS
-        getattr(fmu, f"Set{kind}")(component, (c_uint * 1)(variable.valueReference), 1, values)
-    fmu.SetReal(component, (c_uint * 1)(2**31 + 1), 1, REALS)
-    state = c_void_p()
-    assert fmu.GetFMUstate(component, state) == OK
-    content = serialised(fmu, component, state)
-    found = states.read(content)
-    assert found is not None
-    names = found["refused"].keys()
-    assert names == {variable.name for variable in variables} | {
-        "value reference", "fmi2SetupExperiment", "fmi2EnterInitializationMode",
-        "fmi2ExitInitializationMode", "fmi2Terminate", "fmi2SetFMUstate",
-    }  # fmt: skip
-    found["refused"] = dict.fromkeys((*names, "initialisation"), 500 * "\U0001f30a")
-    for one in (content, states.sealed(found)):
-        assert restore(fmu, component, one) == []
-        assert fmu.FreeFMUstate(component, state) == OK
-        assert fmu.GetFMUstate(component, state) == OK
-        assert serialised(fmu, component, state) == one
-
-
-@pytest.mark.parametrize(
-    ("refused", "why"),
-    [
-        ({"k_q": "x"}, "it refused what cannot be refused"),
-        ({"fmi2DoStep": "x"}, "it refused what cannot be refused"),
-        ({"": "x"}, "it refused what cannot be refused"),
-        ({"k_d": "x\0y"}, "what it refused is no text"),
-        ({"k_d": 2001 * "x"}, "what it refused is no text"),
-        ({str(i): "" for i in range(160_000)}, None),
-    ],
-)
-def test_state_with_what_cannot_be_refused_is_refused(fmu, component, said, refused, why):
-    """However much of it there is."""
-    said["refused"] = refused
-    [message] = restore(fmu, component, states.sealed(said))
-    # What is too long for a state, the FMUs in C do not begin to read.
-    known = [why] if why else ["it refused what cannot be refused", "it has other parts"]
-    assert message in [f"state refused: {one}" for one in known]
-    assert steps(fmu, component) == DISCARD
+    assert serialised(fmu, component, state) == before
+    assert steps(fmu, component) == ERROR
+    assert fmu.SetFMUstate(component, good) == OK
+    assert steps(fmu, component) == OK
 
 
 # Calls within calls
@@ -592,21 +641,18 @@ def test_logger_that_calls_back_is_refused(fmu: RawFmu, component: int, capfd):
 
 def test_messages_of_a_call_are_told_in_their_order_after_all_is_done(fmu, folder, component):
     """Also where the logger calls back: the instance is let go, and its values are as they stay."""
-    inputs = [
-        (v.name, v.valueReference)
-        for v in fmpy.read_model_description(folder).modelVariables
-        if v.causality == "input"
-    ][:5]
-    references, values = (c_uint * 5)(*(r for _, r in inputs)), (c_double * 5)(*[math.nan] * 5)
+    unknown = range(4711, 4716)
+    references, values = (c_uint * 6)(*reference(folder, "k_d"), *unknown), (c_double * 6)()
     answers = []
     fmu.when_told = lambda: answers.append(steps(fmu, component))
-    assert fmu.SetReal(component, references, 5, values) == OK
-    assert steps(fmu, component) == DISCARD
+    assert fmu.GetReal(component, references, 6, values) == ERROR
     fmu.when_told = lambda: None
-    *refused, blocked = (message.text for message in fmu.messages)
-    assert refused == [f"{name} = nan: must be finite" for name, _ in inputs]
-    assert blocked == f"step refused at t = 0 s: {'; '.join(refused)}"
-    assert answers == [ERROR] * 6
+    expected = [f"no Real has the value reference {reference}" for reference in unknown]
+    assert [message.text for message in fmu.messages] == expected
+    assert answers == [ERROR] * 5
+    assert values[0] > 0.0
+    assert values[1:] == [0.0] * 5
+    assert steps(fmu, component) == OK
 
 
 def test_threads_on_one_instance_take_turns(fmu: RawFmu, component: int):

@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 
 import fmpy
 
+from fmus.packaging.kinds import NATIVE
 from support.cells import Company, check
 from support.raw import Description, Host, Library, Status, Variable, instance
 from support.raw_fmi import MODEL_EXCHANGE
@@ -39,6 +40,7 @@ def read_description(folder: Path) -> Description:
         root.attrib["instantiationToken"],
         implementation.attrib["modelIdentifier"],
         tuple(map(_variable, variables)),
+        NATIVE,
     )
 
 

@@ -12,6 +12,20 @@ MODEL_EXCHANGE, CO_SIMULATION = range(2)
 
 Logger = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 
+#: What the functions of model exchange take after the component.
+OF_MODEL_EXCHANGE: dict[str, tuple[Any, ...]] = {
+    "EnterEventMode": (),
+    "NewDiscreteStates": (c_void_p,),
+    "EnterContinuousTimeMode": (),
+    "CompletedIntegratorStep": (c_int, POINTER(c_int), POINTER(c_int)),
+    "SetTime": (c_double,),
+    "SetContinuousStates": (POINTER(c_double), c_size_t),
+    "GetDerivatives": (POINTER(c_double), c_size_t),
+    "GetEventIndicators": (POINTER(c_double), c_size_t),
+    "GetContinuousStates": (POINTER(c_double), c_size_t),
+    "GetNominalsOfContinuousStates": (POINTER(c_double), c_size_t),
+}
+
 #: What each function takes after the component.
 SIGNATURES: dict[str, tuple[Any, ...]] = {
     "SetDebugLogging": (c_int, c_size_t, POINTER(c_char_p)),
@@ -41,6 +55,7 @@ SIGNATURES: dict[str, tuple[Any, ...]] = {
     "GetIntegerStatus": (c_int, POINTER(c_int)),
     "GetBooleanStatus": (c_int, POINTER(c_int)),
     "GetStringStatus": (c_int, POINTER(c_char_p)),
+    **OF_MODEL_EXCHANGE,
 }  # fmt: skip
 
 
