@@ -292,7 +292,7 @@ STATE_FUNCTION(fmi3DeserializeFMUState,
 /* What is not supported */
 
 static int unsupported(void *handle, string function) {
-    call this = begin(handle, function, NOT_AFTER_ERROR);
+    call this = begin(handle, function, ALWAYS);
     if (GOES_ON(this, NULL)) {
         message why;
         compose(&why, "FMI function not supported: %s", function);
