@@ -23,7 +23,7 @@ LIBPYTHON = Path(
 CHROOT = shutil.which("chroot")
 
 #: Processes a test with threads.
-REPETITIONS = 5
+REPETITIONS = 8
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
 needs_libpython = pytest.mark.skipif(
@@ -98,6 +98,25 @@ def test_logger_that_does_not_come_back_leaves_the_instance_to_all_threads(dist,
 
 
 @needs_libpython
+def test_host_that_ends_python_first_lets_its_instances_go_in_silence(dist, tmp_path):
+    """All else is an error that says what has happened."""
+    host = compiled_host(tmp_path, name="ending")
+    process = run(host, str(LIBPYTHON), *unpacked(dist, tmp_path)[:2])
+    assert process.returncode == 0, process.stderr
+    assert process.stdout.splitlines() == [
+        "with Python 0", "ended 0", "step 3", "free state 3", "another none", "terminate 0",
+    ]  # fmt: skip
+    told, silence = process.stderr.split("--\n")
+    ended = "the host has ended Python"
+    assert told.splitlines() == [
+        f"fmi2DoStep: {ended}",
+        f"fmi2FreeFMUstate: {ended}",
+        f"ended: logStatusError: fmi2Instantiate: {ended}",
+    ]
+    assert silence == ""
+
+
+@needs_libpython
 def test_path_with_special_characters_is_no_trap(dist: Path, tmp_path: Path, with_libpython: Path):
     folder = tmp_path / "größe 100% [ü]"
     process = run(with_libpython, *unpacked(dist, folder))
@@ -165,11 +184,15 @@ def test_libpython_without_its_standard_library_does_not_end_the_host(dist, tmp_
 
 
 @needs_libpython
-@pytest.mark.parametrize("count", [2, 5])
+@pytest.mark.parametrize("count", [2, 16])
 def test_threads_that_instantiate_at_the_same_moment(dist: Path, tmp_path: Path, count: int):
-    """One interpreter starts, whoever comes first."""
+    """One interpreter starts, whoever comes first, and all go by the same sys.path."""
     host = compiled_host(tmp_path, *FINDS_LIBPYTHON, name="threads")
-    arguments = unpacked(dist, tmp_path)[: 2 * count]
+    arguments = [word for k in range(3) for word in unpacked(dist, tmp_path / str(k))][: 2 * count]
+    for resources in tmp_path.glob("*/*/resources"):
+        script = resources / f"{(resources / 'slavemodule.txt').read_text()}.py"
+        # Threads take turns as often as can be.
+        script.write_text(f"import sys\nsys.setswitchinterval(1e-6)\n{script.read_text()}")
     for _ in range(REPETITIONS):
         process = run(host, *arguments)
         assert (process.returncode, process.stdout) == (0, f"{count} threads\n"), process.stderr
