@@ -105,8 +105,7 @@ def verify(
     for way in _ways(system, order, at_start):
         complaint = _complaint(table, system, way, tolerance)
         if complaint is None:
-            said = _certificate(table, system, outputs, way, tolerance, verbose)
-            return "\n".join(said)
+            return "\n".join(_certificate(table, system, outputs, way, tolerance, verbose))
         complaints.append(f"{way.words} {complaint}")
     raise InputError(f"{path}: {'; '.join(complaints)}")
 
@@ -123,11 +122,8 @@ def _ways(system: System, order: Order | None, at_start: bool) -> Iterator[Way]:
     for coupling in (None, DELAY) if rings(system) else (None,):
         delayed = ", rings delayed" * (coupling == DELAY)
         for one in ORDERS if order is None else (order,):
-            words = (
-                f"in {one} order"
-                if isinstance(one, str)
-                else f"as run --order {written_order(one)}"
-            )
+            named = written_order(one)
+            words = f"in {named} order" if isinstance(one, str) else f"as run --order {named}"
             yield Way(one, coupling, exchange, f"{words}{delayed}{start}")
 
 
