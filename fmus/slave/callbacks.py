@@ -185,9 +185,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
                 raise Refusal(f"{port.name} is an output and cannot be set")
             if port.variability == "fixed" and self._mode == STEPPING:
                 if value != parameters[port.name]:
-                    raise Refusal(
-                        f"{port.name} is fixed and cannot change after initialisation"
-                    )
+                    raise Refusal(f"{port.name} is fixed and cannot change after initialisation")
                 continue
             port.checked(value)
             if port.causality == "input":
