@@ -35,10 +35,11 @@ rises. So is a step whose size is negative or not finite, or whose result would 
 everything is as it was before, noise included. The run goes on with the next good call; `fault`
 stays true until fmi2Reset, or until a state is restored that had none.
 
-A call in the wrong mode, a value reference that is not there or of another type, a state that no
-run can have led to: the call is answered with fmi2Error, and so is every call after it but a get,
-until fmi2Reset or a good state. A get that is refused has no consequence, and fmi2GetReal gives the
-numbers of Integers and Booleans, too.
+A parameter that cannot be taken before the run, a call in the wrong mode, a value reference that is
+not there or of another type, a state that no run can have led to: the call is answered with
+fmi2Error, and so is every call after it but a get, until fmi2Reset or a good state. The parameter
+raises `fault` as well. A get that is refused has no consequence, and fmi2GetReal gives the numbers
+of Integers and Booleans, too.
 
 The reason is logged, even with logging off. The whole table of calls, states and bad arguments is
 `docs/status.md` of the project."""

@@ -47,9 +47,7 @@ OF_THE_SLAVE = {
     for name, (key, state) in CELLS.items()
     if key[0] not in UNGUARDED
     and state != ERROR
-    and not (
-        rows()[key].cells[state].answer.name == ERROR and any(word in key[1] for word in UNSOUND)
-    )
+    and not (rows()[key].cells[state].answer.fails and any(word in key[1] for word in UNSOUND))
 }
 
 

@@ -48,7 +48,7 @@ def check(library: Library, key: tuple[str, str], state: str, company: Company) 
     row = rows()[key]
     cell = row.cells[state]
     ways = [Trial.check_next_step]
-    if cell.answer.name in ("discarded", ERROR):
+    if cell.answer.name == "discarded" or cell.answer.fails:
         ways += [Trial.check_reset, Trial.check_restored]
     for goes_on in ways:
         with instance(library) as host:
@@ -134,7 +134,7 @@ class Trial:
         status = make(host, call, self.saved)
         assert status == self._status(), f"the status is {status.name}"
         logged = {f"fmi2{message.status.name}" for message in host.messages}
-        if self.state != ERROR or answer.name != ERROR:
+        if self.state != ERROR or not answer.fails:
             assert not answer.message or answer.message in logged, f"messages: {logged or 'none'}"
         if self.cell.leads_to != ERROR:
             self.mode = self.cell.leads_to
@@ -159,8 +159,8 @@ class Trial:
     @property
     def _is_told_late(self) -> bool:
         """Whether it is the next steps that tell what was refused, since no loader does."""
-        name, is_step = self.cell.answer.name, self.row.function == "fmi2DoStep"
-        refused = name == ERROR or (name == "discarded" and not is_step)
+        answer, is_step = self.cell.answer, self.row.function == "fmi2DoStep"
+        refused = answer.fails or (answer.name == "discarded" and not is_step)
         return refused and not self.host.library.answers
 
     def _check_what_is_set(self, call: Call, before: Mapping[str, object]) -> bool:

@@ -36,6 +36,11 @@ class Answer(NamedTuple):
         return self.fault == "rises"
 
     @property
+    def fails(self) -> bool:
+        """Whether it leads to the state error."""
+        return self.afterwards.startswith(self.status) and self.status == "fmi2Error"
+
+    @property
     def changes_nothing(self) -> bool:
         return self.changes.startswith("nothing")
 
@@ -92,7 +97,7 @@ def _cells(texts: dict[str, str]) -> dict[str, Cell]:
 def _cell(text: str, state: str) -> Cell:
     name, _, leads_to = (part.strip() for part in text.partition("→"))
     answer = answers()[name or "OK"]
-    return Cell(answer, leads_to or (ERROR if name == ERROR else state))
+    return Cell(answer, leads_to or (ERROR if answer.fails else state))
 
 
 def creations(kind: str = PYTHON) -> dict[str, bool]:
