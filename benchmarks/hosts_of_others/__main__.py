@@ -153,7 +153,8 @@ def _run(*command: str | Path, timeout: float, folder: Path | None = None) -> st
     if process.returncode != 0:
         told = [line for line in process.stderr.splitlines() if line.startswith(_REASON)]
         text = told[-1] if told else last_line(process.stderr, "it said nothing")
-        raise InputError(text.removeprefix(_REASON))
+        text = text.removeprefix(_REASON)
+        raise InputError(text.replace(f"{folder}/", "") if folder else text)
     return process.stdout
 
 
