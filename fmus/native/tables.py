@@ -87,7 +87,7 @@ def _choices(port: Port) -> str:
     return f"static const choice {_choices_name(port)}[] = {{{rows}}};\n"
 
 
-def _references(causality: str, references: Sequence[int]) -> str:
+def _references(causality: str, places: Sequence[int]) -> str:
     """The value references of the Real ports of a causality; C has no empty arrays."""
-    numbers = ", ".join(map(str, references or [0]))
+    numbers = ", ".join(f"FIRST_REFERENCE + {place}" for place in places or [0])
     return f"static const uint32_t {causality}_references[] = {{{numbers}}};\n"

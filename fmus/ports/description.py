@@ -36,9 +36,12 @@ _INITIAL = {"output": "calculated", "parameter": "exact"}
 
 
 class Dependency(NamedTuple):
-    """What an output depends on, all by value references."""
+    """What an output depends on, all by places among the variables, of which the first is 1.
 
-    reference: int  #: of the output
+    FMI 2.0 calls a place an index; in FMI 3.0 it is the value reference, which hosts take for one.
+    """
+
+    place: int  #: of the output
     direct: list[int]  #: what its value depends on without a state between
     initial: list[int]  #: what its value at the start time depends on
 
@@ -93,15 +96,15 @@ def unit_definitions(units: Sequence[str]) -> Element:
 
 def dependencies(ports: Sequence[Port]) -> Iterator[Dependency]:
     """What each output depends on: its direct feedthrough, and at the start the parameters too."""
-    reference = {port.name: i for i, port in enumerate(ports)}
-    parameters = [reference[port.name] for port in ports if port.causality == "parameter"]
+    places = {port.name: place for place, port in enumerate(ports, start=1)}
+    parameters = [places[port.name] for port in ports if port.causality == "parameter"]
     for port in ports:
         if port.causality == "output":
             # FMI 2.0 has no variable for the time.
-            direct = [reference[name] for name in port.feedthrough if name in reference]
-            # fault is false at the start whatever is set, unless that is refused.
+            direct = [places[name] for name in port.feedthrough if name in places]
+            # fault is false at the start, unless what is set is refused.
             initial = [*direct, *parameters] if port.kind == "Real" else []
-            yield Dependency(reference[port.name], direct, initial)
+            yield Dependency(places[port.name], direct, initial)
 
 
 def log_categories(fmi: str) -> Element:

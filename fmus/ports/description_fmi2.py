@@ -119,8 +119,8 @@ def _structure(ports: Sequence[Port]) -> tuple[Element, Element]:
                 parent,
                 "Unknown",
                 # FMI 2.0 counts variables from one.
-                index=str(output.reference + 1),
-                dependencies=" ".join(str(reference + 1) for reference in known),
+                index=str(output.place),
+                dependencies=" ".join(map(str, known)),
                 dependenciesKind=" ".join(["dependent"] * len(known)),
             )
     return outputs, initial_unknowns

@@ -101,8 +101,8 @@ def _type_definitions(units: Sequence[str]) -> Element:
 
 def _variables(ports: Sequence[Port]) -> Element:
     variables = Element("ModelVariables")
-    for reference, port in enumerate(ports):
-        variable = SubElement(variables, KINDS[port.kind], variable_attributes(reference, port))
+    for place, port in enumerate(ports, start=1):
+        variable = SubElement(variables, KINDS[port.kind], variable_attributes(place, port))
         if port.unit is not None:
             variable.set("declaredType", UNITS[port.unit].type_name)
             variable.set("unit", port.unit)
@@ -119,16 +119,16 @@ def _structure(ports: Sequence[Port]) -> Element:
     known = list(dependencies(ports))
     structure = Element("ModelStructure")
     for output in known:
-        structure.append(_unknown("Output", output.reference, output.direct))
+        structure.append(_unknown("Output", output.place, output.direct))
     for output in known:
-        structure.append(_unknown("InitialUnknown", output.reference, output.initial))
+        structure.append(_unknown("InitialUnknown", output.place, output.initial))
     return structure
 
 
-def _unknown(tag: str, reference: int, known: Sequence[int]) -> Element:
+def _unknown(tag: str, place: int, known: Sequence[int]) -> Element:
     return Element(
         tag,
-        valueReference=str(reference),
+        valueReference=str(place),
         dependencies=" ".join(map(str, known)),
         dependenciesKind=" ".join(["dependent"] * len(known)),
     )

@@ -1,9 +1,9 @@
 """What PythonFMU calls to pass values, and how a refusal is told: values, modes and messages.
 
-No exception leaves a callback: PythonFMU would report fmi2Fatal and release its objects twice. It
-cannot be told that a call was refused either, so every refusal means the same: it is logged,
-`fault` rises, nothing else changes, and steps end with fmi2Discard until it is mended; a value by a
-good value of the same port, everything by a reset or by a state that is restored.
+No exception leaves a callback: PythonFMU would report fmi2Fatal and release its objects twice. Nor
+can PythonFMU be told that a call was refused; it answers fmi2OK. The native loader is told by a log
+entry of its own category, and answers fmi2Discard or fmi2Error to that very call. Without a loader
+every step after a refusal is discarded, until a reset or a state that is restored.
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from math import isfinite
-from typing import Any, Callable, ClassVar
+from typing import Any, ClassVar
 
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
 from fmus.ports.port import Port, Refusal, Value
+from fmus.slave.loading import has_loader
 from fmus.slave.store import MISSING, Store
 
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = MODES = (
@@ -32,18 +33,8 @@ MOST_MESSAGES = 100
 #: Characters of a message: some hosts have a buffer of 1 or 2 kB for them.
 LONGEST_MESSAGE = 500
 
-#: What is refused, where it is neither a port nor a call: a reference that belongs to no port, and
-#: the initialisation with the values that there are.
-REFERENCE, INITIALISATION = "value reference", "initialisation"
-
-#: Calls that are refused in the wrong mode, or with arguments that do not fit.
-REFUSED_CALLS = (
-    "fmi2SetupExperiment",
-    "fmi2EnterInitializationMode",
-    "fmi2ExitInitializationMode",
-    "fmi2Terminate",
-    "fmi2SetFMUstate",
-)
+#: Category of a log entry that tells the native loader the status of the call.
+ANSWER = "answer"
 
 
 class Callbacks(Fmi2Slave):  # type: ignore[misc]
@@ -59,10 +50,18 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         #: Whether a value has changed that state and outputs at the start time depend on.
         self._stale = False
         self._said: set[str] = set()
+        self._has_loader = has_loader(self.resources)
+        #: What no answer has told, where there is no loader.
+        self._untold = ""
 
     @abstractmethod
-    def _refresh(self) -> None:
-        """Compute state and outputs at the start time, if a value they depend on has changed."""
+    def _refresh(self) -> str:
+        """Compute state and outputs at the start time, if a value they depend on has changed.
+
+        Returns:
+            Why there are none; empty: there are.
+
+        """
 
     @abstractmethod
     def _retune(self, parameters: dict[str, Value]) -> None:
@@ -70,15 +69,24 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
     # Refusals and messages
 
-    def _refuse(self, what: str, why: str) -> None:
-        """Take no step until what was refused is mended."""
-        self._store.refused[what] = why[:LONGEST_MESSAGE]
-        self._report(why)
-
-    def _report(self, message: str, key: str | None = None) -> None:
-        """Raise `fault` and log."""
+    def _discard(self, why: str) -> None:
+        """Answer fmi2Discard: nothing that the call brings is taken."""
         self._store.fault = True
-        self.say(message, Fmi2Status.discard, key)
+        self._refuse(Fmi2Status.discard, why)
+
+    def _fail(self, why: str) -> None:
+        """Answer fmi2Error: the call is not possible now, or not at all."""
+        self._refuse(Fmi2Status.error, why)
+
+    def _refuse(self, status: Fmi2Status, why: str) -> None:
+        self._answer(status, why)
+        if not self._has_loader:
+            self._untold = self._untold or why
+
+    def _answer(self, status: Fmi2Status, why: str, key: str | None = None) -> None:
+        self.say(why, status, key)
+        if self._has_loader:
+            self.log("", status, ANSWER)
 
     def say(self, message: str, status: Fmi2Status, key: str | None = None) -> None:
         """Log a message, the first time only that its key, or else its text, comes up.
@@ -94,27 +102,18 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         # FMI defines a log message as a format: a host would take a % for a directive.
         self.log(message[:LONGEST_MESSAGE].replace("%", "%%"), status)
 
-    def _attempt(self, what: str, refused: str, action: Callable[[], None]) -> None:
-        """Do something that is refused if it raises, and mended if it does not."""
-        try:
-            action()
-        except BaseException as error:
-            self._refuse(what, f"{refused}: {explained(error)}")
-        else:
-            self._store.refused.pop(what, None)
-
     def _follows(self, call: str, mode: str) -> bool:
-        """Whether a call comes in the one mode that it is allowed in; else it is refused."""
+        """Whether a call comes in the one mode that it is allowed in; else it fails."""
         if self._mode != mode:
-            self._refuse(call, f"{call} is not allowed when {self._mode}")
+            self._fail(f"{call} is not allowed when {self._mode}")
         return self._mode == mode
 
     # Values
 
     def get_real(self, vrs: list[int]) -> list[float]:
-        if self._stale:
-            self._refresh()
         store = self._store
+        if self._stale:
+            self._refresh_outputs(vrs)
         # PythonFMU reads the list and lets go of it, so it need not be a copy.
         return store.outputs if vrs == store.output_references else self._get(vrs, "Real")
 
@@ -122,8 +121,6 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         return self._get(vrs, "Integer")
 
     def get_boolean(self, vrs: list[int]) -> list[bool]:
-        if self._stale:
-            self._refresh()
         store = self._store
         return [store.fault] if vrs == store.fault_references else self._get(vrs, "Boolean")
 
@@ -133,12 +130,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         store = self._store
         # A sum is finite only if every value is; _set finds out which one was not.
-        if (
-            vrs == store.input_references
-            and self._mode == STEPPING
-            and not store.refused
-            and isfinite(sum(values))
-        ):
+        if vrs == store.input_references and self._mode == STEPPING and isfinite(sum(values)):
             store.inputs = values
         else:
             self._set(vrs, values, "Real")
@@ -152,46 +144,59 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
     def set_string(self, vrs: list[int], values: list[str]) -> None:
         self._set(vrs, values, "String")
 
+    def _refresh_outputs(self, vrs: list[int]) -> None:
+        if not set(self._store.output_references).isdisjoint(vrs):
+            why = self._refresh()
+            if why:
+                self._answer(Fmi2Status.error, why)
+
     def _get(self, vrs: list[int], kind: str) -> list[Any]:
         values: list[Value] = []
         for reference in vrs:
             try:
                 values.append(self._store.get(reference, kind))
             except Refusal as refusal:
-                self._refuse(REFERENCE, str(refusal))
+                self._answer(Fmi2Status.error, str(refusal))
                 values.append(MISSING[kind])
         return values
 
     def _set(self, vrs: list[int], values: Sequence[Value], kind: str) -> None:
-        for reference, value in zip(vrs, values):
-            name = REFERENCE
-            try:
-                port = self._store.port(reference, kind)
-                name = port.name
-                self._change(port, reference, value)
-            except BaseException as error:
-                self._refuse(name, explained(error))
-            else:
-                self._store.refused.pop(name, None)
-                self._stale = self._mode == INITIALISING
-
-    def _change(self, port: Port, reference: int, value: Value) -> None:
-        if port.causality == "output":
-            raise Refusal(f"{port.name} is an output and cannot be set")
+        """Take all values of a call, or none."""
         if self._mode == TERMINATED:
-            raise Refusal(f"{port.name} cannot be set after fmi2Terminate")
-        if port.variability == "fixed" and self._mode == STEPPING:
-            raise Refusal(f"{port.name} is fixed and cannot be set after the initialisation")
-        store = self._store
-        port.checked(value)
-        if port.causality == "input":
-            store.set_input(reference, float(value))
+            self._fail(f"fmi2Set{kind} is not allowed when {self._mode}")
             return
-        parameters = {**store.parameters, port.name: value}
-        if self._mode == STEPPING:
-            self._retune(parameters)
+        try:
+            ports = [self._store.port(reference, kind) for reference in vrs]
+        except Refusal as refusal:
+            self._fail(str(refusal))
+            return
+        try:
+            self._take(ports, vrs, values)
+        except BaseException as error:
+            self._discard(explained(error))
         else:
-            store.parameters = parameters
+            self._stale = self._stale or self._mode == INITIALISING
+
+    def _take(self, ports: list[Port], vrs: list[int], values: Sequence[Value]) -> None:
+        store = self._store
+        inputs, parameters = list(store.inputs), store.parameters
+        for port, reference, value in zip(ports, vrs, values):
+            if port.causality == "output":
+                raise Refusal(f"{port.name} is an output and cannot be set")
+            if port.variability == "fixed" and self._mode == STEPPING:
+                if value != parameters[port.name]:
+                    raise Refusal(
+                        f"{port.name} is fixed and cannot change after initialisation"
+                    )
+                continue
+            port.checked(value)
+            if port.causality == "input":
+                inputs[store.input_references.index(reference)] = float(value)
+            else:
+                parameters = {**parameters, port.name: value}
+        if parameters is not store.parameters and self._mode == STEPPING:
+            self._retune(parameters)
+        store.inputs, store.parameters = inputs, parameters
 
 
 def explained(error: BaseException) -> str:

@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Generic, TypeVar, get_args, get_origin
 from xml.etree.ElementTree import Element
 
 from pythonfmu import DefaultExperiment
+from pythonfmu.enums import Fmi2Status
 
 from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS, internal_steps, longest_step
 from fmus.ports.description import ABOUT, EXPERIMENT
@@ -24,7 +25,6 @@ from fmus.ports.description_fmi2 import complete
 from fmus.ports.groups import ParameterSet, packing, slices, unpacking
 from fmus.ports.port import H_MAX, Refusal, Value
 from fmus.slave.callbacks import (
-    INITIALISATION,
     INITIALISING,
     INSTANTIATED,
     STEPPING,
@@ -37,13 +37,6 @@ from fmus.slave.state import Snapshot, checked, from_bytes, nearly_equal, to_byt
 
 #: Longest step of a component that has no internal steps [s].
 _NO_LIMIT = 1e300
-
-#: Why no step is taken in the other modes.
-_NOT_STEPPING = {
-    INSTANTIATED: "not initialised",
-    INITIALISING: "not initialised",
-    TERMINATED: "terminated",
-}
 
 State = TypeVar("State")
 Inputs = TypeVar("Inputs")
@@ -146,15 +139,11 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
     def setup_experiment(
         self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
     ) -> None:
-        def take() -> None:
-            if not isfinite(start_time):
-                raise Refusal(f"start time {start_time}: must be finite")
-            if stop_time is not None and not stop_time >= start_time:
-                raise Refusal(f"stop time {stop_time}: must not be before {start_time}")
-            self._start_time = start_time
-
         if self._follows("fmi2SetupExperiment", INSTANTIATED):
-            self._attempt("fmi2SetupExperiment", "experiment refused", take)
+            if isfinite(start_time):
+                self._start_time = start_time
+            else:
+                self._fail(f"start time {start_time}: must be finite")
 
     def enter_initialization_mode(self) -> None:
         if self._follows("fmi2EnterInitializationMode", INSTANTIATED):
@@ -163,17 +152,24 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
 
     def exit_initialization_mode(self) -> None:
         if self._follows("fmi2ExitInitializationMode", INITIALISING):
-            self._refresh()
-            self._mode = STEPPING
+            why = self._refresh()
+            if why:
+                self._fail(why)
+            else:
+                self._mode = STEPPING
 
     def terminate(self) -> None:
-        if self._follows("fmi2Terminate", STEPPING):
-            self._mode = TERMINATED
+        self._mode = TERMINATED
 
-    def _refresh(self) -> None:
+    def _refresh(self) -> str:
         if self._stale:
+            try:
+                self._begin()
+            except BaseException as error:
+                self._state, self._store.outputs = None, [0.0] * len(self._store.outputs)
+                return f"initialisation refused: {explained(error)}"
             self._stale = False
-            self._attempt(INITIALISATION, "initialisation refused", self._begin)
+        return ""
 
     def _begin(self) -> None:
         store = self._store
@@ -202,10 +198,13 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         A step longer than `h_max` is split evenly, a zero step changes nothing, a negative one
         is refused. After a refusal everything is as it was before the step.
         """
+        if self._mode != STEPPING:
+            self._follows("fmi2DoStep", STEPPING)
+            return False
         try:
             store = self._store
-            if store.refused or self._mode != STEPPING:
-                raise Refusal("; ".join(store.refused.values()) or _NOT_STEPPING[self._mode])
+            if self._untold:
+                raise Refusal(self._untold)
             if 0.0 < step_size <= self._longest_step and isfinite(current_time):
                 n = 1
             else:
@@ -222,7 +221,9 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
             self._accept(state, self._pack(outputs))
         except BaseException as error:
             what = explained(error)
-            self._report(f"step refused at t = {current_time:g} s: {what}", key=what)
+            self._store.fault = True
+            said = f"step refused at t = {current_time:g} s: {what}"
+            self._answer(Fmi2Status.discard, said, key=what)
             return False
         return True
 
@@ -271,14 +272,13 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
             state=self._state,
             hidden=hidden,
             fault=store.fault,
-            refused=dict(store.refused),
         )
 
     def _set_fmu_state(self, state: Mapping[str, Any]) -> None:
         try:
             self._restore(state)
         except BaseException as error:
-            self._refuse("fmi2SetFMUstate", f"state refused: {explained(error)}")
+            self._fail(f"state refused: {explained(error)}")
 
     def _restore(self, saved: Mapping[str, Any]) -> None:
         store = self._store
@@ -295,7 +295,8 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
             self._adopt(wanted["parameters"], meaning)
             self._state = wanted["state"]
         store.inputs, store.outputs = wanted["inputs"], wanted["outputs"]
-        store.fault, store.refused = wanted["fault"], wanted["refused"]
+        store.fault = wanted["fault"]
+        self._untold = ""
         self._mode, self._start_time = wanted["mode"], wanted["start_time"]
         # Before the first step all follows from parameters and inputs, and is computed once more.
         self._stale = self._mode == INITIALISING

@@ -67,6 +67,15 @@ def _encodable(text: object) -> str:
     return str(text).encode("utf-8", "replace").decode("utf-8")
 
 
+def has_loader(resources: str | None) -> bool:
+    """Whether the native loader is between the host and the slave of a folder of resources."""
+    return (
+        resources is not None
+        and sys.platform.startswith("linux")
+        and any(Path(resources).parent.glob("binaries/linux64/*_pythonfmu.so"))
+    )
+
+
 def _resources_of(folder: str, script: str) -> bool:
     try:
         return Path(folder, "slavemodule.txt").read_text(encoding="utf-8").strip() == script

@@ -10,14 +10,7 @@ from math import isclose
 from typing import Any, TypedDict
 
 from fmus.ports.port import Refusal, Value
-from fmus.slave.callbacks import (
-    INITIALISATION,
-    INSTANTIATED,
-    LONGEST_MESSAGE,
-    MODES,
-    REFERENCE,
-    REFUSED_CALLS,
-)
+from fmus.slave.callbacks import INSTANTIATED, MODES, STEPPING
 from fmus.slave.shape import frozen, restored
 from fmus.slave.store import Store
 
@@ -34,7 +27,6 @@ class Snapshot(TypedDict):
     state: Any  #: NamedTuple of the component, None before the initialisation
     hidden: Any  #: what the component keeps outside its state
     fault: bool
-    refused: dict[str, str]
 
 
 #: Key of what speaks against bytes or a snapshot: PythonFMU asks for them where nothing can be
@@ -108,8 +100,10 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, kind: type) -
     if not isinstance(saved["fault"], bool):
         raise Refusal("its fault is neither true nor false")
     outputs = _values(store, store.output_references, saved["outputs"])
-    if mode == INSTANTIATED and (state is not None or any(outputs)):
-        raise Refusal("it has a state, or outputs, before the initialisation")
+    if mode == INSTANTIATED and state is not None:
+        raise Refusal("it has a state before the initialisation")
+    if state is None and (mode == STEPPING or any(outputs)):
+        raise Refusal("it has steps, or outputs, without a state")
     parameters = saved["parameters"]
     declared = [port for port in store.ports if port.causality == "parameter"]
     if not isinstance(parameters, dict) or parameters.keys() != store.parameters.keys():
@@ -124,7 +118,6 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, kind: type) -
         state=None if state is None else restored(kind, state),
         hidden=frozen(saved["hidden"]),
         fault=saved["fault"],
-        refused=_refused(saved, store),
     )
 
 
@@ -134,32 +127,6 @@ def _values(store: Store, references: Sequence[int], values: Any) -> list[float]
     for reference, value in zip(references, values):
         store.ports[reference].checked(value)
     return [*values]
-
-
-def _refused(saved: Mapping[str, Any], store: Store) -> dict[str, str]:
-    refused = saved["refused"]
-    if not isinstance(refused, dict) or not all(map(_is_reason, refused.values())):
-        raise Refusal("what it refused is no text")
-    if not refused.keys() <= {
-        REFERENCE,
-        INITIALISATION,
-        *REFUSED_CALLS,
-        *(p.name for p in store.ports),
-    }:
-        raise Refusal("it refused what cannot be refused")
-    if refused and not saved["fault"]:
-        raise Refusal("it refused something without a fault")
-    if saved["state"] is None and saved["mode"] != INSTANTIATED and INITIALISATION not in refused:
-        raise Refusal("it is initialised and has no state")
-    return dict(refused)
-
-
-def _is_reason(text: Any) -> bool:
-    """Whether it is a text that a message has room for, in UTF-8 and without a zero in it."""
-    try:
-        return "\0" not in text and len(text.encode()) <= 4 * LONGEST_MESSAGE
-    except (AttributeError, TypeError, UnicodeEncodeError):
-        return False
 
 
 def nearly_equal(one: Sequence[float], other: Sequence[float]) -> bool:

@@ -9,6 +9,9 @@ from fmus.ports.port import FAULT, Port, Refusal, Value
 #: What a reference gets that belongs to no port of its type.
 MISSING: dict[str, Value] = {"Real": 0.0, "Integer": 0, "Boolean": False, "String": ""}
 
+#: Types that can be read as numbers: hosts read all outputs with fmi2GetReal.
+_NUMBERS = ("Real", "Integer", "Boolean")
+
 
 class Store:
     """Values of all ports.
@@ -22,8 +25,7 @@ class Store:
         input_references, output_references: of the Real inputs and outputs.
         inputs, outputs: their values.
         parameters: by name.
-        fault: whether anything was refused.
-        refused: why, by what was refused and has not been mended since.
+        fault: whether a value or a step was discarded.
 
     """
 
@@ -40,7 +42,6 @@ class Store:
             if port.causality == "parameter" and port.start is not None
         }
         self.fault = False
-        self.refused: dict[str, str] = {}
 
     def _references(self, causality: str) -> list[int]:
         return [
@@ -49,26 +50,30 @@ class Store:
             if port.causality == causality and port.kind == "Real"
         ]
 
-    def port(self, reference: int, kind: str) -> Port:
-        """The port of a type that has a value reference.
+    def port(self, reference: int, *kinds: str) -> Port:
+        """The port of one of some types that has a value reference.
 
         Raises:
             Refusal: there is none.
 
         """
-        if not 0 <= reference < len(self.ports) or self.ports[reference].kind != kind:
+        if not 0 <= reference < len(self.ports) or self.ports[reference].kind not in kinds:
             # PythonFMU hands references from 2^31 over as negative numbers.
-            raise Refusal(f"no {kind} has the value reference {reference % 2**32}")
+            raise Refusal(f"no {kinds[0]} has the value reference {reference % 2**32}")
         return self.ports[reference]
 
     def get(self, reference: int, kind: str) -> Value:
         """The value of a port.
 
         Raises:
-            Refusal: no port of this type has the reference.
+            Refusal: no port with the reference has a value of this type.
 
         """
-        port = self.port(reference, kind)
+        if kind == "Real":
+            return float(self._value(reference, self.port(reference, *_NUMBERS)))
+        return self._value(reference, self.port(reference, kind))
+
+    def _value(self, reference: int, port: Port) -> Value:
         if port is FAULT:
             return self.fault
         if port.causality == "parameter":
@@ -76,9 +81,3 @@ class Store:
         if port.causality == "input":
             return self.inputs[self.input_references.index(reference)]
         return self.outputs[self.output_references.index(reference)]
-
-    def set_input(self, reference: int, value: float) -> None:
-        """Change one input."""
-        # The list may be the one that the host's call brought.
-        self.inputs = list(self.inputs)
-        self.inputs[self.input_references.index(reference)] = value

@@ -130,6 +130,12 @@ class Library:
         self.functions.fmi2GetTypesPlatform.restype = c_char_p
 
     @property
+    def answers(self) -> bool:
+        """Whether refusals are answered at the call: PythonFMU's own library cannot."""
+        loaders = self.folder.glob("binaries/linux64/*_pythonfmu.so")
+        return self.description.kind == NATIVE or any(loaders)
+
+    @property
     def location(self) -> str:
         return (self.folder / "resources").as_uri()
 
@@ -247,7 +253,10 @@ class Host:
         return value
 
     def _read(self, arrays: _Arrays) -> list[Any]:
+        """Values of variables; None for all, if there are no outputs because of no start."""
         status = self.call(f"fmi2Get{arrays.kind}", arrays.references, arrays.n, arrays.values)
+        if status == Status.Error and self.messages_of(NO_START):
+            return [None] * len(arrays.names)
         assert status == Status.OK, f"values cannot be read: {status.name}"
         return list(arrays.values)
 

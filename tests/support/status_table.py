@@ -15,9 +15,6 @@ MODES = ("instantiated", "initialising", "stepping", "terminated")
 ERROR = "error"
 STATES = (*MODES, ERROR)
 
-#: What an arrow leads to that ends the state error, whatever was before it.
-SOUND = "sound"
-
 #: Rows that are about no instance: the function that makes one, and what stands in its place.
 CREATION, WITHOUT_AN_INSTANCE = "fmi2Instantiate", "no instance"
 
@@ -33,11 +30,6 @@ class Answer(NamedTuple):
     fault: str
     changes: str
     afterwards: str
-
-    @property
-    def blocks(self) -> bool:
-        """Whether steps are refused from then on."""
-        return self.fault == "rises" and self.afterwards.startswith("fmi2Discard")
 
     @property
     def raises_fault(self) -> bool:
@@ -61,7 +53,6 @@ class Row(NamedTuple):
     function: str
     case: str
     cells: dict[str, Cell]
-    mended_by: str
 
     @property
     def key(self) -> tuple[str, str]:
@@ -86,11 +77,9 @@ def rows() -> dict[tuple[str, str], Row]:
     """All calls on an instance, by function and case."""
     found: dict[tuple[str, str], Row] = {}
     for section in _sections().values():
-        if section.header[-1] == "mended by":
-            columns = section.header[2:-1]
-            assert columns == [*STATES], section.heading
-            for function, case, *cells, mended_by in section.rows:
-                row = Row(function, case, _cells(dict(zip(columns, cells, strict=True))), mended_by)
+        if section.header[2:] == [*STATES]:
+            for function, case, *cells in section.rows:
+                row = Row(function, case, _cells(dict(zip(STATES, cells, strict=True))))
                 assert row.key not in found, f"{row} stands twice"
                 found[row.key] = row
     return found

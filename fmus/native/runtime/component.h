@@ -7,8 +7,7 @@
  *     if (GOES_ON(this, NULL)) terminate(&this);
  *     return end(&this);
  *
- * What the component refuses is no failure of the call: it raises `fault` and blocks the steps
- * until it is mended. docs/status.md says what is answered to what.
+ * docs/status.md says what is answered to what.
  */
 #ifndef COMPONENT_H
 #define COMPONENT_H
@@ -35,8 +34,6 @@ typedef struct {
 typedef struct {
     string kinds[STRING + 1]; /* types of values */
     string token;             /* what tells an FMU from others */
-    string terminate;         /* the function that ends a run */
-    string refused[6];        /* the functions that may be refused; NULL after them */
 } names;
 
 static const names version;
@@ -70,32 +67,37 @@ static int sound(call *this, string wrong);
 /* Lets the next call of the instance begin; the status of this one. */
 static int end(call *this);
 
-/* Messages: errors are told even where logging is off; no categories: all. */
+/* Messages: what is refused is told even where logging is off; no categories: all. */
 static void choose_messages(call *this, int logging, size_t n, const string categories[]);
 static void tell(instance *it, int status, string text);
 
-/* Modes. What comes in the wrong mode is refused. An experiment that is refused gives 0. */
-static int set_experiment(call *this, double start, int has_stop, double stop);
+/* Modes. What comes in the wrong mode fails. */
+static void set_experiment(call *this, double start);
 static void enter_initialisation(call *this);
 static void exit_initialisation(call *this);
 static void terminate(call *this);
 static void reset(call *this);
 
-/* Values. What belongs to no port of the type is refused, and got as 0 or "". */
-static void get_reals(instance *it, const uint32_t references[], size_t n, double values[]);
-static int32_t get_integer(instance *it, uint32_t reference);
-static int get_boolean(instance *it, uint32_t reference);
-static string get_string(instance *it, uint32_t reference);
-static void set_reals(instance *it, const uint32_t references[], size_t n, const double values[]);
-static void set_integer(instance *it, uint32_t reference, int32_t value);
-static void set_boolean(instance *it, uint32_t reference, int value);
-static void set_string(instance *it, uint32_t reference, string value);
+/* Values. What cannot be got is given as 0 or "". Integers and Booleans can be got as Reals. */
+static void get_reals(call *this, const uint32_t references[], size_t n, double values[]);
+static int32_t get_integer(call *this, uint32_t reference);
+static int get_boolean(call *this, uint32_t reference);
+static string get_string(call *this, uint32_t reference);
 
-/* Refuses a reference for a type that no port has; `kind` is the version's name of it. */
-static void refuse_reference(instance *it, string kind, uint32_t reference);
+/* All values of a call are taken, or none: they are set one by one between the beginning and the
+ * end of a setting. */
+typedef struct setting setting;
+static setting begin_setting(call *this, kind kind, const uint32_t references[], size_t n);
+static void set_value(setting *it, uint32_t reference, double number, string text);
+static void end_setting(setting *it);
 
-/* Steps: FMI_OK or FMI_DISCARD. */
-static int take_step(instance *it, double time, double step);
+static void set_reals(call *this, const uint32_t references[], size_t n, const double values[]);
+
+/* References for a type that no port has; `kind` is the version's name of it. */
+static void get_unknown(call *this, string kind, const uint32_t references[], size_t n);
+static void set_unknown(call *this, string kind, const uint32_t references[], size_t n);
+
+static void take_step(call *this, double time, double step);
 
 /* States: each looks at its arguments first. A handle that is not NULL is used again. */
 static void get_state(call *this, void **state);

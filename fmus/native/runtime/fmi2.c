@@ -35,12 +35,18 @@ typedef struct {
 static const names version = {
     .kinds = {"Real", "Integer", "Boolean", "String"},
     .token = "GUID",
-    .terminate = "fmi2Terminate",
-    .refused = {"fmi2SetupExperiment", "fmi2EnterInitializationMode",
-                "fmi2ExitInitializationMode", "fmi2Terminate", "fmi2SetFMUstate"},
 };
 
+/* Value references are places among the variables. */
+enum { FIRST_REFERENCE = 0 };
+
 #include "component.c"
+#include "model_exchange.h"
+
+/* Functions of FMI take more than a component has to know. */
+#if defined(__GNUC__)
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
 
 /* FMI 2.0 defines a message as a format: a host would take a % for a directive. */
 static void deliver(const logger *host, string instance_name, int status, string category,
@@ -76,8 +82,6 @@ EXPORT void *FMI2(fmi2Instantiate)(string name, int type, string guid, string lo
     if (functions != NULL) {
         host = (logger){(void (*)(void))functions->logger, functions->environment};
     }
-    (void)location;
-    (void)visible;
     return instantiate("fmi2Instantiate",
                        type == CO_SIMULATION ? NULL : "this FMU is for co-simulation only", name,
                        guid, host, logging);
@@ -94,12 +98,12 @@ ANSWER(fmi2SetDebugLogging, ALWAYS, NULL,
 
 ANSWER(fmi2SetupExperiment, NOT_AFTER_ERROR, NULL,
        (void *c, int has_tolerance, double tolerance, double start, int has_stop, double stop),
-       (void)has_tolerance; (void)tolerance; set_experiment(&this, start, has_stop, stop))
+       set_experiment(&this, start))
 ANSWER(fmi2EnterInitializationMode, NOT_AFTER_ERROR, NULL, (void *c), enter_initialisation(&this))
 ANSWER(fmi2ExitInitializationMode, NOT_AFTER_ERROR, NULL, (void *c), exit_initialisation(&this))
 ANSWER(fmi2Terminate, NOT_AFTER_ERROR, NULL, (void *c), terminate(&this))
 ANSWER(fmi2DoStep, NOT_AFTER_ERROR, NULL, (void *c, double time, double step, int no_set),
-       (void)no_set; this.status = take_step(this.instance, time, step))
+       take_step(&this, time, step))
 
 /* Values */
 
@@ -112,15 +116,21 @@ ANSWER(fmi2DoStep, NOT_AFTER_ERROR, NULL, (void *c, double time, double step, in
 #define SET(name, type, wrong, action)                                                           \
     ANSWER(name, NOT_AFTER_ERROR, wrong,                                                         \
            (void *c, const uint32_t r[], size_t n, const type v[]), action)
+#define SET_EACH(name, type, kind, wrong, number, text)                                          \
+    SET(name, type, wrong, {                                                                     \
+        setting it = begin_setting(&this, kind, r, n);                                           \
+        FOR_EACH(set_value(&it, r[i], number, text));                                            \
+        end_setting(&it);                                                                        \
+    })
 
-GET(fmi2GetReal, double, get_reals(this.instance, r, n, v))
-GET(fmi2GetInteger, int, FOR_EACH(v[i] = get_integer(this.instance, r[i])))
-GET(fmi2GetBoolean, int, FOR_EACH(v[i] = get_boolean(this.instance, r[i])))
-GET(fmi2GetString, string, FOR_EACH(v[i] = get_string(this.instance, r[i])))
-SET(fmi2SetReal, double, wrong_values(n, r, v), set_reals(this.instance, r, n, v))
-SET(fmi2SetInteger, int, wrong_values(n, r, v), FOR_EACH(set_integer(this.instance, r[i], v[i])))
-SET(fmi2SetBoolean, int, wrong_values(n, r, v), FOR_EACH(set_boolean(this.instance, r[i], v[i])))
-SET(fmi2SetString, string, wrong_strings(n, r, v), FOR_EACH(set_string(this.instance, r[i], v[i])))
+GET(fmi2GetReal, double, get_reals(&this, r, n, v))
+GET(fmi2GetInteger, int, FOR_EACH(v[i] = get_integer(&this, r[i])))
+GET(fmi2GetBoolean, int, FOR_EACH(v[i] = get_boolean(&this, r[i])))
+GET(fmi2GetString, string, FOR_EACH(v[i] = get_string(&this, r[i])))
+SET(fmi2SetReal, double, wrong_values(n, r, v), set_reals(&this, r, n, v))
+SET_EACH(fmi2SetInteger, int, INTEGER, wrong_values(n, r, v), v[i], NULL)
+SET_EACH(fmi2SetBoolean, int, BOOLEAN, wrong_values(n, r, v), v[i] != 0, NULL)
+SET_EACH(fmi2SetString, string, STRING, wrong_strings(n, r, v), 0.0, v[i])
 
 /* States */
 
@@ -144,29 +154,30 @@ static int not_supported(call *this, int status) {
     return status;
 }
 
-#define NOT_SUPPORTED(name, when, wrong, answer, parameters, unused)                             \
-    ANSWER(name, when, wrong, parameters, unused; this.status = not_supported(&this, answer))
+#define NOT_SUPPORTED(name, when, wrong, answer, parameters)                                     \
+    ANSWER(name, when, wrong, parameters, this.status = not_supported(&this, answer))
 
 NOT_SUPPORTED(fmi2GetDirectionalDerivative, ALWAYS, NULL, FMI_ERROR,
               (void *c, const uint32_t u[], size_t nu, const uint32_t k[], size_t nk,
-               const double dk[], double du[]),
-              (void)u; (void)nu; (void)k; (void)nk; (void)dk; (void)du)
+               const double dk[], double du[]))
 NOT_SUPPORTED(fmi2SetRealInputDerivatives, NOT_AFTER_ERROR, NULL, FMI_ERROR,
-              (void *c, const uint32_t r[], size_t n, const int order[], const double v[]),
-              (void)r; (void)n; (void)order; (void)v)
+              (void *c, const uint32_t r[], size_t n, const int order[], const double v[]))
 NOT_SUPPORTED(fmi2GetRealOutputDerivatives, ALWAYS, NULL, FMI_ERROR,
-              (void *c, const uint32_t r[], size_t n, const int order[], double v[]),
-              (void)r; (void)n; (void)order; (void)v)
-NOT_SUPPORTED(fmi2CancelStep, NOT_AFTER_ERROR, NULL, FMI_ERROR, (void *c), )
+              (void *c, const uint32_t r[], size_t n, const int order[], double v[]))
+NOT_SUPPORTED(fmi2CancelStep, NOT_AFTER_ERROR, NULL, FMI_ERROR, (void *c))
 
 static string wrong_place_of(const void *value) { return value == NULL ? "NULL" : NULL; }
 
-NOT_SUPPORTED(fmi2GetStatus, ALWAYS, wrong_place_of(v), FMI_ERROR, (void *c, int kind, int *v),
-              (void)kind)
+NOT_SUPPORTED(fmi2GetStatus, ALWAYS, wrong_place_of(v), FMI_ERROR, (void *c, int kind, int *v))
 NOT_SUPPORTED(fmi2GetIntegerStatus, ALWAYS, wrong_place_of(v), FMI_DISCARD,
-              (void *c, int kind, int *v), (void)kind)
+              (void *c, int kind, int *v))
 NOT_SUPPORTED(fmi2GetStringStatus, ALWAYS, wrong_place_of(v), FMI_DISCARD,
-              (void *c, int kind, string *v), (void)kind)
+              (void *c, int kind, string *v))
+
+#define OF_MODEL_EXCHANGE(name, parameters)                                                      \
+    NOT_SUPPORTED(name, NOT_AFTER_ERROR, NULL, FMI_ERROR, parameters)
+
+MODEL_EXCHANGE_FUNCTIONS(OF_MODEL_EXCHANGE)
 
 ANSWER(fmi2GetRealStatus, ALWAYS, wrong_place_of(v), (void *c, int kind, double *v), {
     if (kind == LAST_SUCCESSFUL_TIME) {

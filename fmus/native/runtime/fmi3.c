@@ -11,10 +11,10 @@
 static const names version = {
     .kinds = {"Float64", "Int32", "Boolean", "String"},
     .token = "instantiation token",
-    .terminate = "fmi3Terminate",
-    .refused = {"fmi3EnterInitializationMode", "fmi3ExitInitializationMode", "fmi3Terminate",
-                "fmi3SetFMUState"},
 };
+
+/* Value references are places among the variables, from 1: some hosts take them for indices. */
+enum { FIRST_REFERENCE = 1 };
 
 #include "component.c"
 
@@ -35,7 +35,7 @@ static const names version = {
 typedef uint8_t boolean;
 
 /* The variable for the time comes after all others. */
-enum { TIME = N_PORTS };
+enum { TIME = FIRST_REFERENCE + N_PORTS };
 
 /* Messages */
 
@@ -111,8 +111,9 @@ EXPORT void FMI3(fmi3FreeInstance)(void *handle) { free_instance(handle, "fmi3Fr
 EXPORT int FMI3(fmi3EnterInitializationMode)(void *handle, boolean has_tolerance, double tolerance,
                                              double start, boolean has_stop, double stop) {
     call this = begin(handle, "fmi3EnterInitializationMode", NOT_AFTER_ERROR);
-    if (GOES_ON(this, NULL) && set_experiment(&this, start, has_stop != 0, stop)) {
-        enter_initialisation(&this);
+    if (GOES_ON(this, NULL)) {
+        set_experiment(&this, start);
+        if (this.status == FMI_OK) enter_initialisation(&this);
     }
     return end(&this);
 }
@@ -137,7 +138,7 @@ EXPORT int FMI3(fmi3DoStep)(void *handle, double time, double step, boolean no_s
     int complete = event_handling_needed && terminate_simulation && early_return &&
                    last_successful_time;
     if (GOES_ON(this, complete ? NULL : "NULL")) {
-        this.status = take_step(this.instance, time, step);
+        take_step(&this, time, step);
         *event_handling_needed = *terminate_simulation = *early_return = 0;
         *last_successful_time = this.instance->run.time;
     }
@@ -154,17 +155,19 @@ static string wrong_numbers(size_t n, const uint32_t r[], const void *values, si
     EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, type v[], size_t n_v) {   \
         call this = begin(handle, #name, ALWAYS);                                                \
         if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {                                        \
-            for (size_t i = 0; i < n; i++) v[i] = get(this.instance, r[i]);                      \
+            for (size_t i = 0; i < n; i++) v[i] = get(&this, r[i]);                              \
         }                                                                                        \
         return end(&this);                                                                       \
     }
 
-#define SET(name, type, wrong, set)                                                              \
+#define SET(name, type, kind, wrong, number, text)                                               \
     EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, const type v[],           \
                           size_t n_v) {                                                          \
         call this = begin(handle, #name, NOT_AFTER_ERROR);                                       \
         if (GOES_ON(this, wrong_numbers(n, r, v, n_v)) && GOES_ON(this, wrong)) {                \
-            for (size_t i = 0; i < n; i++) set(this.instance, r[i], v[i]);                       \
+            setting it = begin_setting(&this, kind, r, n);                                       \
+            for (size_t i = 0; i < n; i++) set_value(&it, r[i], number, text);                   \
+            end_setting(&it);                                                                    \
         }                                                                                        \
         return end(&this);                                                                       \
     }
@@ -172,9 +175,9 @@ static string wrong_numbers(size_t n, const uint32_t r[], const void *values, si
 GET(fmi3GetInt32, int32_t, get_integer)
 GET(fmi3GetBoolean, boolean, get_boolean)
 GET(fmi3GetString, string, get_string)
-SET(fmi3SetInt32, int32_t, NULL, set_integer)
-SET(fmi3SetBoolean, boolean, NULL, set_boolean)
-SET(fmi3SetString, string, wrong_strings(n, r, v), set_string)
+SET(fmi3SetInt32, int32_t, INTEGER, NULL, v[i], NULL)
+SET(fmi3SetBoolean, boolean, BOOLEAN, NULL, v[i] != 0, NULL)
+SET(fmi3SetString, string, STRING, wrong_strings(n, r, v), 0.0, v[i])
 
 EXPORT int FMI3(fmi3GetFloat64)(void *handle, const uint32_t r[], size_t n, double v[],
                                 size_t n_v) {
@@ -182,7 +185,7 @@ EXPORT int FMI3(fmi3GetFloat64)(void *handle, const uint32_t r[], size_t n, doub
     if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {
         for (size_t i = 0, from = 0; i <= n; i++) {
             if (i < n && r[i] != TIME) continue;
-            if (i > from) get_reals(this.instance, &r[from], i - from, &v[from]);
+            if (i > from) get_reals(&this, &r[from], i - from, &v[from]);
             if (i < n) v[i] = this.instance->run.time;
             from = i + 1;
         }
@@ -193,35 +196,36 @@ EXPORT int FMI3(fmi3GetFloat64)(void *handle, const uint32_t r[], size_t n, doub
 EXPORT int FMI3(fmi3SetFloat64)(void *handle, const uint32_t r[], size_t n, const double v[],
                                 size_t n_v) {
     call this = begin(handle, "fmi3SetFloat64", NOT_AFTER_ERROR);
-    if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) set_reals(this.instance, r, n, v);
+    if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) set_reals(&this, r, n, v);
     return end(&this);
 }
 
 /* Types that no variable has: every reference is a wrong one, for which 0 is given. */
 
-static int refuse_all(void *handle, string function, when when, string kind, const uint32_t r[],
-                      size_t n, string wrong) {
-    call this = begin(handle, function, when);
-    if (GOES_ON(this, wrong)) {
-        for (size_t i = 0; i < n; i++) refuse_reference(this.instance, kind, r[i]);
-    }
+static int get_none(void *handle, string function, string kind, const uint32_t r[], size_t n,
+                    string wrong) {
+    call this = begin(handle, function, ALWAYS);
+    if (GOES_ON(this, wrong)) get_unknown(&this, kind, r, n);
     return end(&this);
 }
 
-#define REFUSE_TO_GET(kind, wrong) refuse_all(handle, "fmi3Get" kind, ALWAYS, kind, r, n, wrong)
-#define REFUSE_TO_SET(kind, wrong)                                                               \
-    refuse_all(handle, "fmi3Set" kind, NOT_AFTER_ERROR, kind, r, n, wrong)
+static int set_none(void *handle, string function, string kind, const uint32_t r[], size_t n,
+                    string wrong) {
+    call this = begin(handle, function, NOT_AFTER_ERROR);
+    if (GOES_ON(this, wrong)) set_unknown(&this, kind, r, n);
+    return end(&this);
+}
 
 #define NO_VARIABLE(kind, type)                                                                  \
     EXPORT int FMI3(fmi3Get##kind)(void *handle, const uint32_t r[], size_t n, type v[],         \
                                    size_t n_v) {                                                 \
-        int status = REFUSE_TO_GET(#kind, wrong_numbers(n, r, v, n_v));                          \
-        for (size_t i = 0; i < n && status == FMI_OK; i++) v[i] = 0;                             \
-        return status;                                                                           \
+        string wrong = wrong_numbers(n, r, v, n_v);                                              \
+        for (size_t i = 0; i < n && wrong == NULL; i++) v[i] = 0;                                \
+        return get_none(handle, "fmi3Get" #kind, #kind, r, n, wrong);                   \
     }                                                                                            \
     EXPORT int FMI3(fmi3Set##kind)(void *handle, const uint32_t r[], size_t n, const type v[],   \
                                    size_t n_v) {                                                 \
-        return REFUSE_TO_SET(#kind, wrong_numbers(n, r, v, n_v));                                \
+        return set_none(handle, "fmi3Set" #kind, #kind, r, n, wrong_numbers(n, r, v, n_v));   \
     }
 
 NO_VARIABLE(Float32, float)
@@ -241,27 +245,28 @@ static string wrong_binaries(size_t n, const uint32_t r[], const size_t sizes[],
 
 EXPORT int FMI3(fmi3GetBinary)(void *handle, const uint32_t r[], size_t n, size_t sizes[],
                                const uint8_t *v[], size_t n_v) {
-    int status = REFUSE_TO_GET("Binary", wrong_binaries(n, r, sizes, v, n_v));
-    for (size_t i = 0; i < n && status == FMI_OK; i++) {
+    string wrong = wrong_binaries(n, r, sizes, v, n_v);
+    for (size_t i = 0; i < n && wrong == NULL; i++) {
         v[i] = NULL;
         sizes[i] = 0;
     }
-    return status;
+    return get_none(handle, "fmi3GetBinary", "Binary", r, n, wrong);
 }
 
 EXPORT int FMI3(fmi3SetBinary)(void *handle, const uint32_t r[], size_t n, const size_t sizes[],
                                const uint8_t *const v[], size_t n_v) {
-    return REFUSE_TO_SET("Binary", wrong_binaries(n, r, sizes, v, n_v));
+    return set_none(handle, "fmi3SetBinary", "Binary", r, n,
+                       wrong_binaries(n, r, sizes, v, n_v));
 }
 
 EXPORT int FMI3(fmi3GetClock)(void *handle, const uint32_t r[], size_t n, boolean v[]) {
-    int status = REFUSE_TO_GET("Clock", wrong_values(n, r, v));
-    for (size_t i = 0; i < n && status == FMI_OK; i++) v[i] = 0;
-    return status;
+    string wrong = wrong_values(n, r, v);
+    for (size_t i = 0; i < n && wrong == NULL; i++) v[i] = 0;
+    return get_none(handle, "fmi3GetClock", "Clock", r, n, wrong);
 }
 
 EXPORT int FMI3(fmi3SetClock)(void *handle, const uint32_t r[], size_t n, const boolean v[]) {
-    return REFUSE_TO_SET("Clock", wrong_values(n, r, v));
+    return set_none(handle, "fmi3SetClock", "Clock", r, n, wrong_values(n, r, v));
 }
 
 /* States */

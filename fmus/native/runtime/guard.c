@@ -66,9 +66,18 @@ static size_t without_braces(string *token) {
     return length;
 }
 
+static int lower(char letter) {
+    return letter >= 'A' && letter <= 'Z' ? letter - 'A' + 'a' : letter;
+}
+
+/* Whether two tokens are the same but for the case of their letters. */
 static int same_token(string one, string other) {
     size_t length = without_braces(&one);
-    return without_braces(&other) == length && memcmp(one, other, length) == 0;
+    if (without_braces(&other) != length) return 0;
+    for (size_t i = 0; i < length; i++) {
+        if (lower(one[i]) != lower(other[i])) return 0;
+    }
+    return 1;
 }
 
 static int can_be_made(string wrong, string name, string token, message *why) {
@@ -92,7 +101,6 @@ static void release_instance(instance *it) {
     message text;
     int status;
     while (take_untold(it, &status, &text)) continue;
-    release_run(&it->run);
     release_listener(&it->host);
     free(it);
 }

@@ -89,14 +89,6 @@ typedef struct {
 
 typedef enum { INSTANTIATED, INITIALISING, STEPPING, TERMINATED } mode;
 
-/* Why steps are refused: a port, a call, or another thing was, and has not been mended since. */
-typedef struct refusal refusal;
-struct refusal {
-    refusal *next;
-    string why;
-    char what[1]; /* and `why` behind it */
-};
-
 /* State and outputs at a communication point. */
 typedef struct {
     state_values state;
@@ -114,7 +106,6 @@ typedef struct {
     int now;
     generator noise;
     int fault;
-    refusal *refused; /* in order of the first refusal */
 } run;
 
 /* A message that the host has not been told yet. */
@@ -139,8 +130,5 @@ struct instance {
     double last_successful_time;
     int wants_to_terminate;
 };
-
-/* What is refused, where it is neither a port nor a call. */
-static const char REFERENCE[] = "value reference", INITIALISATION[] = "initialisation";
 
 #endif

@@ -62,3 +62,21 @@ static void say(instance *it, message *said, int status, string key) {
     if (it->n_said == MOST_MESSAGES) append_text(said, "; what comes after this is not logged");
     tell(it, status, said->text);
 }
+
+/* Refusals */
+
+static void discard(call *this, message *why, string key) {
+    this->status = FMI_DISCARD;
+    this->instance->run.fault = 1;
+    say(this->instance, why, FMI_DISCARD, key);
+}
+
+static void refuse_to_get(call *this, message *why) {
+    this->status = FMI_ERROR;
+    say(this->instance, why, FMI_ERROR, NULL);
+}
+
+static void fail(call *this, message *why) {
+    this->instance->in_error = 1;
+    refuse_to_get(this, why);
+}

@@ -4,6 +4,7 @@
  * found finite.
  */
 #include <math.h>
+#include <string.h>
 
 /* A step may exceed `h_max` by this share without being split: hosts round their time. */
 static const double ROUNDING = 1e-9;
@@ -31,7 +32,6 @@ static run new_run(void) {
 
 /* Makes everything what it is after instantiation. */
 static void renew(instance *it) {
-    release_run(&it->run);
     it->run = new_run();
     it->stale = 0;
     it->in_error = 0;
@@ -64,7 +64,7 @@ static int accept(instance *it, const Error *error, message *why) {
     }
     for (int i = 0; i < MODEL_OUTPUTS; i++) {
         if (!isfinite(next->outputs.values[i])) {
-            return in_range(&ports[output_references[i]], next->outputs.values[i], why);
+            return in_range(port_at(output_references[i]), next->outputs.values[i], why);
         }
     }
     if (MODEL_DRAWS > 0) {
@@ -93,50 +93,39 @@ static int start(instance *it, message *why) {
     return accept(it, &error, why);
 }
 
-/* Refuses something, or mends it. */
-static void settle(instance *it, string what, string refused, int settled, const message *why) {
+static int refresh(instance *it, message *why) {
+    run *run = &it->run;
     message said;
-    if (settled) {
-        mend(&it->run, what);
-    } else {
-        compose(&said, "%s refused: %s", refused, why->text);
-        refuse(it, what, &said);
+    if (!it->stale) return 1;
+    if (start(it, &said)) {
+        it->stale = 0;
+        return 1;
     }
+    run->begun = 0;
+    memset(&run->moments[run->now].outputs, 0, sizeof run->moments[run->now].outputs);
+    return compose(why, "initialisation refused: %s", said.text);
 }
 
-static void refresh(instance *it) {
-    message why;
-    if (!it->stale) return;
-    it->stale = 0;
-    settle(it, INITIALISATION, "initialisation", start(it, &why), &why);
-}
-
-/* Whether a call comes in the one mode that it is allowed in; else it is refused. */
 static int follows(call *this, mode mode) {
     static const string names[] = {"instantiated", "initialising", "stepping", "terminated"};
     instance *it = this->instance;
     message why;
     if (it->run.mode == mode) return 1;
     compose(&why, "%s is not allowed when %s", this->function, names[it->run.mode]);
-    refuse(it, this->function, &why);
+    fail(this, &why);
     return 0;
 }
 
-static int set_experiment(call *this, double start, int has_stop, double stop) {
-    instance *it = this->instance;
+static void set_experiment(call *this, double start) {
+    run *run = &this->instance->run;
     message why;
-    int good = 0;
-    if (!follows(this, INSTANTIATED)) return 0;
-    if (!isfinite(start)) {
-        compose(&why, "start time %r: must be finite", start);
-    } else if (has_stop && !(stop >= start)) {
-        compose(&why, "stop time %r: must not be before %r", stop, start);
+    if (!follows(this, INSTANTIATED)) return;
+    if (isfinite(start)) {
+        run->start_time = run->time = start;
     } else {
-        it->run.start_time = it->run.time = start;
-        good = 1;
+        compose(&why, "start time %r: must be finite", start);
+        fail(this, &why);
     }
-    settle(it, this->function, "experiment", good, &why);
-    return good;
 }
 
 static void enter_initialisation(call *this) {
@@ -146,32 +135,20 @@ static void enter_initialisation(call *this) {
 }
 
 static void exit_initialisation(call *this) {
+    message why;
     if (!follows(this, INITIALISING)) return;
-    refresh(this->instance);
-    this->instance->run.mode = STEPPING;
+    if (refresh(this->instance, &why)) {
+        this->instance->run.mode = STEPPING;
+    } else {
+        fail(this, &why);
+    }
 }
 
-static void terminate(call *this) {
-    if (follows(this, STEPPING)) this->instance->run.mode = TERMINATED;
-}
+static void terminate(call *this) { this->instance->run.mode = TERMINATED; }
 
 static void reset(call *this) { renew(this->instance); }
 
 /* Steps */
-
-/* What keeps steps from being taken; 0: something does. */
-static int may_step(const run *it, message *why) {
-    if (it->refused == NULL && it->mode == STEPPING) return 1;
-    clear(why);
-    for (const refusal *one = it->refused; one != NULL; one = one->next) {
-        append_text(why, one->why);
-        append_text(why, one->next != NULL ? "; " : "");
-    }
-    if (it->refused == NULL) {
-        append_text(why, it->mode == TERMINATED ? "terminated" : "not initialised");
-    }
-    return 0;
-}
 
 /* The number of internal steps that a step is split into; -1: it is refused. */
 static int internal_steps(double time, double step, double longest, message *why) {
@@ -199,7 +176,6 @@ static int advance(instance *it, double time, double step, message *why) {
     message said;
     Error error;
     int n = 1;
-    if (!may_step(run, why)) return 0;
     if (!(step > 0.0 && step <= it->longest_step && isfinite(time))) {
         n = internal_steps(time, step, it->longest_step, why);
         if (n <= 0) return n == 0;
@@ -219,13 +195,15 @@ static int advance(instance *it, double time, double step, message *why) {
     return 1;
 }
 
-static int take_step(instance *it, double time, double step) {
+static void take_step(call *this, double time, double step) {
+    instance *it = this->instance;
     message why, said;
-    int taken = advance(it, time, step, &why);
+    int follows_start = follows(this, STEPPING);
+    int taken = follows_start && advance(it, time, step, &why);
     it->last_successful_time = taken ? time + step : time;
-    if (taken) return FMI_OK;
+    if (taken) return;
     it->wants_to_terminate = 1;
+    if (!follows_start) return;
     compose(&said, "step refused at t = %g s: %s", time, why.text);
-    report(it, &said, why.text);
-    return FMI_DISCARD;
+    discard(this, &said, why.text);
 }

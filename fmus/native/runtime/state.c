@@ -7,7 +7,7 @@
  *     parameters and inputs in the order of their ports, outputs,
  *     whether there is a state, and if so: the numbers of the state, and of the noise the words of
  *     the generator, the place of the next, whether there is a next number, and it;
- *     fault, the number of refusals, of each what and why;
+ *     fault;
  *     the CRC-32 of all that.
  *
  * A text is its length and its bytes.
@@ -16,7 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char MAGIC[] = "FMU state 1";
+static const char MAGIC[] = "FMU state 2";
 
 /* Tells states of one model and version from all others. */
 static const char IDENTITY[] = MODEL_NAME " " MODEL_GUID;
@@ -79,7 +79,6 @@ static void put_noise(writer *to, const generator *noise) {
 
 static void put_run(writer *to, const run *it) {
     const moment *now = &it->moments[it->now];
-    uint32_t n_refused = 0;
     put_text(to, MAGIC);
     put_text(to, IDENTITY);
     put_word(to, it->mode);
@@ -102,12 +101,6 @@ static void put_run(writer *to, const run *it) {
         if (MODEL_DRAWS > 0) put_noise(to, &it->noise);
     }
     put_word(to, (uint32_t)it->fault);
-    for (const refusal *one = it->refused; one != NULL; one = one->next) n_refused++;
-    put_word(to, n_refused);
-    for (const refusal *one = it->refused; one != NULL; one = one->next) {
-        put_text(to, one->what);
-        put_text(to, one->why);
-    }
 }
 
 static uint32_t crc32(const unsigned char *bytes, size_t n) {
@@ -202,7 +195,7 @@ static int take_truth(reader *from) {
 static int good_values(const double values[], size_t n, const uint32_t references[],
                        message *why) {
     for (size_t i = 0; i < n; i++) {
-        if (!in_range(&ports[references[i]], values[i], why)) return 0;
+        if (!in_range(port_at(references[i]), values[i], why)) return 0;
     }
     return 1;
 }
@@ -229,25 +222,6 @@ static int take_noise(reader *from, generator *noise, message *why) {
         return compose(why, "its noise generator is in no state that it can be in");
     }
     return isfinite(noise->next) || compose(why, "its noise is not finite");
-}
-
-static int take_refusals(reader *from, run *it, message *why) {
-    char what[MOST_TEXT + 1], text[MOST_TEXT + 1];
-    for (uint32_t n = take_word(from); n > 0; n--) {
-        if (!take_text(from, what) || !take_text(from, text) ||
-            *find_refusal(it, what) != NULL) {
-            return compose(why, "what it refused is no text");
-        }
-        if (!can_be_refused(what)) return compose(why, "it refused what cannot be refused");
-        if (!note_refusal(it, what, text)) return compose(why, "no memory");
-    }
-    if (it->refused != NULL && !it->fault) {
-        return compose(why, "it refused something without a fault");
-    }
-    if (!it->begun && it->mode != INSTANTIATED && *find_refusal(it, INITIALISATION) == NULL) {
-        return compose(why, "it is initialised and has no state");
-    }
-    return 1;
 }
 
 static int are_zero(const double values[], size_t n) {
@@ -284,9 +258,12 @@ static int take_run(reader *from, run *it, message *why) {
         return 0;
     }
     it->begun = take_truth(from);
-    if (it->mode == INSTANTIATED &&
-        (it->begun || !are_zero(now->outputs.values, MODEL_OUTPUTS))) {
-        return compose(why, "it has a state, or outputs, before the initialisation");
+    if (it->mode == INSTANTIATED && it->begun) {
+        return compose(why, "it has a state before the initialisation");
+    }
+    if (!it->begun &&
+        (it->mode == STEPPING || !are_zero(now->outputs.values, MODEL_OUTPUTS))) {
+        return compose(why, "it has steps, or outputs, without a state");
     }
     if (it->begun) {
         take_reals(from, now->state.values, MODEL_STATE);
@@ -297,7 +274,6 @@ static int take_run(reader *from, run *it, message *why) {
     }
     it->fault = take_truth(from);
     if (it->fault < 0) return compose(why, "its fault is neither true nor false");
-    if (!take_refusals(from, it, why)) return 0;
     return (!from->short_of && from->left == 0 && it->begun >= 0) ||
            compose(why, "it has other parts");
 }
@@ -328,14 +304,12 @@ static int can_be_reached(run *it, message *why) {
     return 1;
 }
 
-/* The size of a state in which everything is refused that can be, with the longest reasons. */
 static size_t largest_size(void) {
-    static const size_t LONGEST = 2 * (4 + MOST_TEXT);
     run it = new_run();
-    writer to = {NULL, CHECKSUM_SIZE + (N_PORTS + 2) * LONGEST};
+    writer to = {NULL, CHECKSUM_SIZE};
     it.begun = 1;
     put_run(&to, &it);
-    return to.size + sizeof version.refused / sizeof *version.refused * LONGEST;
+    return to.size;
 }
 
 static int can_be_restored(const saved *state, run *it, message *why) {
@@ -351,12 +325,8 @@ static int can_be_restored(const saved *state, run *it, message *why) {
 
 static int restore(instance *it, const saved *state, message *why) {
     run wanted = new_run();
-    if (!can_be_restored(state, &wanted, why) ||
-        (wanted.begun && !adopt(it, &wanted.parameters, why))) {
-        release_run(&wanted);
-        return 0;
-    }
-    release_run(&it->run);
+    if (!can_be_restored(state, &wanted, why)) return 0;
+    if (wanted.begun && !adopt(it, &wanted.parameters, why)) return 0;
     it->run = wanted;
     /* Before the first step all follows from parameters and inputs, and is computed once more. */
     it->stale = it->run.mode == INITIALISING;
@@ -410,9 +380,10 @@ static saved *new_saved(size_t size) {
 }
 
 static void get_state(call *this, void **state) {
+    message unused;
     writer to = {NULL, 0};
     entry *before;
-    refresh(this->instance);
+    refresh(this->instance, &unused);
     if (!has_place(this, state, &before)) return;
     put_run(&to, &this->instance->run);
     saved *made = new_saved(to.size + CHECKSUM_SIZE);
@@ -429,10 +400,12 @@ static void set_state(call *this, void *state) {
     if (held == NULL) return;
     int restored = restore(this->instance, held->thing, &why);
     let_go(held);
-    this->instance->in_error = 0;
-    if (restored) return;
-    compose(&said, "state refused: %s", why.text);
-    refuse(this->instance, this->function, &said);
+    if (restored) {
+        this->instance->in_error = 0;
+    } else {
+        compose(&said, "state refused: %s", why.text);
+        fail(this, &said);
+    }
 }
 
 static void free_state(call *this, void **state) {

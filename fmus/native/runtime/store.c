@@ -1,89 +1,35 @@
-/* Values of ports, what may be done with them, and what is refused.
+/* Values of ports, and what may be done with them.
  *
- * A port's value reference is its place in the table. All Real inputs and all Real outputs lie
+ * A port's value reference tells its place in the table. All Real inputs and all Real outputs lie
  * side by side, in their order, so that a host that passes them all in one call costs one
  * comparison.
  */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Lets parameters act from the next step, if they fit together. */
 static int adopt(instance *it, const parameter_values *values, message *why);
 
+/* Whether a call comes in the one mode that it is allowed in; else it fails. */
+static int follows(call *this, mode mode);
+
 /* Computes state and outputs at the start time, if a value they depend on has changed. */
-static void refresh(instance *it);
-
-/* Refusals */
-
-static refusal **find_refusal(run *it, string what) {
-    refusal **place = &it->refused;
-    while (*place != NULL && strcmp((*place)->what, what) != 0) place = &(*place)->next;
-    return place;
-}
-
-/* Notes a refusal, in the place of one of the same thing. 0: no memory. */
-static int note_refusal(run *it, string what, string why) {
-    refusal **place = find_refusal(it, what), *before = *place;
-    refusal *noted = malloc(sizeof *noted + strlen(what) + strlen(why) + 1);
-    if (noted == NULL) return 0;
-    noted->next = before == NULL ? NULL : before->next;
-    noted->why = strcpy(strcpy(noted->what, what) + strlen(what) + 1, why);
-    *place = noted;
-    free(before);
-    return 1;
-}
-
-static void mend(run *it, string what) {
-    if (it->refused == NULL) return;
-    refusal **place = find_refusal(it, what), *mended = *place;
-    if (mended == NULL) return;
-    *place = mended->next;
-    free(mended);
-}
-
-static void release_run(run *it) {
-    for (refusal *next; it->refused != NULL; it->refused = next) {
-        next = it->refused->next;
-        free(it->refused);
-    }
-}
-
-/* Whether a refusal can be of something. */
-static int can_be_refused(string what) {
-    if (strcmp(what, REFERENCE) == 0 || strcmp(what, INITIALISATION) == 0) return 1;
-    for (int i = 0; version.refused[i] != NULL; i++) {
-        if (strcmp(what, version.refused[i]) == 0) return 1;
-    }
-    for (int i = 0; i < N_PORTS; i++) {
-        if (strcmp(what, ports[i].name) == 0) return 1;
-    }
-    return 0;
-}
-
-/* Raises `fault` and logs. */
-static void report(instance *it, message *said, string key) {
-    it->run.fault = 1;
-    say(it, said, FMI_DISCARD, key);
-}
-
-/* Takes no step until what was refused is mended. */
-static void refuse(instance *it, string what, message *why) {
-    if (!note_refusal(&it->run, what, why->text)) it->no_memory = 1;
-    report(it, why, NULL);
-}
+static int refresh(instance *it, message *why);
 
 /* Ports */
 
-static void refuse_reference(instance *it, string kind, uint32_t reference) {
-    message why;
-    compose(&why, "no %s has the value reference %u", kind, reference);
-    refuse(it, REFERENCE, &why);
+static const char NO_PORT[] = "no %s has the value reference %u";
+
+/* The port that has a value reference; NULL: none. */
+static const port *port_at(uint32_t reference) {
+    uint32_t place = reference - FIRST_REFERENCE;
+    return place < N_PORTS ? &ports[place] : NULL;
 }
 
 /* The port of a type that has a value reference. */
 static const port *port_of(uint32_t reference, kind kind) {
-    return reference < N_PORTS && ports[reference].kind == kind ? &ports[reference] : NULL;
+    const port *port = port_at(reference);
+    return port != NULL && port->kind == kind ? port : NULL;
 }
 
 /* The text that a number stands for; NULL: none. */
@@ -146,17 +92,26 @@ static void put_parameter(parameter_values *values, const port *port, double num
 
 /* Getting */
 
-/* The value of a port as a number; 0.0, and a refusal, if no port of the type has the reference. */
-static double number_of(instance *it, uint32_t reference, kind kind) {
-    const port *port = port_of(reference, kind);
-    if (port == NULL) {
-        refuse_reference(it, version.kinds[kind], reference);
+static void get_unknown(call *this, string kind, const uint32_t references[], size_t n) {
+    message why;
+    for (size_t i = 0; i < n; i++) {
+        compose(&why, NO_PORT, kind, references[i]);
+        refuse_to_get(this, &why);
+    }
+}
+
+/* The value of a port as a number; 0.0, if the reference is not that of a port of the type. */
+static double number_of(call *this, uint32_t reference, kind kind) {
+    const run *run = &this->instance->run;
+    const port *port = port_at(reference);
+    if (port == NULL || (port->kind != kind && (kind != REAL || port->kind == STRING))) {
+        get_unknown(this, version.kinds[kind], &reference, 1);
         return 0.0;
     }
-    if (port->causality == PARAMETER) return parameter(&it->run.parameters, port);
-    if (port->causality == INPUT) return it->run.inputs.values[port->place];
-    if (port->kind == BOOLEAN) return it->run.fault;
-    return it->run.moments[it->run.now].outputs.values[port->place];
+    if (port->causality == PARAMETER) return parameter(&run->parameters, port);
+    if (port->causality == INPUT) return run->inputs.values[port->place];
+    if (port->kind == BOOLEAN) return run->fault;
+    return run->moments[run->now].outputs.values[port->place];
 }
 
 /* Whether references are those of all inputs, or outputs, in their order. */
@@ -164,67 +119,121 @@ static int are_all(const uint32_t references[], const uint32_t all[], size_t n) 
     return n > 0 && memcmp(references, all, n * sizeof *all) == 0;
 }
 
-static void get_reals(instance *it, const uint32_t references[], size_t n, double values[]) {
-    if (it->stale) refresh(it);
+static int has_output(const uint32_t references[], size_t n) {
+    for (size_t i = 0; i < n; i++) {
+        const port *port = port_of(references[i], REAL);
+        if (port != NULL && port->causality == OUTPUT) return 1;
+    }
+    return 0;
+}
+
+static void get_reals(call *this, const uint32_t references[], size_t n, double values[]) {
+    instance *it = this->instance;
+    message why;
+    if (it->stale && has_output(references, n) && !refresh(it, &why)) refuse_to_get(this, &why);
     if (n == MODEL_OUTPUTS && are_all(references, output_references, n)) {
         memcpy(values, it->run.moments[it->run.now].outputs.values, n * sizeof *values);
         return;
     }
-    for (size_t i = 0; i < n; i++) values[i] = number_of(it, references[i], REAL);
+    for (size_t i = 0; i < n; i++) values[i] = number_of(this, references[i], REAL);
 }
 
-static int32_t get_integer(instance *it, uint32_t reference) {
-    return (int32_t)number_of(it, reference, INTEGER);
+static int32_t get_integer(call *this, uint32_t reference) {
+    return (int32_t)number_of(this, reference, INTEGER);
 }
 
-static int get_boolean(instance *it, uint32_t reference) {
-    if (it->stale) refresh(it);
-    return number_of(it, reference, BOOLEAN) != 0.0;
+static int get_boolean(call *this, uint32_t reference) {
+    return number_of(this, reference, BOOLEAN) != 0.0;
 }
 
-static string get_string(instance *it, uint32_t reference) {
-    double number = number_of(it, reference, STRING);
+static string get_string(call *this, uint32_t reference) {
+    double number = number_of(this, reference, STRING);
     const port *port = port_of(reference, STRING);
     return port == NULL ? "" : text_of(port, number);
 }
 
 /* Setting */
 
-/* A value is a number, or a text. */
-static int change(instance *it, const port *port, double number, string text, message *why) {
-    run *run = &it->run;
-    parameter_values changed;
-    if (port->causality == OUTPUT) {
-        compose(why, "%s is an output and cannot be set", port->name);
-    } else if (run->mode == TERMINATED) {
-        compose(why, "%s cannot be set after %s", port->name, version.terminate);
-    } else if (port->variability == FIXED && run->mode == STEPPING) {
-        compose(why, "%s is fixed and cannot be set after the initialisation", port->name);
-    } else if (text != NULL ? has_choice(port, text, &number, why) : in_range(port, number, why)) {
-        if (port->causality == INPUT) {
-            run->inputs.values[port->place] = number;
-            return 1;
-        }
-        changed = run->parameters;
-        put_parameter(&changed, port, number);
-        if (run->mode == STEPPING && !adopt(it, &changed, why)) return 0;
-        run->parameters = changed;
-        return 1;
-    }
-    return 0;
+/* Only after its end a run takes no values. */
+static int can_set(call *this) {
+    return this->instance->run.mode != TERMINATED || follows(this, STEPPING);
 }
 
-static void set_value(instance *it, uint32_t reference, kind kind, double number, string text) {
-    const port *port = port_of(reference, kind);
+/* The values of a call, until all of them are found good. */
+struct setting {
+    call *call;
+    int good;
+    int retunes; /* whether there are parameters among them */
+    parameter_values parameters;
+    input_values inputs;
+};
+
+static void set_unknown(call *this, string kind, const uint32_t references[], size_t n) {
     message why;
-    if (port == NULL) {
-        refuse_reference(it, version.kinds[kind], reference);
-    } else if (change(it, port, number, text, &why)) {
-        mend(&it->run, port->name);
-        it->stale = it->run.mode == INITIALISING;
-    } else {
-        refuse(it, port->name, &why);
+    if (n == 0 || !can_set(this)) return;
+    compose(&why, NO_PORT, kind, references[0]);
+    fail(this, &why);
+}
+
+static setting begin_setting(call *this, kind kind, const uint32_t references[], size_t n) {
+    const run *run = &this->instance->run;
+    setting it = {.call = this, .good = can_set(this)};
+    for (size_t i = 0; i < n && it.good; i++) {
+        if (port_of(references[i], kind) != NULL) continue;
+        set_unknown(this, version.kinds[kind], &references[i], 1);
+        it.good = 0;
     }
+    it.parameters = run->parameters;
+    it.inputs = run->inputs;
+    return it;
+}
+
+static int is_the_same(const run *run, const port *port, double number, string text) {
+    double now = parameter(&run->parameters, port);
+    return text == NULL ? number == now : strcmp(text, text_of(port, now)) == 0;
+}
+
+static int take_value(setting *it, const port *port, double number, string text, message *why) {
+    const run *run = &it->call->instance->run;
+    if (port->causality == OUTPUT) {
+        return compose(why, "%s is an output and cannot be set", port->name);
+    }
+    if (port->variability == FIXED && run->mode == STEPPING) {
+        return is_the_same(run, port, number, text) ||
+               compose(why, "%s is fixed and cannot change after initialisation", port->name);
+    }
+    if (text != NULL ? !has_choice(port, text, &number, why) : !in_range(port, number, why)) {
+        return 0;
+    }
+    if (port->causality == INPUT) {
+        it->inputs.values[port->place] = number;
+    } else {
+        put_parameter(&it->parameters, port, number);
+        it->retunes = 1;
+    }
+    return 1;
+}
+
+static void set_value(setting *it, uint32_t reference, double number, string text) {
+    message why;
+    if (it->good && !take_value(it, port_at(reference), number, text, &why)) {
+        discard(it->call, &why, NULL);
+        it->good = 0;
+    }
+}
+
+static void end_setting(setting *it) {
+    instance *instance = it->call->instance;
+    run *run = &instance->run;
+    message why;
+    if (!it->good) return;
+    if (it->retunes && run->mode == STEPPING && !adopt(instance, &it->parameters, &why)) {
+        discard(it->call, &why, NULL);
+        return;
+    }
+    run->parameters = it->parameters;
+    run->inputs = it->inputs;
+    if (run->mode == INITIALISING) instance->stale = 1;
 }
 
 static int all_finite(const double values[], size_t n) {
@@ -234,24 +243,14 @@ static int all_finite(const double values[], size_t n) {
     return 1;
 }
 
-static void set_reals(instance *it, const uint32_t references[], size_t n, const double values[]) {
-    run *run = &it->run;
-    if (n == MODEL_INPUTS && run->mode == STEPPING && run->refused == NULL &&
-        are_all(references, input_references, n) && all_finite(values, n)) {
+static void set_reals(call *this, const uint32_t references[], size_t n, const double values[]) {
+    run *run = &this->instance->run;
+    if (n == MODEL_INPUTS && run->mode == STEPPING && are_all(references, input_references, n) &&
+        all_finite(values, n)) {
         memcpy(run->inputs.values, values, n * sizeof *values);
         return;
     }
-    for (size_t i = 0; i < n; i++) set_value(it, references[i], REAL, values[i], NULL);
-}
-
-static void set_integer(instance *it, uint32_t reference, int32_t integer) {
-    set_value(it, reference, INTEGER, integer, NULL);
-}
-
-static void set_boolean(instance *it, uint32_t reference, int boolean) {
-    set_value(it, reference, BOOLEAN, boolean != 0, NULL);
-}
-
-static void set_string(instance *it, uint32_t reference, string text) {
-    set_value(it, reference, STRING, 0.0, text);
+    setting it = begin_setting(this, REAL, references, n);
+    for (size_t i = 0; i < n; i++) set_value(&it, references[i], values[i], NULL);
+    end_setting(&it);
 }

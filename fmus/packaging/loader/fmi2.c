@@ -9,6 +9,7 @@
 #include "../../native/runtime/utf8.c"
 #include "../../native/runtime/arguments.c"
 #include "../../native/runtime/listener.c"
+#include "../../native/runtime/model_exchange.h"
 
 #include "messages.c"
 #include "location.c"
@@ -35,6 +36,7 @@ static const size_t MOST_BYTES = (size_t)1 << 30;
         if (GOES_ON(this, wrong)) {                                                              \
             c = this.instance->slave;                                                            \
             TO_PYTHONFMU(this, name, parameters, arguments);                                     \
+            take_answer(&this, when == NOT_AFTER_ERROR);                                         \
         }                                                                                        \
         return end(&this);                                                                       \
     }
@@ -68,7 +70,9 @@ static component new_component(instance *it, string guid, string path, int visib
     component handle = NULL;
     if (!loaded(why)) return NULL;
     int lock = py.PyGILState_Ensure();
+    begin_making();
     if (preflight(path, guid, why)) it->slave = new_slave(it, guid, path, visible, why);
+    end_making();
     if (it->slave != NULL) {
         handle = new_handle(INSTANCE, it, NULL);
         if (handle == NULL) free_slave(it->slave);
@@ -221,6 +225,7 @@ EXPORT int fmi2SetFMUstate(component c, void *state) {
     if (GOES_ON(this, wrong_state(state))) {
         TO_PYTHONFMU(this, fmi2SetFMUstate, (component, void *),
                      (this.instance->slave, thing_of(state, STATE)));
+        take_answer(&this, 1);
         if (this.status == FMI_OK) this.instance->condition = SOUND;
     }
     return end(&this);
@@ -302,3 +307,18 @@ STATUS(fmi2GetRealStatus, double)
 STATUS(fmi2GetIntegerStatus, int)
 STATUS(fmi2GetBooleanStatus, int)
 STATUS(fmi2GetStringStatus, string)
+
+static int not_supported(component c, string function) {
+    call this = begin(c, function, NOT_AFTER_ERROR);
+    if (GOES_ON(this, NULL)) {
+        complain(this.instance, FMI_ERROR, "FMI function not supported: %s", function);
+        this.status = FMI_ERROR;
+    }
+    return end(&this);
+}
+
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#define NOT_SUPPORTED(name, parameters)                                                          \
+    EXPORT int name parameters { return not_supported(c, #name); }
+
+MODEL_EXCHANGE_FUNCTIONS(NOT_SUPPORTED)

@@ -7,15 +7,18 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <unistd.h>
+#include <string.h>
 
-/* Between two looks whether an instance is still in a call [us]. */
-enum { WAIT = 100 };
-
-/* The logger that PythonFMU gets. */
+/* The logger that PythonFMU gets. An entry of the category "answer" is no message: with it the
+ * slave says what PythonFMU cannot, the status of the call. */
 static void hear(void *environment, string name, int status, string category, string text, ...) {
+    instance *it = environment;
     (void)name;
-    tell(environment, status, category, text);
+    if (category == NULL || strcmp(category, "answer") != 0) {
+        tell(it, status, category, text);
+    } else if (status > it->answer) {
+        it->answer = status;
+    }
 }
 
 instance *new_instance(string name, const callbacks *functions, int logging) {
@@ -47,9 +50,7 @@ static instance *awaited(component handle) {
     instance *it;
     while ((it = thing_of(handle, INSTANCE)) != NULL && it->busy &&
            !pthread_equal(it->thread, pthread_self())) {
-        void *thread = py.PyEval_SaveThread();
-        usleep(WAIT);
-        py.PyEval_RestoreThread(thread);
+        wait_without_lock();
     }
     return it;
 }
@@ -73,23 +74,33 @@ static int is_in_logger(instance *it) {
     return it->telling;
 }
 
+static const char NOT_ALIVE[] = "not a live instance of this FMU";
+
+/* A host that ends Python first lets its instances go after that: there is nothing left to end. */
+static int lets_go(string function) {
+    return strcmp(function, "fmi2Terminate") == 0 || strcmp(function, "fmi2FreeInstance") == 0;
+}
+
 call begin(component handle, string function, when when) {
     call this = {.function = function, .status = FMI_ERROR, .handle = handle};
+    string wrong = NOT_ALIVE;
     instance *it = NULL;
-    int inside = 0;
     if (python_runs()) {
         this.lock = py.PyGILState_Ensure();
         it = awaited(handle);
-        inside = it != NULL && (it->busy || is_in_logger(it));
-        if (it == NULL || inside) py.PyGILState_Release(this.lock);
+        if (it != NULL) wrong = it->busy || is_in_logger(it) ? "called by the logger" : NULL;
+        if (wrong != NULL) py.PyGILState_Release(this.lock);
+    } else if (has_loaded()) {
+        if (lets_go(function)) this.status = FMI_OK;
+        wrong = "the host has ended Python";
     }
-    if (it == NULL || inside) {
+    if (wrong != NULL) {
         /* There is nobody else to tell: a logger that calls would do so again. */
-        fprintf(stderr, "%s: %s\n", function,
-                it == NULL ? "not a live instance of this FMU" : "called by the logger");
+        if (this.status != FMI_OK) fprintf(stderr, "%s: %s\n", function, wrong);
         return this;
     }
     this.instance = it;
+    it->answer = FMI_OK;
     it->busy = 1;
     it->thread = pthread_self();
     if (it->condition == LOST) {
@@ -109,6 +120,12 @@ int refuse(call *this, string wrong) {
 }
 
 int sound(call *this, string wrong) { return wrong == NULL || refuse(this, wrong); }
+
+/* Takes on the status that the slave has for a call, where PythonFMU has answered fmi2OK. */
+void take_answer(call *this, int ends_in_error) {
+    if (this->instance->answer > this->status) this->status = this->instance->answer;
+    if (this->instance->answer >= FMI_ERROR && ends_in_error) this->instance->condition = IN_ERROR;
+}
 
 /* Gives the lock back, and tells the host what there is to tell. */
 void give_back_and_tell(call *this) {

@@ -83,9 +83,13 @@ typedef struct {
 extern python_functions py;
 
 int loaded(char *why);
+int has_loaded(void);
 int python_runs(void);
 void *pythonfmu_function(string name);
 uint64_t next_serial(void);
+void wait_without_lock(void);
+void begin_making(void);
+void end_making(void);
 int exception(char *why);
 
 /* The global interpreter lock is the only lock of what follows. */
@@ -124,6 +128,7 @@ typedef struct {
     int told;        /* whether the host has got a message of an error */
     callbacks heard; /* what PythonFMU gets for callbacks */
     component slave; /* PythonFMU's own instance */
+    int answer;      /* the status that the slave has for the call */
     enum { SOUND, IN_ERROR, LOST } condition;
     int busy;
     pthread_t thread; /* that is in a call */
@@ -152,6 +157,7 @@ void release_instance(instance *it);
 call begin(component handle, string function, when when);
 int sound(call *this, string wrong);
 int refuse(call *this, string wrong);
+void take_answer(call *this, int ends_in_error);
 void give_back_and_tell(call *this);
 int end(call *this);
 

@@ -48,10 +48,6 @@ def refusal(resources: str, guid: str) -> str:
     return ""
 
 
-#: How often a module is looked for, where other threads change where to look.
-_TRIES = 10
-
-
 def forget(resources: str) -> None:
     """Take a folder off sys.path."""
     with suppress(ValueError):
@@ -62,7 +58,7 @@ def _check(resources: str, guid: str) -> None:
     sound = _sound.get(resources)
     if sound is None or sound.script not in sys.modules or _stamps(sound.files) != sound.stamps:
         sound = _sound[resources] = _examined(resources)
-    if guid and guid.strip("{}") != sound.guid.strip("{}"):
+    if guid and guid.strip("{}").lower() != sound.guid.strip("{}").lower():
         raise ValueError(f"GUID {guid} is not that of this FMU, {sound.guid}")
 
 
@@ -106,19 +102,12 @@ def _content(path: Path) -> bytes:
 
 
 def _imported(script: str, resources: str) -> ModuleType:
-    left = _TRIES
-    while True:
-        importlib.invalidate_caches()
-        sys.path.insert(0, resources)
-        try:
-            return importlib.import_module(script)
-        except ModuleNotFoundError as error:
-            # Its file is there: another thread took a folder off, and the search skipped one.
-            left -= 1
-            if error.name != script or not left:
-                raise
-        finally:
-            forget(resources)
+    importlib.invalidate_caches()
+    sys.path.insert(0, resources)
+    try:
+        return importlib.import_module(script)
+    finally:
+        forget(resources)
 
 
 def _has_slave(module: ModuleType) -> bool:

@@ -18,17 +18,24 @@
 
 enum { NEWEST = 13, OLDEST = 9 };
 
+/* Between two looks whether another thread is done [us]. */
+enum { WAIT = 100 };
+
 typedef struct {
     pthread_mutex_t lock; /* for starting; the interpreter lock is never waited for under it */
+    pthread_mutex_t making; /* of an instance, which changes sys.path; only tried for */
     enum { UNTRIED, RUNS, FAILED } python;
     uint64_t serial; /* of the last handle; under the interpreter lock */
     char why[WHY];
 } process_state;
 
-/* The name carries a number for other layouts to come. */
-EXPORT process_state auv_fmu_process_1 = {.lock = PTHREAD_MUTEX_INITIALIZER};
-__asm__(".type auv_fmu_process_1, %gnu_unique_object");
-#define process auv_fmu_process_1
+/* The name carries a number, which another layout raises. */
+EXPORT process_state auv_fmu_process_2 = {
+    .lock = PTHREAD_MUTEX_INITIALIZER,
+    .making = PTHREAD_RECURSIVE_MUTEX_INITIALIZER_NP,
+};
+__asm__(".type auv_fmu_process_2, %gnu_unique_object");
+#define process auv_fmu_process_2
 
 python_functions py;
 
@@ -161,9 +168,26 @@ int loaded(char *why) {
     return pythonfmu != NULL;
 }
 
-int python_runs(void) { return pythonfmu != NULL && py.Py_IsInitialized(); }
+int has_loaded(void) { return pythonfmu != NULL; }
+
+int python_runs(void) { return has_loaded() && py.Py_IsInitialized(); }
 
 void *pythonfmu_function(string name) { return dlsym(pythonfmu, name); }
+
+/* Waits until no other thread makes an instance, of any FMU. The interpreter lock is given away
+ * meanwhile: a thread that makes one needs it. */
+void begin_making(void) {
+    while (pthread_mutex_trylock(&process.making) != 0) wait_without_lock();
+}
+
+void end_making(void) { pthread_mutex_unlock(&process.making); }
+
+/* Lets other threads have the interpreter lock for a while. */
+void wait_without_lock(void) {
+    void *thread = py.PyEval_SaveThread();
+    usleep(WAIT);
+    py.PyEval_RestoreThread(thread);
+}
 
 uint64_t next_serial(void) { return ++process.serial; }
 
