@@ -3,7 +3,7 @@
 Every tool is installed as it is on PyPI today, into a virtual environment of its own, and runs the
 four FMUs of Fig. 4 by a driver in `drivers.py`. The positions after every step are held against a
 bare master on fmpy that steps the same components in the order and from the beginning of the tool,
-and against our own run in the order `gauss-seidel`. A tool that does not run has the reason in its
+and against our own runs. A tool that does not run has the reason in its
 row, and the others go on. Exit status 1: one did not run, or is further away than rounding.
 """
 
@@ -40,12 +40,21 @@ STEPS, STEP = 5000, 0.02
 #: What is compared.
 POSITIONS = [("plant", f"eta.{axis}") for axis in "xyz"]
 
+#: Our own orders.
+ORDERS = ("gauss-seidel", "jacobi")
+
 #: The kinds of FMUs, and how they are built: kind and version of FMI.
 KINDS = {"python": ("python", "2"), "native": ("native", "2"), "fmi3": ("native", "3")}
 _FMI2, _ALL = ("python", "native"), tuple(KINDS)
 
 #: Largest deviation from the bare master that is rounding [m]: some tools add up their time.
 ROUNDING = 1e-9
+
+#: Columns of the table.
+_COLUMNS = (
+    "host", "version", "kind", "beginning: order", "steps", "deviation [m]",
+    *(f"from `{order}` [m]" for order in ORDERS), "us/step",
+)  # fmt: skip
 
 #: How long an installation may take [s], and a run, and each step of it.
 _INSTALLING, _STARTING, _STEPPING = 900, 120, 0.1
@@ -207,10 +216,10 @@ class Loop:
         return rows(folders, self.wires, POSITIONS, beginning, order, self.steps, STEP)
 
     @cache  # noqa: B019
-    def ours(self) -> np.ndarray:
-        """The positions by our own master, in its own order."""
+    def ours(self, order: str) -> np.ndarray:
+        """The positions by our own master."""
         table = Table()
-        completed(self.system, Experiment(self.steps * STEP, STEP, "gauss-seidel"), [table])
+        completed(self.system, Experiment(self.steps * STEP, STEP, order), [table])
         return table.group(*(".".join(port) for port in POSITIONS))[1:]
 
     def driven(self, python: Path, driver: str, kind: str) -> tuple[np.ndarray, float]:
@@ -246,11 +255,11 @@ def line(*cells: object) -> str:
 
 def lines(loop: Loop, name: str, kinds: Sequence[str], folder: Path) -> Iterator[tuple[str, bool]]:
     """The rows of a tool, and whether each ran as it should."""
-    host = HOSTS[name]
+    host, blank = HOSTS[name], ("", "", "")
     try:
         version = installed(host, folder)
     except InputError as error:
-        yield line(name, "", "", "", "", f"not installed: {error}", "", ""), False
+        yield line(name, "", "", "", "", f"not installed: {error}", *blank), False
         return
     for way in host.ways:
         label = f"{name}, {way.label}" if way.label else name
@@ -261,12 +270,12 @@ def lines(loop: Loop, name: str, kinds: Sequence[str], folder: Path) -> Iterator
             try:
                 found, seconds = loop.driven(interpreter(folder), way.driver, kind)
             except InputError as error:
-                yield line(label, version, kind, order, "", f"does not run: {error}", "", ""), False
+                yield line(label, version, kind, order, "", f"does not run: {error}", *blank), False
                 continue
-            deviation = np.abs(found - loop.bare(way.beginning, way.order)).max()
-            from_ours = np.abs(found - loop.ours()).max()
-            cells = f"{deviation:.1e}", f"{from_ours:.1e}", f"{1e6 * seconds / len(found):.0f}"
-            yield line(label, version, kind, order, len(found), *cells), bool(deviation < ROUNDING)
+            others = [loop.bare(way.beginning, way.order), *(loop.ours(name) for name in ORDERS)]
+            deviations = [float(np.abs(found - other).max()) for other in others]
+            cells = [*(f"{x:.1e}" for x in deviations), f"{1e6 * seconds / len(found):.0f}"]
+            yield line(label, version, kind, order, len(found), *cells), deviations[0] < ROUNDING
 
 
 def main() -> int:
@@ -291,9 +300,8 @@ def main() -> int:
         parser.error("--steps: give a number of at least 1")
     chosen = [known[name.casefold()] for name in options.host] or list(HOSTS)
     print(f"{platform.python_implementation()} {platform.python_version()}, {platform.machine()}\n")
-    print(line("host", "version", "kind", "beginning: order", "steps", "deviation [m]",
-               "from `gauss-seidel` [m]", "us/step"))  # fmt: skip
-    print("|---|---|---|---|---|---|---|---|", flush=True)
+    print(line(*_COLUMNS))
+    print(line(*("---" for _ in _COLUMNS)), flush=True)
     good = True
     with TemporaryDirectory(prefix="auvfmu") as folder:
         loop = Loop(Path(folder), options.steps)
