@@ -46,7 +46,6 @@ _WEIGHTS = {
 
 #: Rows that need values of their own; extreme values bring them about.
 _NOT_DRAWN = {
-    ("fmi2DoStep", "anything, while a refusal is not mended"),
     ("fmi2DoStep", "values that the equations overflow with"),
     ("fmi2ExitInitializationMode", "values that give no start"),
     ("fmi2GetReal", "outputs of values that give no start"),
@@ -111,6 +110,7 @@ class _World:
             freed,
             0.0 if known is None else known.time,
             f"{name}.",
+            {} if known is None else known.values,
         )
 
 
@@ -169,7 +169,7 @@ def _call(world: _World, name: str, others: bool) -> Call:
             return call
     keys, weights = _ALPHABET, _RARELY
     if random.random() < SENSIBLE:
-        stuck = known.in_error or bool(known.blocks) or known.mode == "terminated"
+        stuck = known.in_error or known.mode == "terminated"
         keys, weights = _good_keys(known.state), _weights(known.state, stuck)
     while True:
         [key] = random.choices(keys, weights)

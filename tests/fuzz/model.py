@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
-from support.calls import Call
-from support.raw import Description, Variable
-from support.status_table import ERROR, MODES, SOUND, Cell, rows
+from support.calls import SAME, Call
+from support.raw import Description, Status, Variable
+from support.status_table import ERROR, MODES, Cell, rows
 
-_WHILE_REFUSED = ("fmi2DoStep", "anything, while a refusal is not mended")
+_FIXED = "a fixed parameter"
 
 #: Beyond these sizes values are legal, but where the equations lead with them is not foretold.
 LARGEST_TAME, SMALLEST_TAME = 1e4, 1e-6
-
-#: What no good value mends.
-_REFERENCE = "value reference"
 
 
 @dataclass
@@ -25,8 +23,8 @@ class Model:
     Attributes:
         mode: of the four that a sound instance has.
         in_error: whether it is in the state error.
-        fault: whether something was refused since the beginning.
-        blocks: what was refused and is not mended: value references, and functions.
+        fault: whether something was discarded since the beginning.
+        values: of the ports that were set, by name.
         wild: whether it was told values that the equations may overflow with, or that may not go
             with others.
         time: where the next step begins [s].
@@ -37,7 +35,7 @@ class Model:
     mode: str = MODES[0]
     in_error: bool = False
     fault: bool = False
-    blocks: frozenset[str] = field(default_factory=frozenset)
+    values: Mapping[str, Any] = field(default_factory=dict)
     wild: bool = False
     time: float = 0.0
 
@@ -48,9 +46,12 @@ class Model:
 
     def cell(self, call: Call) -> Cell:
         """What the table says to a call."""
-        if call.function == "fmi2DoStep" and self.blocks and not self.in_error:
-            return rows()[_WHILE_REFUSED].cells[self.state]
-        return rows()[call.function, call.case].cells[self.state]
+        case = call.case
+        if case.startswith(_FIXED):
+            [item] = call.arguments["items"]
+            port = self._port_of(call, item.reference)
+            case = SAME if item.value == self.values.get(port.name, port.start) else _FIXED
+        return rows()[call.function, case].cells[self.state]
 
     def after(self, call: Call, saved: Mapping[str, Model]) -> Model:
         """What is known once a call was answered as the table says.
@@ -67,36 +68,31 @@ class Model:
             return saved[slot_of(call)]
         known = replace(self, fault=self.fault or answer.raises_fault)
         known.in_error = leads_to == ERROR
-        if leads_to not in (ERROR, SOUND):
+        if leads_to != ERROR:
             known.mode = leads_to
-        if answer.blocks:
-            known.blocks |= self._refused(call, bad_only=answer.name == "partly")
-        if answer.name in ("OK", "partly"):
+        if answer.name == "OK":
             known._take(call)
         return known
 
-    def _port_of(self, call: Call, reference: int) -> str:
-        kind = call.function.removeprefix("fmi2Set")
-        return self.description.names.get((reference, kind), _REFERENCE)
+    def refused(self, call: Call, status: Status) -> Model:
+        """What is known once a call was refused that the table has nothing against."""
+        fails = status == Status.Error and not call.function.startswith("fmi2Get")
+        return replace(self, in_error=self.in_error or fails)
 
-    def _refused(self, call: Call, bad_only: bool) -> set[str]:
-        if "items" not in call.arguments:
-            return {call.function}
-        items = call.arguments["items"]
-        return {self._port_of(call, i.reference) for i in items if not (bad_only and i.good)}
+    def _port_of(self, call: Call, reference: int) -> Variable:
+        kind = call.function.removeprefix("fmi2Set")
+        return self.description.find(self.description.names[reference, kind])
 
     def _take(self, call: Call) -> None:
         if call.function == "fmi2SetupExperiment":
-            self.blocks -= {call.function}
             self.time = call.arguments["start"]
         elif call.function == "fmi2DoStep":
             self.time = call.arguments["time"] + call.arguments["h"]
         elif call.function.startswith("fmi2Set") and "items" in call.arguments:
             for item in call.arguments["items"]:
-                if item.good:
-                    name = self._port_of(call, item.reference)
-                    self.blocks -= {name}
-                    self.wild = self.wild or not _is_tame(self.description.find(name), item.value)
+                port = self._port_of(call, item.reference)
+                self.values = {**self.values, port.name: item.value}
+                self.wild = self.wild or not _is_tame(port, item.value)
 
 
 def slot_of(call: Call) -> str:
@@ -125,7 +121,8 @@ def keep(saved: dict[str, Model], call: Call, known: Model) -> None:
 def _is_tame(port: Variable, value: object) -> bool:
     """Whether no run can overflow with a value, and no other parameter can speak against it."""
     if not isinstance(value, float):
-        return True
+        # Without roll two start values must be 0.
+        return port.name != "roll" or bool(value)
     if value in (port.minimum, port.maximum):
         return False
     return value == 0.0 or SMALLEST_TAME <= abs(value) <= LARGEST_TAME

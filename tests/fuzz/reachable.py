@@ -51,8 +51,7 @@ def faults(said: Any, description: Description, samples: Sequence[dict[str, Any]
         return ["other parts than those of a state"]
     found = [*_faults(said, description, samples)]
     kept_true = _INVARIANTS.get(description.name)
-    # After an initialisation that was refused, values are others than those the state came from.
-    if found or kept_true is None or said["state"] is None or "initialisation" in said["refused"]:
+    if found or kept_true is None or said["state"] is None:
         return found
     try:
         return [*kept_true(said)]
@@ -85,18 +84,9 @@ def _faults(
         yield "other parameters"
     else:
         yield from (f"{n} = {v!r:.30}" for n, v in values.items() if not _fits(parameters[n], v))
-    yield from _faults_of_refusals(said)
-    yield from _faults_of_state(said, samples)
-
-
-def _faults_of_refusals(said: dict[str, Any]) -> Iterator[str]:
-    refused = said["refused"]
     if not isinstance(said["fault"], bool):
         yield "fault is neither true nor false"
-    if not isinstance(refused, dict) or not all(isinstance(v, str) for v in refused.values()):
-        yield "refusals that are no text"
-    elif refused and said["fault"] is not True:
-        yield "refusals without a fault"
+    yield from _faults_of_state(said, samples)
 
 
 def _faults_of_state(said: dict[str, Any], samples: Sequence[dict[str, Any]]) -> Iterator[str]:
@@ -104,6 +94,8 @@ def _faults_of_state(said: dict[str, Any], samples: Sequence[dict[str, Any]]) ->
     if state is None:
         if said["hidden"] is not None:
             yield "something hidden without a state"
+        if said["mode"] == MODES[2]:
+            yield "steps without a state"
         return
     if said["mode"] == MODES[0]:
         yield "a state before the initialisation"

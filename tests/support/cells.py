@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from random import Random
 from typing import NamedTuple
 
 from support import states
 from support.calls import CASES, NO_START, OVERFLOWING, Call, Draw, Saved, Setting, make
 from support.raw import Host, Library, Status, Variable, instance
-from support.status_table import ERROR, SOUND, Answer, Cell, Row, rows
+from support.status_table import ERROR, Cell, Row, rows
 
 #: Step of the trials [s], and how many come before the state stepping is tried.
 H, STEPS = 0.02, 3
@@ -20,8 +20,6 @@ _SETTINGS: Mapping[tuple[str, str], Mapping[str, Setting]] = {
     ("fmi2ExitInitializationMode", "values that give no start"): NO_START,
     ("fmi2GetReal", "outputs of values that give no start"): NO_START,
 }
-
-_WHILE_REFUSED = "anything, while a refusal is not mended"
 
 
 class Company(NamedTuple):
@@ -49,7 +47,10 @@ def check(library: Library, key: tuple[str, str], state: str, company: Company) 
     """
     row = rows()[key]
     cell = row.cells[state]
-    for goes_on in _ways_on(row, cell.answer):
+    ways = [Trial.check_next_step]
+    if cell.answer.name in ("discarded", ERROR):
+        ways += [Trial.check_reset, Trial.check_restored]
+    for goes_on in ways:
         with instance(library) as host:
             trial = Trial(host, company, row, state)
             if trial.call is None:
@@ -57,14 +58,6 @@ def check(library: Library, key: tuple[str, str], state: str, company: Company) 
             trial.check_call()
             goes_on(trial)
     return True
-
-
-def _ways_on(row: Row, answer: Answer) -> list[Callable[[Trial], None]]:
-    """What is tried after the call, each on an instance of its own."""
-    if not (answer.blocks or answer.name == ERROR):
-        return [Trial.check_next_step]
-    ways = [Trial.check_next_step, Trial.check_reset, Trial.check_restored]
-    return [*ways, Trial.check_mended] if row.mended_by and answer.blocks else ways
 
 
 class Trial:
@@ -132,8 +125,6 @@ class Trial:
     def check_call(self) -> None:
         host, call, answer = self.host, self.call, self.cell.answer
         assert call is not None
-        if self.row.case == _WHILE_REFUSED:
-            host.get("Real", [len(host.description.variables)])
         if answer.name == "restored" and self.state == "stepping":
             assert self._step() == Status.OK
         values, content, fault = host.values(), _content(host), host.fault()
@@ -141,11 +132,11 @@ class Trial:
             self._set(self.setting.values)
         host.messages.clear()
         status = make(host, call, self.saved)
-        assert f"fmi2{status.name}" == answer.status, f"the status is {status.name}"
+        assert status == self._status(), f"the status is {status.name}"
         logged = {f"fmi2{message.status.name}" for message in host.messages}
         if self.state != ERROR or answer.name != ERROR:
             assert not answer.message or answer.message in logged, f"messages: {logged or 'none'}"
-        if self.cell.leads_to not in (ERROR, SOUND):
+        if self.cell.leads_to != ERROR:
             self.mode = self.cell.leads_to
         if answer.name == "restored":
             self._check_what_is_restored(call)
@@ -153,8 +144,24 @@ class Trial:
             self._check_as_new()
         else:
             assert host.fault() == (answer.raises_fault or fault), f"fault is {host.fault()}"
-            if not self._check_what_is_set(call, values) and answer.changes_nothing:
+            is_set = self._check_what_is_set(call, values)
+            if not is_set and answer.changes_nothing and self.setting is None:
                 self._check_unchanged(values, content)
+
+    def _status(self) -> Status:
+        """What the call is answered with: PythonFMU knows fmi2OK, and fmi2Discard of steps."""
+        answer = self.cell.answer
+        values = self.call is not None and "items" in self.call.arguments
+        if not self._is_told_late and (self.host.library.answers or not values):
+            return Status[answer.status.removeprefix("fmi2")]
+        return Status.Discard if self.row.function == "fmi2DoStep" else Status.OK
+
+    @property
+    def _is_told_late(self) -> bool:
+        """Whether it is the next steps that tell what was refused, since no loader does."""
+        name, is_step = self.cell.answer.name, self.row.function == "fmi2DoStep"
+        refused = name == ERROR or (name == "discarded" and not is_step)
+        return refused and not self.host.library.answers
 
     def _check_what_is_set(self, call: Call, before: Mapping[str, object]) -> bool:
         """Whether the call is one that changes values, and has changed those alone."""
@@ -163,7 +170,7 @@ class Trial:
         if self.cell.answer.changes_nothing:
             return False
         names = {v.reference: v for v in self.host.description.variables}
-        taken = {names[i.reference]: i.value for i in call.arguments["items"] if i.good}
+        taken = {names[i.reference]: i.value for i in call.arguments["items"]}
         after = self.host.values()
         for variable, value in taken.items():
             found = after[variable.name]
@@ -178,11 +185,8 @@ class Trial:
     def _check_unchanged(self, values: Mapping[str, object], content: object) -> None:
         after = self.host.values()
         changed = {name for name in values if after[name] != values[name]} - {"fault"}
-        if self.setting is not None:
-            changed -= self.setting.values.keys()
         assert not changed, f"{sorted(changed)} changed"
-        if self.setting is None:
-            assert _content(self.host) == content, "the state has changed"
+        assert _content(self.host) == content, "the state has changed"
 
     def _check_what_is_restored(self, call: Call) -> None:
         slot = call.arguments.get("slot") or call.arguments["bytes of"]
@@ -198,12 +202,14 @@ class Trial:
 
     def check_next_step(self) -> None:
         answer = self.cell.answer
-        if self.cell.leads_to == ERROR and answer.name != "restored":
+        if self._is_told_late:
+            if self.mode != "terminated":
+                assert self._good_step() == Status.Discard, "a step after what was refused"
+        elif self.cell.leads_to == ERROR and answer.name != "restored":
             self._check_error()
         elif self.mode == "terminated":
-            assert self._step() == Status.Discard, "a step after the end"
-        elif answer.blocks or answer.name == "blocked":
-            assert self._good_step() == Status.Discard, "a step, though something was refused"
+            expected = Status.Error if self.host.library.answers else Status.Discard
+            assert self._step() == expected, "a step after the end"
         else:
             if self.setting is not None:
                 self._set(self.setting.good)
@@ -233,55 +239,10 @@ class Trial:
         if self.mode != "terminated":
             assert self._good_step() == Status.OK, "a step is refused after fmi2SetFMUstate"
 
-    def check_mended(self) -> None:
-        """What the last column names mends where the table takes it."""
-        if self.state == ERROR:
-            return
-        if self.row.mended_by == "a good value":
-            taken = self._set_good_values()
-        elif self.row.function == "fmi2SetupExperiment":
-            assert self.host.setup() == Status.OK
-            taken = _is_taken(("fmi2SetupExperiment", "start"), self.state)
-        else:
-            self.check_restored()
-            return
-        assert self.host.fault()
-        if self.mode != "terminated":
-            expected = Status.OK if taken else Status.Discard
-            assert self._good_step() == expected, f"after {self.row.mended_by}"
-
-    def _set_good_values(self) -> bool:
-        """Whether the table says that they are taken."""
-        assert self.call is not None
-        if self.setting is not None:
-            self._set(self.setting.good)
-            return True
-        taken = True
-        for item in self.call.arguments["items"]:
-            [variable] = [
-                v for v in self.host.description.variables if v.reference == item.reference
-            ]
-            value = self.draw.good_value(variable)
-            value = value.encode() if isinstance(value, str) else value
-            assert self.host.set(variable.kind, [variable.reference], [value]) == Status.OK
-            taken = taken and _is_taken(_row_of(variable), self.state)
-        return taken
-
 
 def _content(host: Host) -> object:
-    """The state, without what tells of refusals; None where it cannot be read."""
-    return states.without_refusals(host.content())
-
-
-def _row_of(variable: Variable) -> tuple[str, str]:
-    """The row about a good value of a port."""
-    if variable.causality == "input":
-        return "fmi2SetReal", "an input"
-    return f"fmi2Set{variable.kind}", f"a {variable.variability} parameter"
-
-
-def _is_taken(key: tuple[str, str], state: str) -> bool:
-    return rows()[key].cells[state].answer.name == "OK"
+    """The state without `fault`; None where it cannot be read."""
+    return states.without_fault(host.content())
 
 
 def _same(variable: Variable, found: object, wanted: object) -> bool:

@@ -15,7 +15,7 @@ from support.status_table import MODES
 
 CHECKSUM = "checksum"
 
-MAGIC = "FMU state 1"
+MAGIC = "FMU state 2"
 
 #: Lengths of the groups of numbers that a state consists of, 0: of a number in no group.
 _SHAPES = {
@@ -119,7 +119,6 @@ def _read(source: _Reader) -> NativeState | None:
             words, has_next, following = source.words(_WORDS), source.word(), source.real()
             said["hidden"] = [_VERSION, words, following if has_next else None]
     said["fault"] = bool(source.word())
-    said["refused"] = {source.text(): source.text() for _ in range(source.word())}
     said[CHECKSUM] = source.word()
     return said
 
@@ -160,7 +159,7 @@ def written(said: NativeState) -> bytes:
 
 
 def _written(said: NativeState) -> bytes:
-    identity, refused = said["identity"], said["refused"]
+    identity = said["identity"]
     layout = _layout(identity.split()[0])
     parts = [
         _text(MAGIC),
@@ -180,9 +179,7 @@ def _written(said: NativeState) -> bytes:
         if layout.name == _NOISY:
             _, words, following = said["hidden"]
             parts += [_words(*words, following is not None), _reals(following or 0.0)]
-    parts += [_words(said["fault"], len(refused))]
-    parts += [_text(text) for item in refused.items() for text in item]
-    return b"".join(parts) + _words(said[CHECKSUM])
+    return b"".join(parts) + _words(said["fault"], said[CHECKSUM])
 
 
 def _text(text: str) -> bytes:

@@ -253,9 +253,9 @@ class Host:
         return value
 
     def _read(self, arrays: _Arrays) -> list[Any]:
-        """Values of variables; None for all, if there are no outputs because of no start."""
+        """Values of variables; None each, where there are no outputs since there is no start."""
         status = self.call(f"fmi2Get{arrays.kind}", arrays.references, arrays.n, arrays.values)
-        if status == Status.Error and self.messages_of(NO_START):
+        if status == Status.Error and arrays.kind == "Real":
             return [None] * len(arrays.names)
         assert status == Status.OK, f"values cannot be read: {status.name}"
         return list(arrays.values)

@@ -20,9 +20,6 @@ from typing import Any, NamedTuple
 from support import native_states
 from support.native_states import CHECKSUM, NativeState, Unwritable
 
-#: What tells of refusals, not of the run.
-REFUSALS = ("fault", "refused")
-
 #: What differs between states of the two kinds of an FMU that are one.
 OF_THE_KIND = ("identity", "time", CHECKSUM)
 
@@ -38,12 +35,12 @@ def read(content: bytes) -> dict[str, Json] | None:
     return said if isinstance(said, dict) else None
 
 
-def without_refusals(content: bytes) -> Json:
-    """What can be compared of two states that differ in their refusals alone."""
+def without_fault(content: bytes) -> Json:
+    """What can be compared of two states of which one is that of a run with refusals."""
     said = read(content)
     if said is None:
         return None
-    return {key: value for key, value in said.items() if key not in (*REFUSALS, CHECKSUM)}
+    return {key: value for key, value in said.items() if key not in ("fault", CHECKSUM)}
 
 
 def sealed(said: dict[str, Json]) -> bytes:

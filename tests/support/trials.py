@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from fmus.packaging.kinds import PYTHON
-from support.calls import MANY
+from support.calls import MANY, MODEL_EXCHANGE_FUNCTIONS
 from support.cells import Company, check
 from support.raw import Host, Library, Status, instance
 from support.raw_fmi import MODEL_EXCHANGE
@@ -154,6 +154,7 @@ _CALLS: tuple[tuple[Any, ...], ...] = (
     ("fmi2GetRealOutputDerivatives", None, 0, None, None),
     ("fmi2DoStep", c_double(0.0), c_double(0.02), 1),
     ("fmi2CancelStep",),
+    *((function, None, 0, None) for function in MODEL_EXCHANGE_FUNCTIONS),
     *((f"fmi2Get{kind}Status", 0, (c_double * 1)())
       for kind in ("", "Real", "Integer", "Boolean", "String")),
 )  # fmt: skip
