@@ -3,8 +3,8 @@
 Every tool is installed as it is on PyPI today, into a virtual environment of its own, and runs the
 four FMUs of Fig. 4 by a driver in `drivers.py`. The positions after every step are held against a
 bare master on fmpy that steps the same components in the order and from the beginning of the tool,
-and against our own runs. A tool that does not run has the reason in its
-row, and the others go on. Exit status 1: one did not run, or is further away than rounding.
+and against our own runs. A tool that does not run has the reason in its row, and the others go on.
+Exit status 1: one did not run, or is further away than rounding.
 """
 
 from __future__ import annotations
@@ -256,6 +256,9 @@ def line(*cells: object) -> str:
 def lines(loop: Loop, name: str, kinds: Sequence[str], folder: Path) -> Iterator[tuple[str, bool]]:
     """The rows of a tool, and whether each ran as it should."""
     host, blank = HOSTS[name], ("", "", "")
+    known = [kind for kind in kinds if kind in host.kinds]
+    if not known:
+        return
     try:
         version = installed(host, folder)
     except InputError as error:
@@ -264,9 +267,7 @@ def lines(loop: Loop, name: str, kinds: Sequence[str], folder: Path) -> Iterator
     for way in host.ways:
         label = f"{name}, {way.label}" if way.label else name
         order = f"{way.beginning}: {way.order}"
-        for kind in kinds:
-            if kind not in host.kinds:
-                continue
+        for kind in known:
             try:
                 found, seconds = loop.driven(interpreter(folder), way.driver, kind)
             except InputError as error:
