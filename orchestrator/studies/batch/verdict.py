@@ -26,18 +26,16 @@ _NO_FORCE = (0.0, 0.0, 0.0)
 
 
 def refused_at_start(setting: Setting) -> str:
-    """Why a run has no start; empty: it has one."""
-    refusals = {
-        "plant": misfit(setting)
-        or _why(lambda: _plant(setting, *plant.begin(setting.plant, _NO_FORCE))),
-        "planner": _why(lambda: _planner(setting, *motion_planner.begin(setting.planner))),
-    }
-    # Who is refused shows zeros, which are no reason to refuse anything.
-    if not any(refusals.values()):
-        refusals["controller"] = _why(lambda: _controller_at_start(setting))
-    return "; ".join(
-        f"{name}: initialisation refused: {why}" for name, why in refusals.items() if why
+    """Why a run has no start: what the first FMU says that has none; empty: all have one."""
+    starts: tuple[tuple[str, Callable[[], str]], ...] = (
+        ("plant", lambda: misfit(setting) or _why(lambda: _plant_at_start(setting))),
+        ("planner", lambda: _why(lambda: _planner_at_start(setting))),
+        ("controller", lambda: _why(lambda: _controller_at_start(setting))),
     )
+    for name, start in starts:
+        if why := start():
+            return f"{name}: initialisation refused: {why}"
+    return ""
 
 
 def misfit(setting: Setting) -> str:
@@ -51,6 +49,14 @@ def misfit(setting: Setting) -> str:
             if value:
                 return f"{name} = {value:g} must be 0 where roll is false"
     return ""
+
+
+def _plant_at_start(setting: Setting) -> _Result:
+    return _plant(setting, *plant.begin(setting.plant, _NO_FORCE))
+
+
+def _planner_at_start(setting: Setting) -> _Result:
+    return _planner(setting, *motion_planner.begin(setting.planner))
 
 
 def _controller_at_start(setting: Setting) -> _Result:
