@@ -161,7 +161,7 @@ class Trial:
         """Whether it is the next steps that tell what was refused, since no loader does."""
         answer, is_step = self.cell.answer, self.row.function == "fmi2DoStep"
         refused = answer.fails or (answer.name == "discarded" and not is_step)
-        return refused and not self.host.library.answers
+        return refused and not self.host.library.answers and not self.row.is_unsound
 
     def _check_what_is_set(self, call: Call, before: Mapping[str, object]) -> bool:
         """Whether the call is one that changes values, and has changed those alone."""
