@@ -150,9 +150,9 @@ class Trial:
 
     def _status(self) -> Status:
         """What the call is answered with: PythonFMU knows fmi2OK, and fmi2Discard of steps."""
-        answer = self.cell.answer
-        values = self.call is not None and "items" in self.call.arguments
-        if not self._is_told_late and (self.host.library.answers or not values):
+        answer, library, call = self.cell.answer, self.host.library, self.call
+        is_get = answer.name == "refused" and call is not None and "items" in call.arguments
+        if not self._is_told_late and (library.answers or not is_get):
             return Status[answer.status.removeprefix("fmi2")]
         return Status.Discard if self.row.function == "fmi2DoStep" else Status.OK
 
