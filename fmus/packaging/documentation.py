@@ -29,27 +29,23 @@ _HTML = Path(__file__).with_name("page.html")
 _REFUSALS = """\
 ## What is refused
 
-A value out of its range or not finite, a value reference that is not there or of another type, an
-output or a fixed parameter set during the run, a call out of order, a state that no run can have
-led to: such a call changes nothing, is logged with status fmi2Discard, and raises `fault`.
-{answer} with fmi2OK, so the steps tell: **every fmi2DoStep after it ends with
-fmi2Discard and changes nothing until it is mended**, a value by a good value of the same variable,
-anything by fmi2Reset or by restoring a state.
+A value that is not finite, out of its range or no choice, an output, another value for a fixed
+parameter during the run: the call is answered with fmi2Discard, nothing of it is taken, and `fault`
+rises. So is a step whose size is negative or not finite, or whose result would not be finite:
+everything is as it was before, noise included. The run goes on with the next good call; `fault`
+stays true until fmi2Reset, or until a state is restored that had none.
 
-A step that cannot be taken, because its size is negative or not finite, or because its result would
-not be finite, ends with fmi2Discard and leaves everything as it was, noise included; the next good
-step is taken. `fault` stays true until fmi2Reset or until a state without it is restored.
+A parameter that cannot be taken before the run, a call in the wrong mode, a value reference that is
+not there or of another type, a state that no run can have led to: the call is answered with
+fmi2Error, and so is every call after it but a get, until fmi2Reset or a good state. The parameter
+raises `fault` as well. A get that is refused has no consequence, and fmi2GetReal gives the numbers
+of Integers and Booleans, too.
 
-The whole table of calls, states and bad arguments is `docs/status.md` of the project."""
+The reason is logged, even with logging off. The whole table of calls, states and bad arguments is
+`docs/status.md` of the project."""
 
 #: The place in a list of things that have members.
 _PLACE = re.compile(r"\[\d+\]\.")
-
-#: Why a refused call is not answered with another status.
-_ANSWERS = {
-    PYTHON: "PythonFMU answers it",
-    NATIVE: "Like its twin in Python, this FMU answers it",
-}
 
 _NATIVE = """\
 ## What it is made of
@@ -71,19 +67,7 @@ In Python:
     import fmpy
     result = fmpy.simulate_fmu("{name}.fmu", stop_time=10.0, output_interval=0.02)
 
-A step longer than `h_max`, where there is such a parameter, is split evenly with held inputs.
-
-{refused}"""
-
-#: What fmpy makes of a refusal, by the version of FMI.
-_REFUSED = {
-    "2": """\
-**A refused parameter does not show in a bare `fmpy.simulate_fmu`: the result has two rows, with
-`fault` true, and there is no text. Add `debug_logging=True` to read the reason.**""",
-    "3": """\
-A refused parameter ends `fmpy.simulate_fmu` at the first step, with an exception that does not say
-why. Add `debug_logging=True` to read the reason.""",
-}
+A step longer than `h_max`, where there is such a parameter, is split evenly with held inputs."""
 
 
 def page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
@@ -91,11 +75,16 @@ def page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
     module = components()[name]
     text = (folder_of(module) / "page.md").read_text(encoding="utf-8").strip()
     ports: Sequence[Port] = (*import_module(module.replace(".slave", ".ports")).PORTS, FAULT)
-    refusals = _REFUSALS.format(answer=_ANSWERS[kind]).replace("fmi2", f"fmi{fmi}")
+    refusals = _REFUSALS.replace("fmi2GetReal", "fmi3GetFloat64") if fmi == "3" else _REFUSALS
     made_of = (_NATIVE,) if kind == NATIVE else ()
     tables = _tables(ports, KINDS if fmi == "3" else {})
-    example = _EXAMPLE.format(name=name, refused=_REFUSED[fmi])
-    parts = (text, *made_of, *tables, refusals, example)
+    parts = (
+        text,
+        *made_of,
+        *tables,
+        refusals.replace("fmi2", f"fmi{fmi}"),
+        _EXAMPLE.format(name=name),
+    )
     return "\n\n".join(parts) + "\n"
 
 

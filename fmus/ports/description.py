@@ -90,7 +90,8 @@ def unit_definitions(units: Sequence[str]) -> Element:
     definitions = Element("UnitDefinitions")
     for unit in units:
         base = {name: str(exponent) for name, exponent in UNITS[unit].exponents.items()}
-        SubElement(SubElement(definitions, "Unit", name=unit), "BaseUnit", base)
+        # Some readers cannot do with an element without attributes; one is the default.
+        SubElement(SubElement(definitions, "Unit", name=unit), "BaseUnit", base or {"factor": "1"})
     return definitions
 
 

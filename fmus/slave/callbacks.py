@@ -69,11 +69,6 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
     # Refusals and messages
 
-    def _discard(self, why: str) -> None:
-        """Answer fmi2Discard: nothing that the call brings is taken."""
-        self._store.fault = True
-        self._refuse(Fmi2Status.discard, why)
-
     def _fail(self, why: str) -> None:
         """Answer fmi2Error: the call is not possible now, or not at all."""
         self._refuse(Fmi2Status.error, why)
@@ -173,7 +168,10 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         try:
             self._take(ports, vrs, values)
         except BaseException as error:
-            self._discard(explained(error))
+            # A run with another parameter than the host asked for must not begin.
+            begins = self._mode != STEPPING and any(p.causality == "parameter" for p in ports)
+            self._store.fault = True
+            self._refuse(Fmi2Status.error if begins else Fmi2Status.discard, explained(error))
         else:
             self._stale = self._stale or self._mode == INITIALISING
 
@@ -185,9 +183,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
                 raise Refusal(f"{port.name} is an output and cannot be set")
             if port.variability == "fixed" and self._mode == STEPPING:
                 if value != parameters[port.name]:
-                    raise Refusal(
-                        f"{port.name} is fixed and cannot change after initialisation"
-                    )
+                    raise Refusal(f"{port.name} is fixed and cannot change after initialisation")
                 continue
             port.checked(value)
             if port.causality == "input":

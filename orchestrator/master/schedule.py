@@ -224,6 +224,8 @@ def gathered(
     plan: Sequence[Sequence[str]],
     solved: Sequence[Sequence[str]] = (),
     order: Order = ORDERS[0],
+    *,
+    latest: bool = False,
 ) -> list[list[Connection]]:
     """The connections along which values are gathered before each stage.
 
@@ -232,6 +234,7 @@ def gathered(
         plan: its components in :func:`stages`.
         solved: rings among them, which gather by themselves what they feed themselves.
         order: of the stages.
+        latest: whether stages take all that those before them have computed.
 
     """
     stage_of = {name: i for i, names in enumerate(plan) for name in names}
@@ -243,7 +246,8 @@ def gathered(
             continue
         source, target = stage_of[start], stage_of[end]
         # What is no feedthrough is a state, and must be taken before anybody advances.
-        late = order != JACOBI and has_feedthrough(system, connection) and source < target
+        at_once = latest or (order != JACOBI and has_feedthrough(system, connection))
+        late = at_once and source < target
         found[target if late else 0].append(connection)
     return found
 
@@ -255,6 +259,8 @@ def schedule(
     instances: Mapping[str, Instance],
     row: Row,
     rings: Sequence[Ring] = (),
+    *,
+    latest: bool = False,
 ) -> list[Stage]:
     """The stages of every step.
 
@@ -265,6 +271,7 @@ def schedule(
         instances: of all components.
         row: that they are tied to.
         rings: that are solved, in stages of their own.
+        latest: whether stages take all that those before them have computed.
 
     """
     pace = paces(system, experiment.step)
@@ -273,7 +280,8 @@ def schedule(
     found: list[Stage] = []
     shown: list[Stage] = []
     nothing = Gathering.along(row, ())
-    gathers = gathered(system, plan, [ring.names for ring in rings], experiment.order)
+    solved = [ring.names for ring in rings]
+    gathers = gathered(system, plan, solved, experiment.order, latest=latest)
     for names, connections in zip(plan, gathers, strict=True):
         taken: dict[int, list[Connection]] = {1: []}
         for connection in connections:

@@ -14,7 +14,7 @@ from orchestrator.errors import InputError, StartError, reason, unforeseen
 from orchestrator.master.attendant import Attendance, Attendant, Run
 from orchestrator.master.coupling import Coupling
 from orchestrator.master.ends import to_its_end
-from orchestrator.master.experiment import LINEAR, Experiment
+from orchestrator.master.experiment import LINEAR, OURS, Exchange, Experiment
 from orchestrator.master.growth import Growth
 from orchestrator.master.instance import ComponentFailed, Ended, Instance
 from orchestrator.master.interrupts import held_interrupts
@@ -45,6 +45,7 @@ def simulate(
     isolation: Isolation | None = None,
     loop: Loop = PYTHON_LOOP,
     attendants: Sequence[Attendant] = (),
+    exchange: Exchange = OURS,
 ) -> Ending:
     """Run a system.
 
@@ -55,6 +56,7 @@ def simulate(
         isolation: run each FMU in a process of its own; None: all in this one.
         loop: makes the steps.
         attendants: act between them, in this order.
+        exchange: of values.
 
     Returns:
         How the run has ended: after a failure the observers have the rows before it.
@@ -78,7 +80,7 @@ def simulate(
             stack.enter_context(surroundings)
             loop = _possible_loop(loop, instances, log)
             row = Row(system, instances, slow)
-            coupling = Coupling(system, experiment, instances, row, log)
+            coupling = Coupling(system, experiment, instances, row, log, exchange)
             coupling.initialise()
             names = tuple(map(str, row.columns))
             parameters = _parameters(system, instances, log)
@@ -122,7 +124,12 @@ def simulate(
         return ending
 
 
-def completed(system: System, experiment: Experiment, observers: Sequence[Observer] = ()) -> None:
+def completed(
+    system: System,
+    experiment: Experiment,
+    observers: Sequence[Observer] = (),
+    exchange: Exchange = OURS,
+) -> None:
     """Run a system of which nothing less than all rows will do.
 
     Raises:
@@ -130,7 +137,7 @@ def completed(system: System, experiment: Experiment, observers: Sequence[Observ
         KeyboardInterrupt: somebody wants it to stop.
 
     """
-    ending = simulate(system, experiment, observers)
+    ending = simulate(system, experiment, observers, exchange=exchange)
     if ending.signals:
         raise KeyboardInterrupt
     if ending.failure is not None:

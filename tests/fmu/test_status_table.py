@@ -38,18 +38,13 @@ CELLS: dict[str, Cell] = {
 #: Cells that PythonFMU's own library has a part in, and no guard of ours.
 UNGUARDED = ("fmi2FreeFMUstate", CREATION, WITHOUT_AN_INSTANCE, *MODEL_EXCHANGE_FUNCTIONS)
 
-#: What is wrong with arguments that only the loader looks at.
-UNSOUND = ("NULL", "n = ", "not UTF-8", "freed", "pointer", "too few", "too many")
-
 #: Cells that hold without the native loader.
 OF_THE_SLAVE = {
     name: (key, state)
     for name, (key, state) in CELLS.items()
     if key[0] not in UNGUARDED
     and state != ERROR
-    and not (
-        rows()[key].cells[state].answer.name == ERROR and any(word in key[1] for word in UNSOUND)
-    )
+    and not (rows()[key].cells[state].answer.fails and rows()[key].is_unsound)
 }
 
 

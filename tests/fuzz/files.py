@@ -45,7 +45,7 @@ from orchestrator.experiments.bundle import current_fmus
 from orchestrator.experiments.scenario import FOLDER as SCENARIOS
 from orchestrator.experiments.scenario import read_scenario
 from orchestrator.experiments.wiring import closed_loop
-from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.experiment import ORDERS, Exchange, Experiment
 from orchestrator.master.files import CsvFile
 from orchestrator.master.observer import Observer
 from orchestrator.master.table import Table
@@ -181,7 +181,11 @@ def _tell(observer: Observer, run: Table) -> None:
 
 
 def _replay(
-    runs: Mapping[str, Table], _: object, experiment: Experiment, observers: Sequence[Observer]
+    runs: Mapping[str, Table],
+    _: object,
+    experiment: Experiment,
+    observers: Sequence[Observer],
+    __: Exchange,
 ) -> None:
     """What `verify` meets instead of a new run."""
     if experiment.stop_time > RECORDED + 1e-9:

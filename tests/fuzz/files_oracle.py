@@ -10,7 +10,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
-_ALIASES = re.compile(r"(?:auv\.|fig4\.)?([^.:]+)(?:\.|::)(.+?)(?:\[[A-Z]+\])?")
+
+#: Times whose distance is a smaller share of them are one.
+_SAME = 1e-9
 
 
 class Agreement(NamedTuple):
@@ -87,13 +89,15 @@ def _agreement(  # noqa: PLR0911  # one for each thing that can be wrong
     if None in times or not times or not times[-1]:
         return None
     known = [float(time) for time in times if time is not None]
-    if known[0] < 0 or any(a >= b for a, b in pairwise(known)):
+    if known[0] < 0 or any(a > b for a, b in pairwise(known)):
         return None
+    first = [True, *(b - a > _SAME * b for a, b in pairwise(known))]
     compared: dict[str, int] = {}
     for i, name in enumerate(names):
-        alias = _ALIASES.fullmatch(name.strip())
-        plain = f"{alias[1]}.{alias[2]}" if alias else name
-        for port in {plain, name.strip()} & run.keys() - {"time"}:
+        parts = re.sub(r"\[[A-Z]+\]$", "", name.strip()).replace("::", ".").split(".")
+        # No name of a port has more parts.
+        ends = {".".join(parts[-n:]) for n in range(2, min(len(parts), 5) + 1)}
+        for port in (ends | {name.strip()}) & run.keys() - {"time"}:
             if port in compared:
                 return None
             compared[port] = i
@@ -102,11 +106,12 @@ def _agreement(  # noqa: PLR0911  # one for each thing that can be wrong
         words = {"true": 1.0, "false": 0.0} if port in booleans else {}
         values = [words.get(cell.strip().lower(), _number(cell)) for cell in cells]
         expected = [_at(time, run["time"], run[port]) for time in known]
-        accepted = tolerance * max([1.0, *map(abs, expected)]) * (1 + 1e-9)
-        for time, value, wanted in zip(known, values, expected, strict=True):
-            if value is None or (time > 0.0 and not abs(value - wanted) <= accepted):
+        largest = max(abs(x) for x, counts in zip(expected, first, strict=True) if counts)
+        accepted = tolerance * max(1.0, largest) * (1 + 1e-9)
+        for counts, time, value, wanted in zip(first, known, values, expected, strict=True):
+            if value is None or (counts and time > 0.0 and not abs(value - wanted) <= accepted):
                 return None
-    after = [time for time in known if time > 0.0]
+    after = [time for time, counts in zip(known, first, strict=True) if counts and time > 0.0]
     return Agreement(len(compared), len(after), after[0], after[-1]) if compared else None
 
 

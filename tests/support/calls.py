@@ -299,15 +299,24 @@ def _many_to_get(draw: Draw) -> Arguments | None:
     return None if port is None else _items(Item(port.reference), times=MANY)
 
 
-@_case("fmi2SetReal", "NaN")
-def _set_nan(draw: Draw) -> Arguments | None:
-    return _item(_changeable(draw) or draw.any_of(draw.settable("Real")), nan, False)
+def _tunable(draw: Draw) -> list[Variable]:
+    found = draw.description.of("parameter", "Real")
+    return [v for v in found if v.variability == "tunable"]
 
 
-@_case("fmi2SetReal", "an infinite value")
-def _set_infinite(draw: Draw) -> Arguments | None:
-    port = _changeable(draw) or draw.any_of(draw.settable("Real"))
-    return _item(port, draw.random.choice((inf, -inf)), False)
+for _whose, _found in (
+    ("input", lambda draw: draw.description.of("input", "Real")),
+    ("parameter", lambda draw: _tunable(draw) or draw.description.of("parameter", "Real")),
+):
+    _article = "an" if _whose == "input" else "a"
+
+    @_case("fmi2SetReal", f"NaN for {_article} {_whose}")
+    def _set_nan(draw: Draw, found: Callable[[Draw], Any] = _found) -> Arguments | None:
+        return _item(draw.any_of(found(draw)), nan, False)
+
+    @_case("fmi2SetReal", f"an infinite value for {_article} {_whose}")
+    def _set_infinite(draw: Draw, found: Callable[[Draw], Any] = _found) -> Arguments | None:
+        return _item(draw.any_of(found(draw)), draw.random.choice((inf, -inf)), False)
 
 
 def _beyond(limit: float, direction: float, random: Random) -> float:
@@ -330,15 +339,20 @@ def _above(draw: Draw) -> Arguments | None:
     return _item(port, _beyond(port.maximum, inf, draw.random), False)
 
 
-@_case("fmi2SetReal", "one bad among good")
-def _one_bad(draw: Draw) -> Arguments | None:
-    ports = [v for v in draw.settable("Real") if v.variability != "fixed"]
-    if len(ports) < 2:
-        return None
-    first, second = draw.random.sample(ports, 2)
-    items = [Item(first.reference, draw.good_value(first)), Item(second.reference, nan, False)]
-    draw.random.shuffle(items)
-    return _items(*items)
+for _whose, _found in (
+    ("inputs", lambda draw: draw.description.of("input", "Real")),
+    ("parameters", _tunable),
+):
+
+    @_case("fmi2SetReal", f"one bad among good {_whose}")
+    def _one_bad(draw: Draw, found: Callable[[Draw], Any] = _found) -> Arguments | None:
+        ports = found(draw)
+        if len(ports) < 2:
+            return None
+        first, second = draw.random.sample(ports, 2)
+        items = [Item(first.reference, draw.good_value(first)), Item(second.reference, nan, False)]
+        draw.random.shuffle(items)
+        return _items(*items)
 
 
 @_case("fmi2SetReal", "an unknown reference among good")

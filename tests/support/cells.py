@@ -48,7 +48,7 @@ def check(library: Library, key: tuple[str, str], state: str, company: Company) 
     row = rows()[key]
     cell = row.cells[state]
     ways = [Trial.check_next_step]
-    if cell.answer.name in ("discarded", ERROR):
+    if cell.answer.name == "discarded" or cell.answer.fails:
         ways += [Trial.check_reset, Trial.check_restored]
     for goes_on in ways:
         with instance(library) as host:
@@ -134,7 +134,7 @@ class Trial:
         status = make(host, call, self.saved)
         assert status == self._status(), f"the status is {status.name}"
         logged = {f"fmi2{message.status.name}" for message in host.messages}
-        if self.state != ERROR or answer.name != ERROR:
+        if self.state != ERROR or not answer.fails:
             assert not answer.message or answer.message in logged, f"messages: {logged or 'none'}"
         if self.cell.leads_to != ERROR:
             self.mode = self.cell.leads_to
@@ -150,18 +150,18 @@ class Trial:
 
     def _status(self) -> Status:
         """What the call is answered with: PythonFMU knows fmi2OK, and fmi2Discard of steps."""
-        answer = self.cell.answer
-        values = self.call is not None and "items" in self.call.arguments
-        if not self._is_told_late and (self.host.library.answers or not values):
+        answer, library, call = self.cell.answer, self.host.library, self.call
+        is_get = answer.name == "refused" and call is not None and "items" in call.arguments
+        if not self._is_told_late and (library.answers or not is_get):
             return Status[answer.status.removeprefix("fmi2")]
         return Status.Discard if self.row.function == "fmi2DoStep" else Status.OK
 
     @property
     def _is_told_late(self) -> bool:
         """Whether it is the next steps that tell what was refused, since no loader does."""
-        name, is_step = self.cell.answer.name, self.row.function == "fmi2DoStep"
-        refused = name == ERROR or (name == "discarded" and not is_step)
-        return refused and not self.host.library.answers
+        answer, is_step = self.cell.answer, self.row.function == "fmi2DoStep"
+        refused = answer.fails or (answer.name == "discarded" and not is_step)
+        return refused and not self.host.library.answers and not self.row.is_unsound
 
     def _check_what_is_set(self, call: Call, before: Mapping[str, object]) -> bool:
         """Whether the call is one that changes values, and has changed those alone."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from orchestrator.analysis.metrics import indices
 from orchestrator.experiments.preparation import Prepared, Request, loaded, prepare
-from orchestrator.master.experiment import Experiment
+from orchestrator.master.experiment import Experiment, Order
 from orchestrator.master.files import CsvFile
 from orchestrator.master.loop import chosen
 from orchestrator.master.simulation import simulate
@@ -20,7 +20,7 @@ def run(
     system: System,
     stop_time: float,
     step: float,
-    order: str = "gauss-seidel",
+    order: Order = "gauss-seidel",
     loop: str = "python",
 ) -> Table:
     """All rows of a run."""

@@ -17,6 +17,8 @@ from orchestrator.exchange.verify import verify
 from orchestrator.experiments.scenario import read_scenario
 from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.library import machines_compiler
+from orchestrator.system.names import PortName
+from orchestrator.system.ssp.writing import structure_xml
 
 LIBDIR = sysconfig.get_config_var("LIBDIR")
 
@@ -33,6 +35,18 @@ def test_host_gives_the_numbers_of_our_jacobi_master(dist: Path, host: str, scen
         pytest.skip("fmpy.ssp ignores parameter sets")
     system = closed_loop(dist, read_scenario(scenario))
     [verdict] = compare(system, [host], 500, 0.02)
+    assert verdict.failure is None
+    assert verdict.deviation <= HOSTS[host].bound
+
+
+@pytest.mark.parametrize("host", ["libcosim-ssp", "ecos"])
+def test_text_in_a_parameter_set_reaches_its_component_without_a_connector(dist: Path, host: str):
+    """The other saturation moves the vehicle by 19 cm in these steps."""
+    if find_spec(HOSTS[host].package) is None:
+        pytest.skip(f"{HOSTS[host].package} is not installed")
+    system = closed_loop(dist).with_parameters({PortName("controller", "saturation"): "algebraic"})
+    assert b'name="saturation"' not in structure_xml(system)
+    [verdict] = compare(system, [host], 300, 0.02)
     assert verdict.failure is None
     assert verdict.deviation <= HOSTS[host].bound
 

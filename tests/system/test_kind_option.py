@@ -164,8 +164,9 @@ def test_export_with_fmi_3_is_an_ssp_2(workplace: Path, capsys):
         archive.extract("resources/AuvPlant.fmu")
     assert (structure.get("version"), values.get("version")) == ("2.0", "2.0")
     types = {element.tag.partition("}")[2] for element in structure.iter()}
-    assert {"Float64", "Int32", "Boolean", "String"} < types
-    assert not {"Real", "Integer"} & types
+    assert {"Float64", "Int32", "Boolean"} < types
+    assert not {"Real", "Integer", "String"} & types
+    assert values.find(".//{*}String") is not None
     assert validate_fmu("resources/AuvPlant.fmu") == []
     capsys.readouterr()
     assert main(["run", "out/fig4.ssp"]) == 2

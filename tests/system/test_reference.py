@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
+from fmpy.fmi2 import FMU2Slave
 from fmpy.util import read_csv, read_ref_opt_file
 
 from fmus.packaging.discovery import components
+from orchestrator.commands.main import main
 from orchestrator.errors import InputError
 from orchestrator.exchange.reference import reference_outputs
 from orchestrator.exchange.verify import verify
@@ -21,6 +24,10 @@ from support.runs import run, write
 
 COMMITTED = Path(__file__).parents[2] / "reference"
 NAMES = list(components())
+
+#: Orders in which tools step the components.
+ORDER = ("plant", "controller", "disturbance", "planner")
+OTHER_ORDER = ("controller", "plant", "planner", "disturbance")
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +70,7 @@ def test_table_of_another_tool_is_understood(system: System, tmp_path: Path):
     said = verify(path, system, 1e-9)
     assert "2 of 64 outputs agree to 1e-09 in 20 rows from t = 0.1 to 2 s, in jacobi order" in said
     assert "no outputs: controller.saturation" in said
-    assert "not in the table: plant.eta.y, " in said
+    assert "not in the table: 62, such as plant.eta.y, " in said
 
 
 def test_first_port_that_differs_is_named(system: System, tmp_path: Path):
@@ -73,6 +80,129 @@ def test_first_port_that_differs_is_named(system: System, tmp_path: Path):
     write(result, tmp_path / "wrong.csv")
     with pytest.raises(InputError, match=r"planner\.y_d\.z differs first, at t = 1\.2 s"):
         verify(tmp_path / "wrong.csv", system, 1e-6)
+
+
+class OtherTool:
+    """A plain loop: it steps one group of components after the other, with whatever is there."""
+
+    def __init__(self, system: System, initial: str) -> None:
+        self.feeding, self.values = system.feeding, {}
+        self.slaves, self.references, self.outputs = {}, {}, {}
+        for name, component in system.components.items():
+            described = component.description
+            slave = FMU2Slave(
+                guid=described.guid,
+                modelIdentifier=described.coSimulation.modelIdentifier,
+                unzipDirectory=str(component.folder),
+                instanceName=name,
+            )
+            slave.instantiate()
+            slave.setupExperiment(startTime=0.0)
+            slave.enterInitializationMode()
+            self.slaves[name] = slave
+            self.references[name] = {v.name: v.valueReference for v in described.modelVariables}
+            self.outputs[name] = [v.name for v in component.having("output") if v.type == "Real"]
+        # As often as values need to come round.
+        for _ in range(5 if initial == "full" else 0):
+            for name in self.slaves:
+                self.read(name)
+            for name in self.slaves:
+                self.set(name)
+        for name, slave in self.slaves.items():
+            slave.exitInitializationMode()
+            self.read(name)
+
+    def read(self, name: str) -> None:
+        held = self.slaves[name].getReal([self.references[name][p] for p in self.outputs[name]])
+        self.values |= {(name, p): x for p, x in zip(self.outputs[name], held, strict=True)}
+
+    def set(self, name: str) -> None:
+        for wire in self.feeding[name]:
+            value = self.values[wire.source.component, wire.source.port]
+            self.slaves[name].setReal([self.references[name][wire.target.port]], [value])
+
+    def rows(self, groups: Sequence[Sequence[str]]) -> list[list[float]]:
+        """Time and all values after each of 200 steps."""
+        rows = []
+        for k in range(200):
+            for group in groups:
+                for name in group:
+                    self.set(name)
+                for name in group:
+                    self.slaves[name].doStep(k * 0.02, 0.02)
+                for name in group:
+                    self.read(name)
+            rows.append([(k + 1) * 0.02, *self.values.values()])
+        return rows
+
+    def write(self, path: Path, rows: Sequence[Sequence[float]]) -> None:
+        lines = [",".join(["time", *map(".".join, self.values)])]
+        path.write_text("\n".join([*lines, *(",".join(map(repr, row)) for row in rows)]))
+
+
+@pytest.mark.parametrize("initial", ["full", "none"])
+@pytest.mark.parametrize("order", [ORDER, ("planner", *ORDER[:3]), ("plant", *ORDER[:0:-1])])
+def test_table_of_a_tool_with_an_order_of_its_own_is_certified(
+    native: Path, tmp_path: Path, order: tuple[str, ...], initial: str
+):
+    path, system = tmp_path / "table.csv", closed_loop(native)
+    tool = OtherTool(system, initial)
+    tool.write(path, tool.rows([[name] for name in order]))
+    said = verify(path, system, 1e-12, order, at_start=initial == "full")
+    compared, *_ = said.splitlines()
+    assert compared.startswith("60 of 64 outputs agree to 1e-12 in 200 rows from t = 0.02 to 4 s")
+    assert f"in the order {','.join(order)}, each with the latest outputs" in compared
+    assert compared.endswith("outputs") == (initial == "full")
+    others = ({}, {"order": order, "at_start": initial != "full"}, {"order": OTHER_ORDER})
+    for asked in others:
+        with pytest.raises(InputError, match="differs first"):
+            verify(path, system, 1e-9, **asked)
+
+
+def test_table_of_a_tool_without_an_exchange_at_the_start_is_certified(
+    native: Path, tmp_path: Path
+):
+    path, system = tmp_path / "table.csv", closed_loop(native)
+    tool = OtherTool(system, "none")
+    tool.write(path, tool.rows([ORDER]))
+    assert "in jacobi order, no values" in verify(path, system, 1e-12, at_start=False)
+    options = ["verify", str(path), "--tolerance", "1e-12"]
+    assert main([*options, "--initial", "none", "--order", "jacobi"]) == 0
+    assert main([*options, "--initial", "none", "--order", "gauss-seidel"]) == 2
+    assert main(options) == 2
+
+
+def test_own_order_by_names_is_certified(system: System, tmp_path: Path):
+    write(run(system, 2.0, 0.02, ORDER), tmp_path / "ours.csv")
+    said = verify(tmp_path / "ours.csv", system, 1e-12, ORDER)
+    assert f"as run --order {','.join(ORDER)}" in said
+
+
+def test_order_that_names_no_component_or_not_all_is_refused(system: System):
+    for order, reason in (
+        (("plant", "rudder"), "rudder"), (ORDER[1:], "names plant not at all"), ("new", "use one"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=reason):
+            verify(COMMITTED / "auv_ref.csv", system, 1e-9, order)
+
+
+@pytest.mark.parametrize("end", [4.0, 4.000000000000001])
+@pytest.mark.parametrize("prefix", ["auv.auv.", "model.root.", "a.b.c.d."])
+def test_first_row_of_a_time_counts_and_systems_may_stand_before_a_name(
+    system: System, tmp_path: Path, prefix: str, end: float
+):
+    """A tool writes one row at the end of a step, one after the exchange, and a tiny last step."""
+    [_, *names], *rows = cells(COMMITTED / "auv_ref.csv")
+    wrong = ["9"] * len(names)
+    lines = [["time", *(f"{prefix}{name}" for name in names)]]
+    for row in rows:
+        lines += [row, [row[0], *wrong]]
+    lines.append([repr(end), *wrong])
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join(map(",".join, lines)))
+    compared, passed_over, *_ = verify(path, system, 1e-9).splitlines()
+    assert compared.startswith("64 of 64 outputs agree to 1e-09 in 200 rows from t = 0.02 to 4 s")
+    assert passed_over == "passed over: 202 rows that have the time of the row before"
 
 
 def cells(path: Path) -> list[list[str]]:
@@ -100,7 +230,12 @@ def test_what_was_not_compared_is_named(system: System, tmp_path: Path):
         row += ["plant.eta.X", "comment"] if i == 0 else ["7", "said, nothing"]
     path = tmp_path / "table.csv"
     path.write_text("\n".join(",".join(f'"{cell}"' for cell in row) for row in rows))
-    compared, *others = verify(path, system, 1e-9).splitlines()
+    short = verify(path, system, 1e-9).splitlines()
+    assert short[4] == (
+        "not in the table: 62, such as plant.eta.y, plant.eta.z, plant.eta.phi, plant.eta.theta, "
+        "plant.eta.psi (--verbose names all)"
+    )
+    compared, *others = verify(path, system, 1e-9, verbose=True).splitlines()
     assert compared.startswith("2 of 64 outputs agree to 1e-09 in 100 rows from t = 0.02 to 2 s")
     assert "row at t = 0" in others[0]
     assert "stop time of 100 s" in others[1]
@@ -144,8 +279,8 @@ def test_own_run_that_fails_certifies_nothing(system: System):
         ("clock,plant.eta.x\n0,1\n1,2\n", "no column of its first line is named time"),
         ("time plant.eta.x\n0 1\n1 2\n", "no column of its first line is named time"),
         ("time,Time,plant.eta.x\n0,0,1\n1,1,2\n", "2 columns are named time"),
-        ("time,plant.eta.x\n0,1\n0,2\n", "line 3: time 0 s follows 0 s; it must grow"),
-        ("time,plant.eta.x\n0,1\n2,2\n1,2\n", "time 1 s follows 2 s"),
+        ("time,plant.eta.x\n0,1\n0,2\n", "no row after t = 0"),
+        ("time,plant.eta.x\n0,1\n2,2\n1,2\n", "line 4: time 1 s follows 2 s; it must not fall"),
         ("time,plant.eta.x\n-1,1\n1,2\n", "line 2: time -1 s is before the start"),
         ("time,plant.eta.x\n0,1\nnan,2\n1,2\n", "line 3, time: 'nan' is not finite"),
         ("time,plant.eta.x\n0,1\n", "no row after t = 0"),
@@ -159,6 +294,7 @@ def test_own_run_that_fails_certifies_nothing(system: System):
         ('time,plant.eta.x,b\n0,1,"\n1,2,"\n2,1,a\n', "line 2: a value in quotes goes on"),
         ("time,plant.eta.x,plant::eta.x[REAL]\n0,1,1\n", "columns 2 and 3 are both plant.eta.x"),
         ("time,auv.plant.eta.x,plant.eta.x\n0,1,1\n", "columns 2 and 3 are both plant.eta.x"),
+        ("time,a.b.plant::eta.x,c.plant.eta.x\n0,1,1\n", "columns 2 and 3 are both plant.eta.x"),
         ("time,controller.fault\n0,false\n1,maybe\n", "'maybe' is no number"),
         ("time,plant.eta.x\n0,true\n1,true\n", "'true' is no number"),
     ],

@@ -163,7 +163,7 @@ static int can_set(call *this) {
 struct setting {
     call *call;
     int good;
-    int retunes; /* whether there are parameters among them */
+    int tunes; /* whether there are parameters among them */
     parameter_values parameters;
     input_values inputs;
 };
@@ -179,9 +179,13 @@ static setting begin_setting(call *this, kind kind, const uint32_t references[],
     const run *run = &this->instance->run;
     setting it = {.call = this, .good = can_set(this)};
     for (size_t i = 0; i < n && it.good; i++) {
-        if (port_of(references[i], kind) != NULL) continue;
-        set_unknown(this, version.kinds[kind], &references[i], 1);
-        it.good = 0;
+        const port *port = port_of(references[i], kind);
+        if (port != NULL) {
+            it.tunes |= port->causality == PARAMETER;
+        } else {
+            set_unknown(this, version.kinds[kind], &references[i], 1);
+            it.good = 0;
+        }
     }
     it.parameters = run->parameters;
     it.inputs = run->inputs;
@@ -209,17 +213,24 @@ static int take_value(setting *it, const port *port, double number, string text,
         it->inputs.values[port->place] = number;
     } else {
         put_parameter(&it->parameters, port, number);
-        it->retunes = 1;
     }
     return 1;
 }
 
+/* A run with another parameter than the host asked for must not begin. */
+static void give_up(setting *it, message *why) {
+    it->good = 0;
+    it->call->instance->run.fault = 1;
+    if (it->tunes && it->call->instance->run.mode != STEPPING) {
+        fail(it->call, why);
+    } else {
+        discard(it->call, why, NULL);
+    }
+}
+
 static void set_value(setting *it, uint32_t reference, double number, string text) {
     message why;
-    if (it->good && !take_value(it, port_at(reference), number, text, &why)) {
-        discard(it->call, &why, NULL);
-        it->good = 0;
-    }
+    if (it->good && !take_value(it, port_at(reference), number, text, &why)) give_up(it, &why);
 }
 
 static void end_setting(setting *it) {
@@ -227,8 +238,8 @@ static void end_setting(setting *it) {
     run *run = &instance->run;
     message why;
     if (!it->good) return;
-    if (it->retunes && run->mode == STEPPING && !adopt(instance, &it->parameters, &why)) {
-        discard(it->call, &why, NULL);
+    if (it->tunes && run->mode == STEPPING && !adopt(instance, &it->parameters, &why)) {
+        give_up(it, &why);
         return;
     }
     run->parameters = it->parameters;

@@ -150,7 +150,8 @@ typedef struct {
 typedef enum { NOT_AFTER_ERROR, ALWAYS } when;
 
 /* Whether a call may be forwarded: only then it is looked at what is wrong with its arguments. */
-#define GOES_ON(call, wrong) ((call).status == FMI_OK && sound(&(call), wrong))
+#define GOES_ON(call, wrong)                                                                    \
+    ((call).instance != NULL && (call).status == FMI_OK && sound(&(call), wrong))
 
 instance *new_instance(string name, const callbacks *functions, int logging);
 void release_instance(instance *it);

@@ -28,6 +28,7 @@ SSV = f"{_SSP}ParameterValues"
 SSM = f"{_SSP}ParameterMapping"
 SSB = f"{_SSP}SignalDictionary"
 OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
+OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
 
 #: Those of the standard's own elements.
 NAMESPACES = (SSD, SSC, SSV, SSM, SSB)

@@ -15,6 +15,7 @@ _STEPS = (
     ("FixedStepAlgorithm", "baseStepSize"),
     ("FixedStepMaster", "baseStepSize"),
     ("FixedStepMaster", "stepSize"),
+    ("SimulationInformation", "fixedStepSize"),
 )
 
 #: That of a component.

@@ -9,7 +9,7 @@ from zipfile import ZipFile, ZipInfo
 
 from orchestrator.system.component import Component
 from orchestrator.system.names import file_name, plain
-from orchestrator.system.ssp import OSP, SSC, SSD, SSV, STRUCTURE
+from orchestrator.system.ssp import OMS, OSP, SSC, SSD, SSV, STRUCTURE
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.transformation import Linear, Mapped
 from orchestrator.system.units import BASES
@@ -17,6 +17,9 @@ from orchestrator.system.values import Value, literal, type_of
 
 #: Name of every parameter set: ecos applies the sets of the one name that it is given.
 PARAMETER_SET = "scenario"
+
+#: Whose annotations libcosim and ecos look for.
+_LIBCOSIM = "com.opensimulationplatform"
 
 #: Where tools draw the components: size of a box, and the distance to the next.
 _BOX, _GAP = (40.0, 60.0), 30.0
@@ -79,8 +82,9 @@ def _literal(component: Component, name: str, value: Value) -> str:
 
 
 def _register_prefixes() -> None:
-    """Libcosim accepts no other prefixes than these."""
-    for prefix, namespace in (("ssd", SSD), ("ssc", SSC), ("ssv", SSV), ("osp", OSP)):
+    """Libcosim and OMSimulator accept no other prefixes than these."""
+    prefixes = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "oms": OMS}
+    for prefix, namespace in prefixes.items():
         ElementTree.register_namespace(prefix, namespace)
 
 
@@ -93,7 +97,7 @@ def _serialised(root: ElementTree.Element) -> bytes:
 def structure_xml(system: System) -> bytes:
     """SystemStructure.ssd; connectors and units come from the FMUs' own descriptions.
 
-    libcosim needs its step size as an annotation.
+    libcosim and OMSimulator each need the step in an annotation of their own.
     """
     _register_prefixes()
     root = ElementTree.Element(
@@ -116,7 +120,7 @@ def structure_xml(system: System) -> bytes:
             )
         if component.name in system.steps:
             hint = {"value": str(system.steps[component.name])}
-            ElementTree.SubElement(_annotation(element), f"{{{OSP}}}StepSizeHint", hint)
+            ElementTree.SubElement(_annotation(element, _LIBCOSIM), f"{{{OSP}}}StepSizeHint", hint)
     # The schema has no empty list of connections.
     connections = ElementTree.Element(_ssd("Connections"))
     if system.connections:
@@ -134,6 +138,8 @@ def structure_xml(system: System) -> bytes:
             # Where units differ, it has been made of them.
             element.set("suppressUnitConversion", "true")
             _add_transformation(element, connection, system)
+    if system.step is not None:
+        _add_master(structure, system.step)
     _add_enumerations(root, system)
     _add_units(root, system)
     _add_experiment(root, system)
@@ -159,12 +165,27 @@ def _add_transformation(
             ElementTree.SubElement(table, _ssc("MapEntry"), pair)
 
 
-def _annotation(element: ElementTree.Element) -> ElementTree.Element:
-    """An annotation of an element, as libcosim and ecos look for it."""
-    annotations = ElementTree.SubElement(element, _ssd("Annotations"))
-    return ElementTree.SubElement(
-        annotations, _ssc("Annotation"), type="com.opensimulationplatform"
+def _add_master(structure: ElementTree.Element, step: float) -> None:
+    """The step, as OMSimulator looks for it: in Python the attributes, in C++ the child.
+
+    Components without a solver of their own get the one of this name. The tolerances are its own
+    defaults: those that are missing it takes for zero.
+    """
+    annotation = _annotation(structure, "org.openmodelica")
+    information = ElementTree.SubElement(
+        ElementTree.SubElement(annotation, f"{{{OMS}}}Annotations"),
+        f"{{{OMS}}}SimulationInformation",
+        {"name": "oms_ma_default", "method": "oms_ma", "fixedStepSize": str(step)},
     )
+    tolerances = dict.fromkeys(("absoluteTolerance", "relativeTolerance"), "0.0001")
+    master = {"description": "oms-ma", "stepSize": str(step), **tolerances}
+    ElementTree.SubElement(information, f"{{{OMS}}}FixedStepMaster", master)
+
+
+def _annotation(element: ElementTree.Element, of: str) -> ElementTree.Element:
+    """An annotation of an element, of some tool's."""
+    annotations = ElementTree.SubElement(element, _ssd("Annotations"))
+    return ElementTree.SubElement(annotations, _ssc("Annotation"), type=of)
 
 
 def _version(component: Component) -> str:
@@ -192,7 +213,9 @@ def _add_component(
     )
     connectors = ElementTree.SubElement(element, _ssd("Connectors"))
     for variable in component.description.modelVariables:
-        if variable.causality in ("input", "output", "parameter"):
+        # OMSimulator knows no connectors of texts; parameter sets reach variables without one.
+        is_text = variable.causality == "parameter" and variable.type == "String"
+        if variable.causality in ("input", "output", "parameter") and not is_text:
             connector = ElementTree.SubElement(
                 connectors, _ssd("Connector"), name=variable.name, kind=variable.causality
             )
@@ -250,7 +273,8 @@ def _add_experiment(root: ElementTree.Element, system: System) -> None:
     if system.stop_time is not None:
         experiment.set("stopTime", str(system.stop_time))
     if system.step is not None:
-        algorithm = ElementTree.SubElement(_annotation(experiment), f"{{{OSP}}}Algorithm")
+        annotation = _annotation(experiment, _LIBCOSIM)
+        algorithm = ElementTree.SubElement(annotation, f"{{{OSP}}}Algorithm")
         ElementTree.SubElement(
             algorithm, f"{{{OSP}}}FixedStepAlgorithm", baseStepSize=str(system.step)
         )

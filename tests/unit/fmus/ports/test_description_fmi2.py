@@ -35,7 +35,7 @@ AFTER = """
     canHandleVariableCommunicationStepSize="true" canGetAndSetFMUstate="true"
     canSerializeFMUstate="true"/>
   <UnitDefinitions>
-    <Unit name="1"><BaseUnit/></Unit>
+    <Unit name="1"><BaseUnit factor="1"/></Unit>
     <Unit name="N"><BaseUnit kg="1" m="1" s="-2"/></Unit>
     <Unit name="m"><BaseUnit m="1"/></Unit>
   </UnitDefinitions>

@@ -26,7 +26,7 @@ DESCRIPTION = """
     canBeInstantiatedOnlyOncePerProcess="false" canHandleVariableCommunicationStepSize="true"
     canGetAndSetFMUState="true" canSerializeFMUState="true"/>
   <UnitDefinitions>
-    <Unit name="1"><BaseUnit/></Unit>
+    <Unit name="1"><BaseUnit factor="1"/></Unit>
     <Unit name="m"><BaseUnit m="1"/></Unit>
     <Unit name="s"><BaseUnit s="1"/></Unit>
   </UnitDefinitions>

@@ -348,6 +348,7 @@ def test_times_and_steps_are_read_from_annotations_of_all_tools(files, tmp_path:
         ("FixedStepAlgorithm", "baseStepSize"),
         ("FixedStepMaster", "baseStepSize"),
         ("FixedStepMaster", "stepSize"),
+        ("SimulationInformation", "fixedStepSize"),
     ):
         after = (
             "<ssd:DefaultExperiment startTime='-2' stopTime='3'><ssd:Annotations><ssc:Annotation "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 from zipfile import ZipFile
@@ -15,6 +16,7 @@ from orchestrator.system.component import read_component
 from orchestrator.system.container import write_container
 from orchestrator.system.names import plain
 from orchestrator.system.osp import write_osp
+from orchestrator.system.ssp import OMS
 from orchestrator.system.ssp.reading import read_ssp
 from orchestrator.system.ssp.writing import write_ssp
 from orchestrator.system.structure import System
@@ -85,15 +87,45 @@ def test_system_that_is_written_and_read_is_the_same(found: System, tmp_path: Pa
     assert contents[0] == contents[1]
 
 
-def test_what_is_written_is_valid(found: System, tmp_path: Path):
+@pytest.mark.parametrize("step", [None, 0.02])
+def test_what_is_written_is_valid(found: System, tmp_path: Path, step: float | None):
     """fmpy holds it against the schemas of SSP 1.0."""
-    [path] = write_ssp(found, tmp_path)
+    [path] = write_ssp(replace(found, step=step), tmp_path)
     read_ssd(str(path))
     with ZipFile(path) as content:
         sets = [name for name in content.namelist() if name.endswith(".ssv")]
     assert len(sets) == 2
     for name in sets:
         read_ssv(str(path), name)
+
+
+@pytest.mark.parametrize("step", [0.02, 0.0125])
+def test_omsimulator_is_told_the_step_where_it_looks_for_it(
+    found: System, tmp_path: Path, step: float
+):
+    """Its Python side takes the attributes, its C++ side the child, by literal prefixes."""
+    [path] = write_ssp(replace(found, step=step), tmp_path)
+    with ZipFile(path) as content:
+        text = content.read("SystemStructure.ssd").decode()
+    root = ElementTree.fromstring(text)
+    way = "./{*}System/{*}Annotations/{*}Annotation[@type='org.openmodelica']/{*}Annotations/"
+    [information] = root.findall(f"{way}{{{OMS}}}SimulationInformation")
+    assert information.attrib == {
+        "name": "oms_ma_default", "method": "oms_ma", "fixedStepSize": str(step),
+    }  # fmt: skip
+    [master] = information
+    assert master.tag == f"{{{OMS}}}FixedStepMaster"
+    assert (master.get("description"), float(master.get("stepSize", ""))) == ("oms-ma", step)
+    for element in ("ssd:System ", "ssc:Annotation ", "oms:Annotations>", "oms:FixedStepMaster "):
+        assert f"<{element}" in text
+    assert f'<osp:FixedStepAlgorithm baseStepSize="{step}" />' in text
+    root_element = text[text.index("<ssd:SystemStructureDescription") :].partition(">")[0]
+    assert "xmlns:osp=" in root_element and "xmlns:oms=" in root_element
+    # Without libcosim's annotation it is what is left to be read.
+    other = text.replace("FixedStepAlgorithm", "Another")
+    with ZipFile(path) as content:
+        files = {name: content.read(name) for name in content.namelist() if name.count("/")}
+    assert read_ssp(archive(tmp_path / "other.ssp", other, files)).step == step
 
 
 def test_formats_without_words_for_a_transformation_refuse_it(found: System, tmp_path: Path):
