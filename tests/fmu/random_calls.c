@@ -129,7 +129,8 @@ static int state(handle c) {
 
 static int mode(handle c) {
     static const char *const names[] = {"EnterInitializationMode", "ExitInitializationMode",
-                                        "Reset", "Reset", "Terminate", "CancelStep"};
+                                        "Reset", "Reset", "Terminate", "CancelStep",
+                                        "EnterEventMode", "EnterContinuousTimeMode"};
     if (once_in(3)) {
         return CALL("SetupExperiment", "", (handle, int, double, double, int, double))(
             c, 0, 0.0, 0.0, 0, 0.0);

@@ -17,7 +17,7 @@ from pathlib import Path
 import fmpy
 import pytest
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import fmi2Discard
+from fmpy.fmi2 import fmi2Discard, fmi2Error
 from fmpy.validation import validate_fmu
 
 import auv_fmu
@@ -123,12 +123,12 @@ def test_two_instances_do_not_know_of_each_other(fmu: FmuInstance):
 def test_bad_input_ends_in_discard_and_fault_not_in_a_crash(fmu: FmuInstance, bad: float):
     fmu.initialise().run(0, 5)
     before = fmu.outputs()
-    fmu.fmu.setReal(fmu.references("input")[:1], [bad])
     with pytest.raises(FMICallException) as failure:
-        fmu.step()
+        fmu.fmu.setReal(fmu.references("input")[:1], [bad])
     assert failure.value.status == fmi2Discard
     assert fmu.get("fault")
     assert fmu.outputs() == before
+    fmu.step()
     fmu.excite(6)
     fmu.step()
 
@@ -143,13 +143,21 @@ def test_bad_input_ends_in_discard_and_fault_not_in_a_crash(fmu: FmuInstance, ba
         ("DisturbanceGenerator", "A_f", inf),
     ],
 )
-def test_wrong_parameter_ends_in_discard(dist, tmp_path, name, parameter, value):
+def test_no_run_begins_with_another_parameter(dist, tmp_path, name, parameter, value):
     with unpacked(dist / f"{name}.fmu", tmp_path) as fmu:
-        fmu.initialise(**{parameter: value})
-        assert fmu.get("fault")
         with pytest.raises(FMICallException) as failure:
-            fmu.step()
-        assert failure.value.status == fmi2Discard
+            fmu.initialise(**{parameter: value})
+        assert failure.value.status == fmi2Error
+        assert fmu.get("fault")
+        with pytest.raises(FMICallException):
+            fmu.fmu.enterInitializationMode()
+        fmu.fmu.reset()
+        fmu.initialise().step()
+        assert not fmu.get("fault")
+        with pytest.raises(FMICallException) as failure:
+            fmu.set(**{parameter: value})
+        assert failure.value.status == fmi2Discard, "the run goes on with the one that it has"
+        fmu.step()
 
 
 @pytest.mark.parametrize("h", [-0.02, nan])
@@ -171,11 +179,31 @@ def test_zero_and_long_steps_are_accepted(fmu: FmuInstance):
     assert not fmu.get("fault")
 
 
-def test_unknown_value_reference_does_not_end_the_process(fmu: FmuInstance):
+def test_unknown_value_reference_is_an_error_and_not_the_end_of_the_process(fmu: FmuInstance):
     fmu.initialise()
-    fmu.fmu.getReal([4711])
-    fmu.fmu.setReal([4711], [1.0])
-    assert fmu.get("fault")
+    for call in (lambda: fmu.fmu.getReal([4711]), lambda: fmu.fmu.setReal([4711], [1.0])):
+        fmu.step()
+        with pytest.raises(FMICallException) as failure:
+            call()
+        assert failure.value.status == fmi2Error
+    with pytest.raises(FMICallException) as failure:
+        fmu.step()
+    assert failure.value.status == fmi2Error
+    assert not fmu.get("fault")
+    fmu.fmu.reset()
+    fmu.initialise().step()
+
+
+def test_all_numbers_can_be_read_with_the_function_for_reals(fmu: FmuInstance):
+    """There are hosts that read all outputs so."""
+    fmu.initialise().run(0, 5)
+    for name, variable in fmu.variables.items():
+        if variable.kind != "String":
+            assert fmu.fmu.getReal([variable.reference]) == [float(fmu.get(name))]
+    with pytest.raises(FMICallException):
+        fmu.step(-1.0)
+    assert fmu.fmu.getReal([fmu.variables["fault"].reference]) == [1.0]
+    fmu.step()
 
 
 def test_many_instances_leave_the_interpreter_as_it_was(dist: Path, tmp_path: Path):

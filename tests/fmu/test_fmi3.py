@@ -246,6 +246,41 @@ def test_creation(plant: Fmi3Library, case: str):
     host.free()
 
 
+def test_token_may_be_in_capitals_and_without_braces(plant: Fmi3Library):
+    stated = plant.description.guid.encode()
+    for token in (stated.upper(), stated.strip(b"{}").upper(), None, b""):
+        with instance(plant, guid=token) as host:
+            assert host.messages == []
+
+
+def test_what_is_refused_is_told_with_logging_off(plant: Fmi3Library):
+    """Each in its call, and answered again where it is not told again."""
+    force, mass, place = (plant.description.find(n).reference for n in ("tau.u", "m11", "eta.x"))
+    for status, call in (
+        (Status.Discard, lambda host: host.set("Real", [force], [nan])),
+        (Status.Discard, lambda host: host.set("Real", [force, mass], [1.0, 77.0])),
+        (Status.Discard, lambda host: host.set("Real", [place], [1.0])),
+        (Status.Discard, lambda host: host.step(0.0, -1.0)),
+        (Status.Error, lambda host: host.get("Real", [0])[0]),
+        (Status.Error, lambda host: host.get("Boolean", [force])[0]),
+        (Status.Error, lambda host: host.set("Real", [0], [1.0])),
+        (Status.Error, lambda host: host.exit()),
+    ):
+        with instance(plant, logging=False) as host:
+            assert host.setup() == host.enter() == host.exit() == Status.OK
+            assert host.messages == []
+            assert [call(host), call(host)] == [status] * 2
+            assert [message.status for message in host.messages] == [status]
+            assert host.fault() is (status == Status.Discard)
+            assert host.get("Real", [force]) == (Status.OK, [0.0])
+
+
+def test_references_begin_at_one(library: Fmi3Library):
+    """In the order of the variables: some hosts take them for indices."""
+    references = [variable.reference for variable in library.description.variables]
+    assert references == [*range(1, len(references) + 1)]
+
+
 class Own:
     """What is tried of the second table: each gives the answer."""
 
