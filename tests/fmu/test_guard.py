@@ -11,6 +11,7 @@ import gc
 import math
 import os
 import shutil
+import subprocess
 import sys
 import threading
 from collections.abc import Iterator
@@ -695,6 +696,52 @@ def test_threads_that_make_instances_leave_the_process_as_it_was(
         thread.join()
     assert answers == [OK] * 60
     assert sys.path == before
+
+
+#: Forks while a thread makes an instance, which takes its time; what the child makes is its status.
+FORKS = """
+import os, sys, threading
+from pathlib import Path
+from support.raw_fmi import RawFmu
+
+slow, quick = map(RawFmu, map(Path, sys.argv[1:]))
+thread = threading.Thread(target=slow.instantiate)
+thread.start()
+while not hasattr(sys, "is_being_made"):
+    thread.join(0.01)
+child = os.fork()
+if child == 0:
+    os._exit(0 if quick.instantiate() else 1)
+_, status = os.waitpid(child, 0)
+assert status == 0
+assert quick.instantiate(), "after the other"
+"""
+
+SLOW = """
+import sys, time
+from pythonfmu import Fmi2Slave
+
+class Slow(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        if kwargs.get("resources"):
+            sys.is_being_made = True
+            time.sleep(1.0)
+
+    def do_step(self, t, h):
+        return True
+"""
+
+
+def test_child_that_is_forked_waits_for_no_thread_of_its_parent(python_folder, tmp_path):
+    (tmp_path / "slow.py").write_text(SLOW)
+    fmpy.extract(build_own(tmp_path / "slow.py", tmp_path), unzipdir=tmp_path / "slow")
+    subprocess.run(
+        [sys.executable, "-c", FORKS, tmp_path / "slow", python_folder],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        check=True,
+        timeout=30,
+    )
 
 
 # Slaves of other people

@@ -23,16 +23,18 @@ enum { WAIT = 100 };
 
 typedef struct {
     pthread_mutex_t lock; /* for starting; the interpreter lock is never waited for under it */
-    pthread_mutex_t making; /* of an instance, which changes sys.path; only tried for */
     enum { UNTRIED, RUNS, FAILED } python;
-    uint64_t serial; /* of the last handle; under the interpreter lock */
+    /* Under the interpreter lock: */
+    uint64_t serial; /* of the last handle */
+    int making;      /* how many instances a thread makes, one within the other */
+    pthread_t maker;
+    pid_t family; /* the process that it is in: a child that is forked lacks the thread */
     char why[WHY];
 } process_state;
 
 /* The name carries a number, which another layout raises. */
 EXPORT process_state auv_fmu_process_2 = {
     .lock = PTHREAD_MUTEX_INITIALIZER,
-    .making = PTHREAD_RECURSIVE_MUTEX_INITIALIZER_NP,
 };
 __asm__(".type auv_fmu_process_2, %gnu_unique_object");
 #define process auv_fmu_process_2
@@ -174,13 +176,20 @@ int python_runs(void) { return has_loaded() && py.Py_IsInitialized(); }
 
 void *pythonfmu_function(string name) { return dlsym(pythonfmu, name); }
 
-/* Waits until no other thread makes an instance, of any FMU. The interpreter lock is given away
- * meanwhile: a thread that makes one needs it. */
+/* Waits until no other thread makes an instance, of any FMU, which changes sys.path. The interpreter
+ * lock is given away meanwhile: a thread that makes one needs it. */
 void begin_making(void) {
-    while (pthread_mutex_trylock(&process.making) != 0) wait_without_lock();
+    while (process.making > 0 && process.family == getpid() &&
+           !pthread_equal(process.maker, pthread_self())) {
+        wait_without_lock();
+    }
+    if (process.family != getpid()) process.making = 0;
+    process.family = getpid();
+    process.maker = pthread_self();
+    process.making++;
 }
 
-void end_making(void) { pthread_mutex_unlock(&process.making); }
+void end_making(void) { process.making--; }
 
 /* Lets other threads have the interpreter lock for a while. */
 void wait_without_lock(void) {
