@@ -177,7 +177,10 @@ static void set_unknown(call *this, string kind, const uint32_t references[], si
 
 static setting begin_setting(call *this, kind kind, const uint32_t references[], size_t n) {
     const run *run = &this->instance->run;
-    setting it = {.call = this, .good = can_set(this)};
+    setting it;
+    it.call = this;
+    it.good = can_set(this);
+    it.tunes = 0;
     for (size_t i = 0; i < n && it.good; i++) {
         const port *port = port_of(references[i], kind);
         if (port != NULL) {
@@ -187,7 +190,7 @@ static setting begin_setting(call *this, kind kind, const uint32_t references[],
             it.good = 0;
         }
     }
-    it.parameters = run->parameters;
+    if (it.tunes) it.parameters = run->parameters;
     it.inputs = run->inputs;
     return it;
 }
@@ -242,7 +245,7 @@ static void end_setting(setting *it) {
         give_up(it, &why);
         return;
     }
-    run->parameters = it->parameters;
+    if (it->tunes) run->parameters = it->parameters;
     run->inputs = it->inputs;
     if (run->mode == INITIALISING) instance->stale = 1;
 }
