@@ -125,4 +125,5 @@ def _is_tame(port: Variable, value: object) -> bool:
         return port.name != "roll" or bool(value)
     if value in (port.minimum, port.maximum):
         return False
-    return value == 0.0 or SMALLEST_TAME <= abs(value) <= LARGEST_TAME
+    # Only what is drawn to be extreme is -0.0, where a way may come back to itself.
+    return repr(value) == "0.0" or SMALLEST_TAME <= abs(value) <= LARGEST_TAME
