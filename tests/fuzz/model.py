@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from support.calls import SAME, Call
+from support.calls import ODD_TRUTH, SAME, Call
 from support.raw import Description, Status, Variable
 from support.status_table import ERROR, MODES, Cell, rows
 
@@ -47,10 +47,11 @@ class Model:
     def cell(self, call: Call) -> Cell:
         """What the table says to a call."""
         case = call.case
-        if case.startswith(_FIXED):
+        if case in (_FIXED, SAME, ODD_TRUTH):
             [item] = call.arguments["items"]
             port = self._port_of(call, item.reference)
-            case = SAME if item.value == self.values.get(port.name, port.start) else _FIXED
+            same = _meant(port, item.value) == self.values.get(port.name, port.start)
+            case = SAME if same else _FIXED
         return rows()[call.function, case].cells[self.state]
 
     def after(self, call: Call, saved: Mapping[str, Model]) -> Model:
@@ -91,7 +92,7 @@ class Model:
         elif call.function.startswith("fmi2Set") and "items" in call.arguments:
             for item in call.arguments["items"]:
                 port = self._port_of(call, item.reference)
-                self.values = {**self.values, port.name: item.value}
+                self.values = {**self.values, port.name: _meant(port, item.value)}
                 self.wild = self.wild or not _is_tame(port, item.value)
 
 
@@ -116,6 +117,10 @@ def keep(saved: dict[str, Model], call: Call, known: Model) -> None:
         saved[slot_of(call)] = replace(known, in_error=False)
     elif call.function == "fmi2FreeFMUstate" and "slot" in call.arguments:
         del saved[slot_of(call)]
+
+
+def _meant(port: Variable, value: Any) -> Any:
+    return bool(value) if port.kind == "Boolean" else value
 
 
 def _is_tame(port: Variable, value: object) -> bool:

@@ -164,6 +164,9 @@ class Draw:
         return [*of("input", kind), *of("parameter", kind)]
 
 
+#: The case of a Boolean that is no truth value of C.
+ODD_TRUTH = "neither 0 nor 1, which is true"
+
 #: The case of a fixed parameter that keeps its value.
 SAME = "a fixed parameter, to the value that it has"
 
@@ -382,7 +385,7 @@ def _numbers(draw: Draw) -> Arguments | None:
     return _items(*(Item(v.reference) for v in draw.description.variables if v.kind in kinds))
 
 
-@_case("fmi2SetBoolean", "neither 0 nor 1, which is true")
+@_case("fmi2SetBoolean", ODD_TRUTH)
 def _odd_boolean(draw: Draw) -> Arguments | None:
     found = draw.description.of("parameter", "Boolean")
     port = draw.any_of([variable for variable in found if not draw.value(variable)])
