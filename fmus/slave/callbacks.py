@@ -17,6 +17,7 @@ from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
 from fmus.ports.port import Port, Refusal, Value
+from fmus.slave.scripts import place
 from fmus.slave.store import MISSING, Store
 
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = MODES = (
@@ -196,4 +197,6 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
 def explained(error: BaseException) -> str:
     """What speaks against something; what is no refusal of ours is named as what it is."""
-    return str(error) if isinstance(error, Refusal) else f"{type(error).__name__}: {error}"
+    if isinstance(error, Refusal):
+        return str(error)
+    return f"{place(error)}{type(error).__name__}: {error}"
