@@ -125,8 +125,8 @@ def _run(options: argparse.Namespace) -> int:
     runs = with_companion(prepare(*read(options), wanted), wanted)
     findings = Findings(options.strict)
     for prepared in runs:
-        if found := prepared.open_inputs():
-            findings.note(f"{prepared.scenario.name}: {found}")
+        for doubt in prepared.doubts():
+            findings.note(f"{prepared.scenario.name}: {doubt}")
     findings.refuse()
     for note in findings.notes:
         say(f"warning: {note}")
