@@ -27,7 +27,7 @@ _SOURCE = Path(__file__).with_name("stepper.c")
 #: Products are not contracted with sums: t + h must not depend on the processor.
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC")
 
-#: C compilers, the first of which is taken that there is.
+#: C compilers, the first of which is taken that there is. The packaging has the same.
 COMPILERS = ("cc", "gcc", "clang")
 
 #: What it is in the user's cache folder.
