@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestrator.errors import InputError, last_line, reason
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.library import COMPILERS, machines_compiler, run_compiler
+from orchestrator.master.library import COMPILERS, LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.master.schedule import gathered, stages
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
@@ -47,7 +47,7 @@ def compiled(folder: Path, command: Sequence[str] = (), name: str = "host") -> P
     if program.suffix != ".exe":
         options.append("-ldl")  # until glibc 2.34, dlopen is in a library of its own
     try:
-        process = run_compiler([*found, *options])
+        process = run_compiler([*found, *options], LIMIT_OF_ZIG if command else None)
     except OSError as error:
         raise InputError(f"{SOURCE.name} does not compile: {reason(error)}") from error
     if process.returncode != 0:
