@@ -43,8 +43,10 @@ def compiled(folder: Path, command: Sequence[str] = (), name: str = "host") -> P
     if found[0] is None:
         raise InputError(f"there is no C compiler: neither {' nor '.join(COMPILERS)}")
     program = folder / name
-    options = ["-std=c99", "-O2", "-o", str(program), str(SOURCE)]
-    if program.suffix != ".exe":
+    is_windows = program.suffix == ".exe"
+    # For Windows as the libraries: ziglang makes a C library for every level, which takes minutes.
+    options = ["-std=c99", "-Os" if is_windows else "-O2", "-o", str(program), str(SOURCE)]
+    if not is_windows:
         options.append("-ldl")  # until glibc 2.34, dlopen is in a library of its own
     try:
         process = run_compiler([*found, *options], LIMIT_OF_ZIG if command else None)
