@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -29,6 +31,27 @@ settings.register_profile("attack", settings.get_profile("patient"), max_example
 # does all that they start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
+#: What a reason says beside the name of what is missing.
+_MISSING = re.compile(r"^(there is |there are )?no | (is|are) not installed$")
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Note what a test would be skipped without."""
+    for mark in item.iter_markers("skipif"):
+        item.user_properties.append(("needs", _MISSING.sub("", mark.kwargs["reason"])))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say what not every machine has, and how many tests ran with it or were skipped, and why."""
+    passed, skipped = (terminalreporter.stats.get(name, []) for name in ("passed", "skipped"))
+    needs = Counter(need for report in passed for _, need in report.user_properties)
+    reasons = Counter(report.longrepr[2].removeprefix("Skipped: ") for report in skipped)
+    for what, counter in (("ran with", needs), (f"skipped {len(skipped)}", reasons)):
+        if counter:
+            counts = ", ".join(f"{name} {n}" for name, n in counter.most_common())
+            terminalreporter.write_line(f"{what}: {counts}")
 
 
 @pytest.fixture(scope="session", autouse=True)

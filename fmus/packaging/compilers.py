@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from fmus.packaging.loader import compiler, run_compiler
+from fmus.packaging.loader import machines_compiler, run_compiler
 from fmus.packaging.platforms import TARGETS, Platform, this_machine
 from fmus.packaging.universal import universal
 
@@ -28,6 +28,10 @@ _SMALL = ("-Os",)
 #: For the linker of Linux: no trace of when and where, and no padding to whole pages.
 _LINUX = ("-Wl,--build-id=none", "-Wl,-z,noseparate-code")
 
+#: What each compiler takes for the name of a machine: ziglang, and Apple's.
+_ZIG = {machine: ("-target", target) for machine, target in TARGETS.items()}
+_APPLE = {"x86_64-darwin": ("-arch", "x86_64"), "aarch64-darwin": ("-arch", "arm64")}
+
 #: How long this machine's compiler may take [s], and ziglang, which makes a C library, too.
 _LIMIT, _LIMIT_OF_ZIG = 120.0, 900.0
 
@@ -38,13 +42,13 @@ class Compiler(NamedTuple):
     Attributes:
         name: with its version.
         command: that runs it, with options of its own.
-        targets: whether it makes libraries for all machines, and is told for which.
+        targets: what it is told for each machine, if it makes libraries for several.
 
     """
 
     name: str
     command: Sequence[str]
-    targets: bool
+    targets: Mapping[str, Sequence[str]]
 
 
 def compiler_for(platforms: Sequence[Platform]) -> Compiler:
@@ -54,16 +58,19 @@ def compiler_for(platforms: Sequence[Platform]) -> Compiler:
         OSError: there is none.
 
     """
-    own = compiler()
-    others = [platform.name for platform in platforms if platform.machines != (this_machine(),)]
-    if own is not None and not others:
-        return Compiler(_version_of(own), [own, *_LINUX], targets=False)
+    own, machine = machines_compiler(), this_machine()
+    targets = _APPLE if machine in _APPLE else {}
+    can = {machine, *targets}
+    others = [platform.name for platform in platforms if not can.issuperset(platform.machines)]
+    if own is not None and not others and not machine.endswith("-windows"):
+        options = _LINUX if machine.endswith("-linux") else ()
+        return Compiler(_version_of(own), [own, *options], targets)
     if find_spec("ziglang") is not None:
         command = [sys.executable, "-m", "ziglang", "cc"]
-        return Compiler(f"ziglang {version('ziglang')}", command, targets=True)
+        return Compiler(f"ziglang {version('ziglang')}", command, _ZIG)
     names = ", ".join(others or [platform.name for platform in platforms])
     remedy = "pip install 'auv-fmu[native]' brings one"
-    if not others and this_machine().endswith("-linux"):
+    if not others and machine.endswith("-linux"):
         remedy = f"install gcc or clang, or {remedy}"
     raise OSError(f"there is no C compiler for {names}: {remedy}")
 
@@ -96,10 +103,10 @@ def library(
         made = Path(folder, f"{name}{platform.ending}")
         libraries = []
         for machine in platform.machines:
-            target = ("-target", TARGETS[machine]) if compiler.targets else ()
+            target = compiler.targets.get(machine, ())
             size = _SMALL if machine.endswith("-windows") else _NO_TABLES
             options = [*target, *FLAGS, *size, "-o", made.name, main, "-lm"]
-            limit = _LIMIT_OF_ZIG if compiler.targets else _LIMIT
+            limit = _LIMIT_OF_ZIG if compiler.targets is _ZIG else _LIMIT
             process = run_compiler([*compiler.command, *options], Path(folder), limit)
             if process.returncode != 0:
                 raise OSError(

@@ -26,6 +26,15 @@ from {module} import {component}
 settle({component}, globals(), locals())
 """
 
+#: The same for a user's slave, which may raise.
+_OWN_SCRIPT = """\
+from fmus.slave.loading import settle
+from fmus.slave.scripts import caught
+from {module} import {component}
+
+settle(caught({component}), globals(), locals())
+"""
+
 #: How FMUs are loaded: by a library of our own, or by PythonFMU's.
 LOADERS = ("native", "plain")
 
@@ -33,7 +42,8 @@ LOADERS = ("native", "plain")
 def _stage(component: str, module: str, stage: Path, script: str, own: Path | None) -> Path:
     """Lay out a script and the modules it needs the way PythonFMU wants them."""
     path = stage / f"{script}.py"
-    path.write_text(_SCRIPT.format(module=module, component=component), encoding="utf-8")
+    text = _SCRIPT if own is None else _OWN_SCRIPT
+    path.write_text(text.format(module=module, component=component), encoding="utf-8")
     roots = [folder.parent for folder in _FOLDERS.values()]
     finder = ModuleFinder(path=[str(root) for root in (*roots, *([own] if own else []))])
     finder.run_script(str(path))

@@ -23,6 +23,9 @@ _DESCRIPTION = "modelDescription.xml"
 _GUID_FILE = "resources/guid.txt"
 _GUID = re.compile(rb'guid="[^"]*"')
 
+#: `import`, and the modules after it.
+_IMPORT = re.compile(r"^(\s*import\s+)([\w., \t]*\w)", re.MULTILINE)
+
 #: The oldest time a zip archive can hold: the time of a build is no part of its result.
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
@@ -82,13 +85,33 @@ def _renamed(entries: dict[str, bytes], suffix: str) -> dict[str, bytes]:
         if name.startswith(_RESOURCES) and name.endswith(".py")
     }
     alternatives = "|".join(sorted(map(re.escape, modules)))
-    import_statement = re.compile(rf"^(\s*(?:from|import)\s+(?:{alternatives}))\b", re.MULTILINE)
+    from_module = re.compile(rf"^(\s*from\s+(?:{alternatives}))\b", re.MULTILINE)
+    imported = re.compile(rf"^({alternatives})((?:\.\w+)*)(\s+as\s+\w+)?$")
+
+    def import_statement(found: re.Match[str]) -> str:
+        """The same modules, and the names that the script has for them."""
+        wanted = [
+            imported.sub(lambda one: _under_its_name(one, suffix), name.strip())
+            for name in found[2].split(",")
+        ]
+        return found[1] + ", ".join(wanted)
+
     resource = re.compile(rf"^({_RESOURCES}(?:{alternatives}))(?=/|\.py$)")
     renamed = {}
     for name, content in entries.items():
         if name.startswith(_RESOURCES) and name.endswith(".py"):
-            content = import_statement.sub(rf"\1_{suffix}", content.decode("utf-8")).encode()
+            text = from_module.sub(rf"\1_{suffix}", content.decode("utf-8"))
+            content = _IMPORT.sub(import_statement, text).encode()
         elif name == _SLAVE_MODULE:
             content = content.strip() + f"_{suffix}".encode()
         renamed[resource.sub(rf"\1_{suffix}", name)] = content
     return renamed
+
+
+def _under_its_name(imported: re.Match[str], suffix: str) -> str:
+    """One module of an import statement, so that it is still found under its own name."""
+    top, below, other_name = imported.groups(default="")
+    sealed = f"{top}_{suffix}"
+    if other_name:
+        return f"{sealed}{below}{other_name}"
+    return f"{sealed}{below}, {sealed} as {top}" if below else f"{sealed} as {top}"

@@ -9,5 +9,6 @@ module               what it states
 :mod:`.state`        the state of an FMU, complete, exact and checked
 :mod:`.shape`        the shape of a component's own state, as its type says it
 :mod:`.loading`      making up for what PythonFMU does to a process
+:mod:`.scripts`      mistakes in a user's script: told with their line, kept from PythonFMU
 ==================== ===============================================================
 """

@@ -17,7 +17,8 @@ from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
 from fmus.ports.port import Port, Refusal, Value
-from fmus.slave.loading import has_loader
+from fmus.slave.loading import ANSWER, has_loader
+from fmus.slave.scripts import place
 from fmus.slave.store import MISSING, Store
 
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = MODES = (
@@ -32,9 +33,6 @@ MOST_MESSAGES = 100
 
 #: Characters of a message: some hosts have a buffer of 1 or 2 kB for them.
 LONGEST_MESSAGE = 500
-
-#: Category of a log entry that tells the native loader the status of the call.
-ANSWER = "answer"
 
 
 class Callbacks(Fmi2Slave):  # type: ignore[misc]
@@ -197,4 +195,6 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
 def explained(error: BaseException) -> str:
     """What speaks against something; what is no refusal of ours is named as what it is."""
-    return str(error) if isinstance(error, Refusal) else f"{type(error).__name__}: {error}"
+    if isinstance(error, Refusal):
+        return str(error)
+    return f"{place(error)}{type(error).__name__}: {error}"

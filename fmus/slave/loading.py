@@ -21,6 +21,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
+#: Category of a log entry that tells the native loader the status of the call.
+ANSWER = "answer"
+
 
 def settle(slave: type, module: dict[str, Any], found: dict[str, Any]) -> None:
     """To be called by the script of a slave, as its last statement, when all is imported.

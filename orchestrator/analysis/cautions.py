@@ -1,4 +1,4 @@
-"""Gains that the step cannot follow: known before a run, or seen in it."""
+"""What gives numbers that may not be meant: known before a run, or seen in it."""
 
 from __future__ import annotations
 
@@ -7,10 +7,20 @@ import numpy as np
 from auv_fmu.observer import EXACT, FORMS, exact_gain
 from auv_fmu.proof.gain_conditions import bounds
 from auv_fmu.proof.sampling import observer_rate, robust_rate
-from orchestrator.analysis.signals import ELL, THETA_HAT, VEHICLE, Y_D, parameter, vehicle
+from orchestrator.analysis.signals import (
+    CONTROLLER,
+    ELL,
+    LIMITS,
+    PLANNER,
+    THETA_HAT,
+    VEHICLE,
+    Y_D,
+    parameter,
+    vehicle,
+)
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.table import Table
-from orchestrator.system.names import port_name
+from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 
 _K_D, _LAMBDA, _EPS_T = "controller.k_d", "controller.lambda", "controller.eps_t"
@@ -46,6 +56,40 @@ def cautions(system: System, experiment: Experiment) -> list[str]:
         f"{_K_D} = {value(_K_D):g} 1/s is unstable with internal steps of {h:g} s: the observer's "
         f"fastest mode has h p = {h_p:.3g} and grows above {_GROWS:g}; lower k_d or h_max"
     ]
+
+
+def differing_vehicle(system: System) -> str | None:
+    """Where controller or planner hold other values of the vehicle than the plant, in words.
+
+    Returns:
+        One line; None: nowhere.
+
+    """
+    texts, others = [], set()
+    for name in map(port_name, (ELL, *VEHICLE, *LIMITS)):
+        true, held = _parameter(system, name), dict[float, list[str]]()
+        for other in (CONTROLLER, PLANNER):
+            same = PortName(other, name.port)
+            value = _parameter(system, same)
+            if true is not None and value is not None and value != true:
+                held.setdefault(value, []).append(str(same))
+                others.add(other)
+        for value, names in held.items():
+            texts.append(f"{name} = {true:.12g}, but {' = '.join(names)} = {value:.12g}")
+    if not texts:
+        return None
+    made = "is" if len(others) == 1 else "are"
+    return f"{'; '.join(texts)}: {' and '.join(sorted(others))} {made} set for another vehicle"
+
+
+def _parameter(system: System, name: PortName) -> float | None:
+    """The value of a parameter that is a number; None: there is none of the name."""
+    if not system.has(name):
+        return None
+    variable = system.component(name.component).variables[name.port]
+    is_one = (variable.causality, variable.type) == ("parameter", "Real")
+    value = system.value(name) if is_one else None
+    return None if value is None else float(value)
 
 
 def cautions_after(table: Table) -> list[str]:

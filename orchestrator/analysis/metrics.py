@@ -80,7 +80,8 @@ class Metrics:
         found: dict[str, list[float]] = {}
         if self._effort is not None and self._effort.steps:
             found |= self._effort.indices()
-        if self._has_error:
+        # Before the first step nothing has been followed.
+        if self._has_error and self._end > self._header.experiment.start_time:
             found["final_error"] = self._final_error().tolist()
         return found
 

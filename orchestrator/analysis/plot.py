@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from io import BytesIO
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from orchestrator.analysis.figures.panels import over_time
 from orchestrator.analysis.figures.signal import draw_signal
@@ -21,11 +23,14 @@ from orchestrator.master.table import Table
 #: What is drawn where nothing is asked for, as far as it is there.
 DEFAULT = ("controller.e", "plant.tau", "controller.theta_hat")
 
-#: Height of a panel, and of what stands above and below all of them [in].
-_PANEL, _MARGIN = 1.9, 0.6
+#: Height of a panel, of what stands above and below all of them, of a row of a legend [in].
+_PANEL, _MARGIN, _ROW = 1.9, 0.6, 0.2
 
-#: Entries in a row of a legend.
-_COLUMNS = 6
+#: Letters in a row of a legend, of which the line of an entry takes some.
+_LETTERS, _LINE = 100, 6
+
+#: Of the lines, so many that few runs look alike.
+_STYLES = (*STYLES, (0, (7, 2)), (0, (3, 1, 1, 1, 1, 1)))
 
 
 class Plot(Figure):
@@ -73,6 +78,15 @@ def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Fig
             for place, ((group, unit), members) in zip(axes, panels.items(), strict=True)
         ]
         over_time(list(axes), [Drawn(*run) for run in runs], any(has_means))
+        if len(runs) > 1:
+            in_colour = all(len(members) == 1 for members in panels.values())
+            lines = [
+                _line(label, COLOURS[i % len(COLOURS)] if in_colour else "black", i)
+                for i, (label, _) in enumerate(runs)
+            ]
+            columns = _columns(lines)
+            figure.set_figheight(figure.get_figheight() + _ROW * -(-len(lines) // columns))
+            figure.legend(handles=lines, loc="outside upper left", ncols=columns)
     return figure
 
 
@@ -97,24 +111,43 @@ def _draw_panel(
     Members differ in colour, runs in style; runs of a single member in both.
     """
     has_means = False
+    parts = [member.removeprefix(group).strip(".[]") for member in members]
     for i, (run, table) in enumerate(runs):
         for j, member in enumerate(members):
             if member not in table:
                 continue
-            part = member.removeprefix(group).strip(".[]")
-            texts = [part] * (len(members) > 1) + [plain(run)] * (len(runs) > 1)
             colour = (j if len(members) > 1 else i) % len(COLOURS)
-            style = (i if len(runs) > 1 else j) % len(STYLES)
             has_means |= draw_signal(
                 axes,
                 table,
                 partial(_column, member),
                 color=COLOURS[colour],
-                linestyle=STYLES[style],
-                label=", ".join(texts),
+                linestyle=_style(i if len(runs) > 1 else j),
+                label=", ".join([parts[j]] * (len(members) > 1) + [plain(run)] * (len(runs) > 1)),
             )
     name = group if len(members) > 1 else members[0]
     axes.set_ylabel(f"{name}\n[{unit}]" if unit else name)
-    if len(members) * len(runs) > 1:
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=_COLUMNS)
+    if len(members) > 1:
+        lines = [
+            _line(part, COLOURS[j % len(COLOURS)], 0 if len(runs) > 1 else j)
+            for j, part in enumerate(parts)
+        ]
+        axes.legend(
+            handles=lines, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=_columns(lines)
+        )
     return has_means
+
+
+def _line(label: str, colour: str, style: int) -> Line2D:
+    """A line for a legend."""
+    return Line2D([], [], color=colour, linestyle=_style(style), label=plain(label))
+
+
+def _style(i: int) -> Any:
+    return _STYLES[i % len(_STYLES)]
+
+
+def _columns(lines: Sequence[Line2D]) -> int:
+    """How many entries of a legend have room beside each other."""
+    longest = max(len(str(line.get_label())) for line in lines)
+    return max(1, _LETTERS // (longest + _LINE))

@@ -64,8 +64,8 @@ DRAWN = frozenset(
 CONTROL_POINT = (POSTURE, (ELL,))
 TRACKING = ((*POSTURE, *Y_D), (ELL,))
 
-#: The component that commands the vehicle.
-CONTROLLER = "controller"
+#: The component that commands the vehicle, and the one that gives the reference.
+CONTROLLER, PLANNER = "controller", "planner"
 
 
 #: Units of the members of groups, by the group's name at whichever component.

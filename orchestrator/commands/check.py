@@ -81,5 +81,5 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
             "compute their outputs between steps, and else delayed by a step"
             for ring in rings(prepared.system)
         ]
-        to_know += filter(None, [prepared.open_inputs()])
+        to_know += prepared.doubts()
     return to_know

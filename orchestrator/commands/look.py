@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -32,6 +32,11 @@ from orchestrator.experiments.stored import changed_files, read_record, read_res
 from orchestrator.master.observer import Observer
 from orchestrator.master.progress import Progress
 from orchestrator.master.simulation import simulate
+from orchestrator.master.table import Table
+from orchestrator.system.names import PortName
+
+#: Runs of one scenario are told apart by so many parameters.
+_FEW = 2
 
 #: What a plot can be written as.
 _PLOTS = (".png", ".svg", ".pdf")
@@ -85,12 +90,34 @@ def _plot(options: argparse.Namespace) -> int:
     for path in paths:
         _warn(table_in(path))
     runs = [read_result(path, lambda columns: wanted(columns, patterns)) for path in paths]
-    names = [name for name, _ in runs]
-    labels = names if len(set(names)) == len(names) else list(map(str, paths))
-    figure = plot(list(zip(labels, (table for _, table in runs), strict=True)), patterns)
+    figure = plot(list(zip(_labels(runs, paths), (run[1] for run in runs), strict=True)), patterns)
     with _written(options.out, options.force) as file:
         save(figure, file)
     return OK
+
+
+def _labels(runs: Sequence[tuple[str, Table]], paths: Sequence[Path]) -> list[str]:
+    """What tells runs apart: scenarios, or else a few parameters, or else the ends of paths."""
+    names = [name for name, _ in runs]
+    given = [table.header.parameters for _, table in runs]
+    differing = [
+        name
+        for name in dict.fromkeys(name for values in given for name in values)
+        if len({str(values.get(name)) for values in given}) > 1
+    ]
+    changes = [
+        ", ".join([name] * (len(set(names)) > 1) + [f"{k} = {_text(values, k)}" for k in differing])
+        for name, values in zip(names, given, strict=True)
+    ]
+    parts = [path.resolve().parts for path in paths]
+    ends = [["/".join(part[-n:]) for part in parts] for n in range(1, max(map(len, parts)))]
+    candidates = [names, *([changes] * (len(differing) <= _FEW)), *ends]
+    return next((labels for labels in candidates if len(set(labels)) == len(labels)), ends[0])
+
+
+def _text(values: Mapping[PortName, Any], name: PortName) -> str:
+    value = values.get(name, "none")
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _warn(table: Path) -> None:

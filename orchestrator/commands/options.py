@@ -159,8 +159,10 @@ def request(options: argparse.Namespace) -> Request:
 
 def status(name: str, ending: Ending) -> int:
     """Exit status of a run, after saying what has happened, and what went wrong in it."""
+    failure = ending.failure or ""
     for message in ending.messages:
-        say(message)
+        if not failure.endswith(f": {message}"):
+            say(message)
     for occurrence in ending.events:
         say(f"{name}: {occurrence}")
     if ending.remark is not None:

@@ -125,8 +125,8 @@ def _run(options: argparse.Namespace) -> int:
     runs = with_companion(prepare(*read(options), wanted), wanted)
     findings = Findings(options.strict)
     for prepared in runs:
-        if found := prepared.open_inputs():
-            findings.note(f"{prepared.scenario.name}: {found}")
+        for doubt in prepared.doubts():
+            findings.note(f"{prepared.scenario.name}: {doubt}")
     findings.refuse()
     for note in findings.notes:
         say(f"warning: {note}")
@@ -172,10 +172,11 @@ def _print_summary(values: Mapping[str, Any]) -> None:
         "total_variation": "total variation u, q, r [N, N.m]",
         "final_error": f"largest error x, y, z in the last {last:g} s [m]",
     }
-    show(values["scenario"])
-    for key, label in rows.items():
-        if key in values:
-            show(f"  {label:44}" + "".join(f"{_number(value):>11}" for value in values[key]))
+    shown = {label: values[key] for key, label in rows.items() if key in values}
+    if shown:
+        show(values["scenario"])
+    for label, numbers in shown.items():
+        show(f"  {label:44}" + "".join(f"{_number(number):>11}" for number in numbers))
 
 
 def _number(value: float) -> str:

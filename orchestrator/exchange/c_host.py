@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestrator.errors import InputError, last_line, reason
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.library import COMPILERS, machines_compiler, run_compiler
+from orchestrator.master.library import COMPILERS, LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.master.schedule import gathered, stages
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
@@ -43,11 +43,13 @@ def compiled(folder: Path, command: Sequence[str] = (), name: str = "host") -> P
     if found[0] is None:
         raise InputError(f"there is no C compiler: neither {' nor '.join(COMPILERS)}")
     program = folder / name
-    options = ["-std=c99", "-O2", "-o", str(program), str(SOURCE)]
-    if program.suffix != ".exe":
+    is_windows = program.suffix == ".exe"
+    # For Windows as the libraries: ziglang makes a C library for every level, which takes minutes.
+    options = ["-std=c99", "-Os" if is_windows else "-O2", "-o", str(program), str(SOURCE)]
+    if not is_windows:
         options.append("-ldl")  # until glibc 2.34, dlopen is in a library of its own
     try:
-        process = run_compiler([*found, *options])
+        process = run_compiler([*found, *options], LIMIT_OF_ZIG if command else None)
     except OSError as error:
         raise InputError(f"{SOURCE.name} does not compile: {reason(error)}") from error
     if process.returncode != 0:

@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from auv_fmu.euler import STEP
+from orchestrator.analysis.cautions import differing_vehicle
 from orchestrator.analysis.figures import check_figure
-from orchestrator.analysis.signals import CONTROLLER
+from orchestrator.analysis.signals import CONTROLLER, PLANNER
 from orchestrator.errors import InputError
 from orchestrator.experiments.bundle import FMI, PYTHON, current_fmus
 from orchestrator.experiments.events import check_events, read_events, shared_events
 from orchestrator.experiments.inputs import Inputs, read_inputs
 from orchestrator.experiments.scenario import Scenario, names, read_scenario
-from orchestrator.experiments.waypoints import PLANNER
 from orchestrator.experiments.wiring import closed_loop, left_open, read_wiring
 from orchestrator.findings import Findings
 from orchestrator.master.attendant import Attendant
@@ -106,13 +106,13 @@ class Prepared:
     events: tuple[Event, ...] = ()
     course: Course | None = None
 
-    def open_inputs(self) -> str | None:
-        """The inputs that nothing feeds or sets, in words; None: there are none."""
+    def doubts(self) -> list[str]:
+        """What may have been forgotten, in lines: inputs without a source, a part of a vehicle."""
         actions = [event.action for event in self.events]
         given = {*(self.course.targets if self.course else ())}
         given |= {port for one in actions if isinstance(one, Alter) for port, _ in one.values}
         given |= {port for one in actions if isinstance(one, Set) for port, _ in one.inputs}
-        return _open_inputs(self.scenario, self.system, given)
+        return _doubts(self.scenario, self.system, given)
 
     @property
     def identity(self) -> Identity:
@@ -150,10 +150,9 @@ def load(
     """
     with warned(strict) as findings:
         scenario, system = loaded(str(name), kind, variant=variant, findings=findings)
-        if left := left_behind(scenario):
-            findings.note(left)
-        elif still_open := _open_inputs(scenario, system):
-            findings.note(still_open)
+        left = left_behind(scenario)
+        for note in [left] if left else _doubts(scenario, system):
+            findings.note(note)
         findings.refuse()
     return replace(
         system,
@@ -429,15 +428,14 @@ def _beside(
     return replace(companion, parameters=values), replace(new.with_parameters(values), steps=steps)
 
 
-def _open_inputs(
-    scenario: Scenario, system: System, given: Collection[PortName] = ()
-) -> str | None:
+def _doubts(scenario: Scenario, system: System, given: Collection[PortName] = ()) -> list[str]:
     if len(system.components) == 1:
         # No other one could feed it.
-        return None
+        return []
     # A file of the closed loop says which of its wires are not to be.
     on_purpose = left_open(scenario, system) if scenario.digest else ()
-    return open_inputs(system, {*given, *on_purpose})
+    found = open_inputs(system, {*given, *on_purpose}), differing_vehicle(system)
+    return [text for text in found if text is not None]
 
 
 def _first_given(*values: T | None) -> T | None:

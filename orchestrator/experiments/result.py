@@ -293,8 +293,8 @@ def simulate(
     prepared = prepare(scenario, system, request)
     if is_named:
         with warned(strict) as findings:
-            if found := prepared.open_inputs():
-                findings.note(found)
+            for doubt in prepared.doubts():
+                findings.note(doubt)
             findings.refuse()
     result = Result(prepared)
     observers: list[Observer] = [result, *([Progress(scenario.name)] * progress)]

@@ -202,7 +202,8 @@ def run_into(
                     say(f"warning: {prepared.scenario.name}: {caution}")
                 if interrupts:
                     break
-            if files.figures and not interrupts.urgent:
+            ended_at_once = done[0].ending.failure is not None and len(done[0].seen.rows) == 1
+            if files.figures and not interrupts.urgent and not ended_at_once:
                 for note in _draw(runs[0].scenario, done, unfinished, interrupts):
                     say(note)
         except (OSError, MemoryError) as error:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from orchestrator.analysis.signals import PLANNER
 from orchestrator.errors import InputError
 from orchestrator.experiments.entries import (
     Entry,
@@ -24,7 +25,7 @@ from orchestrator.experiments.inputs import ENTRIES as INPUTS
 from orchestrator.experiments.inputs import Inputs
 from orchestrator.experiments.named import names_in, path_of
 from orchestrator.experiments.waypoints import ENTRIES as PATH
-from orchestrator.experiments.waypoints import PLANNER, path_parameters
+from orchestrator.experiments.waypoints import path_parameters
 from orchestrator.findings import Findings
 from orchestrator.master.experiment import COUPLINGS, Order
 from orchestrator.reading import explained, text_of

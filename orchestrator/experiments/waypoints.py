@@ -12,15 +12,12 @@ from auv_fmu import path_planner
 from auv_fmu.actuators import Limits
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.vehicle import Vehicle
-from orchestrator.analysis.signals import ACTUATORS
+from orchestrator.analysis.signals import ACTUATORS, PLANNER
 from orchestrator.experiments.entries import Entry, is_text
 from orchestrator.reading import explained, lines_of
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import finite
-
-#: The planner of the closed loop.
-PLANNER = "planner"
 
 #: The name of its model.
 _MODEL = "PathPlanner"

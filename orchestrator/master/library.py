@@ -27,14 +27,14 @@ _SOURCE = Path(__file__).with_name("stepper.c")
 #: Products are not contracted with sums: t + h must not depend on the processor.
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC")
 
-#: C compilers, the first of which is taken that there is.
+#: C compilers, the first of which is taken that there is. The packaging has the same.
 COMPILERS = ("cc", "gcc", "clang")
 
 #: What it is in the user's cache folder.
 _KIND = "loop"
 
 #: How long this machine's compiler may take [s], and ziglang, which makes a C library, too.
-_LIMIT, _LIMIT_OF_ZIG = 60.0, 600.0
+_LIMIT, LIMIT_OF_ZIG = 60.0, 600.0
 
 #: Libraries that this process has loaded, by cache folders.
 _in_use: dict[Path, CDLL] = {}
@@ -92,25 +92,30 @@ def _of_the_machine() -> _Compiler | None:
     return lambda *arguments: run_compiler([command, *arguments])
 
 
-def run_compiler(command: Sequence[str]) -> CompletedProcess[str]:
+def run_compiler(command: Sequence[str], limit: float | None = None) -> CompletedProcess[str]:
     """Run a C compiler, and end it with all that it has started if it takes too long.
+
+    Args:
+        command: with its arguments.
+        limit: how long it may take [s]; None: as long as this machine's.
 
     Raises:
         OSError: it does, or it cannot be started.
 
     """
+    limit = _LIMIT if limit is None else limit
     # Ctrl-C is for this process alone.
     with Popen(
         command, stdout=PIPE, stderr=PIPE, text=True, errors="replace", start_new_session=True
     ) as process:
         try:
-            said, complaints = process.communicate(timeout=_LIMIT)
+            said, complaints = process.communicate(timeout=limit)
         except BaseException as error:
             if os.name == "posix":
                 os.killpg(process.pid, signal.SIGKILL)
             process.kill()
             if isinstance(error, TimeoutExpired):
-                raise TimeoutError(f"{command[0]} has not ended after {_LIMIT:g} s") from None
+                raise TimeoutError(f"{command[0]} has not ended after {limit:g} s") from None
             raise
     return CompletedProcess(command, process.returncode, said, complaints)
 
@@ -119,7 +124,7 @@ def _zig() -> _Compiler | None:
     """The compiler of the package ziglang, which takes some seconds the first time."""
     if find_spec("ziglang") is None:
         return None
-    return lambda *arguments: run_module("ziglang", "cc", *arguments, timeout=_LIMIT_OF_ZIG)
+    return lambda *arguments: run_module("ziglang", "cc", *arguments, timeout=LIMIT_OF_ZIG)
 
 
 def _made(compiler: _Compiler) -> CDLL:

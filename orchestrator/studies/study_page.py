@@ -173,7 +173,8 @@ the script.
 
 $engines
 
-A study says which with `engine`; the command line wins.
+A study says which with `engine`; the command line wins. Where many runs begin that another engine
+or kind would make sooner, with the same numbers, a line names its option.
 
 ## Figures
 

@@ -116,6 +116,72 @@ def test_mistake_in_a_script_is_told_with_its_line(text, complaint, tmp_path, ca
     assert not list(tmp_path.glob("*.fmu"))
 
 
+@pytest.mark.parametrize("isolated", [[], ["--isolate"]])
+@pytest.mark.parametrize("base", ["plain", "hardened"])
+def test_mistake_in_a_step_is_told_once_with_its_line(
+    base, isolated, tmp_path, monkeypatch, capsys
+):
+    """One that shows after half a second, in a module beside the script; rows until then stay."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "controller", "my_law", ".", "--base", base]) == 0
+    Path("beside.py").write_text("def waiting(t):\n    return t < 0.5 or value\n")
+    script = Path("my_law.py")
+    text = script.read_text().replace("from math import", "import beside\nfrom math import", 1)
+    argument, first = {
+        "plain": ("current_time", "        value = self.values\n"),
+        "hardened": ("t", "        share = 1.0 - exp(-n * h / self.parameters.T)\n"),
+    }[base]
+    script.write_text(text.replace(first, f"{first}        beside.waiting({argument})\n"))
+    assert main(["build", "my_law.py"]) == 0
+    capsys.readouterr()
+    assert main(["run", "scenario.toml", "--no-figures", "--out", "out", *isolated]) == 1
+    assert capsys.readouterr().err == (
+        "auv-fmu: scenario stopped at t = 0.5 s: controller: step refused at t = 0.5 s: "
+        "beside.py:2: NameError: name 'value' is not defined\n"
+    )
+    assert len(Path("out/result.csv").read_text().splitlines()) == 1 + 26
+
+
+def test_mistake_in_the_first_step_is_all_that_is_told(tmp_path, monkeypatch, capsys):
+    """No figures and no indices of a run that has made no step."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "controller", "my_law", "."]) == 0
+    script = Path("my_law.py")
+    script.write_text(script.read_text().replace("value = self.values", "value = self.valu"))
+    line = script.read_text().splitlines().index("        value = self.valu") + 1
+    assert main(["build", "my_law.py"]) == 0
+    capsys.readouterr()
+    assert main(["run", "scenario.toml", "--out", "out"]) == 1
+    told = capsys.readouterr()
+    assert told.out == f"written to out{os.sep}\n"
+    [complaint] = told.err.splitlines()
+    assert f"my_law.py:{line}: AttributeError: " in complaint
+    assert "Fatal" not in complaint
+
+
+@pytest.mark.parametrize(
+    ("head", "mistake", "status"),
+    [("get()", "if self.smoothed: nothing", 1), ("put(value)", "nothing", 2)],
+)
+def test_mistake_in_a_value_is_told_with_its_line(
+    head, mistake, status, tmp_path, monkeypatch, capsys
+):
+    """Where a plain slave gives or takes a value; PythonFMU alone ends with fmi2Fatal."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "controller", "my_law", "."]) == 0
+    script = Path("my_law.py")
+    head, mistake = f"        def {head}:\n", f"            {mistake}\n"
+    script.write_text(script.read_text().replace(head, f"{head}{mistake}"))
+    line = script.read_text().splitlines(keepends=True).index(mistake) + 1
+    assert main(["build", "my_law.py"]) == 0
+    capsys.readouterr()
+    assert main(["run", "scenario.toml", "--no-figures"]) == status
+    [complaint] = capsys.readouterr().err.splitlines()
+    assert complaint.endswith(
+        f"controller: my_law.py:{line}: NameError: name 'nothing' is not defined"
+    )
+
+
 def test_changed_script_runs_changed_in_the_same_process(tmp_path, monkeypatch):
     """Modules beside the script are in the FMU, and those of two versions do not meet."""
     from orchestrator import simulate  # noqa: PLC0415

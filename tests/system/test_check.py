@@ -179,10 +179,47 @@ def test_inputs_that_somebody_sets_or_leaves_open_are_not_named(workplace, capsy
     assert lines(capsys) == ["pd.toml: nothing is wrong with it"]
 
 
+#: What is set of the vehicle, and what is said then.
+VEHICLES = {
+    "plant.ell = 0.6": (
+        "plant.ell = 0.6, but controller.ell = planner.ell = 0.35: "
+        "controller and planner are set for another vehicle"
+    ),
+    "plant.ell = 0.6\nplanner.ell = 0.6\nplant.m11 = 26": (
+        "plant.ell = 0.6, but controller.ell = 0.35; plant.m11 = 26, but planner.m11 = 25: "
+        "controller and planner are set for another vehicle"
+    ),
+    "planner.righting.pitch = 4.0": (
+        "plant.righting.pitch = 5, but planner.righting.pitch = 4: "
+        "planner is set for another vehicle"
+    ),
+    "plant.ell = 0.6\nplanner.ell = 0.6\ncontroller.ell = 0.6": None,
+    "plant.m44 = 3.0\nplant.tau_max.u = 60.0": None,
+}
+
+
+@pytest.mark.parametrize("values", VEHICLES)
+def test_another_vehicle_in_some_components_is_named(workplace, capsys, values):
+    said = VEHICLES[values]
+    Path("auv.toml").write_text(f"stop_time = 0.1\n[parameters]\n{values}\n")
+    assert main(["check", "auv.toml"]) == 0
+    wrong = [] if said is None else [f"to know: {said}"]
+    assert lines(capsys) == [*wrong, "auv.toml: nothing is wrong with it"]
+    assert main(["run", "auv.toml", "--no-figures"]) == 0
+    assert capsys.readouterr().err == ("" if said is None else f"auv-fmu: warning: auv: {said}\n")
+    assert main(["run", "auv.toml", "--no-figures", "--strict"]) == (0 if said is None else 2)
+
+
+def test_another_vehicle_is_named_by_a_call_from_python(workplace):
+    with pytest.warns(UserWarning, match=r"plant\.ell = 0\.6, but") as told:
+        simulate("fig4", {"plant.ell": 0.6}, stop_time=0.1)
+    assert [warning.filename for warning in told] == [__file__]
+
+
 @pytest.mark.parametrize("name", names())
 def test_nothing_is_open_in_a_ready_scenario(name):
     prepared = prepare(*loaded(name), Request(strict=True))
-    assert prepared.open_inputs() is None
+    assert prepared.doubts() == []
 
 
 @pytest.mark.parametrize("ending", ["fmu", "ssp", "toml"])

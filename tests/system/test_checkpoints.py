@@ -230,7 +230,7 @@ def test_a_signal_leaves_the_rows_and_the_checkpoint(loop, capsys):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (["--set", "plant.m11=26"], "plant.m11 differ"),
+        (["--set", "plant.m44=26"], "plant.m44 differ"),
         (["--stop-time", "3", "--order", "jacobi"], "order, stop_time differ"),
         (["--kind", "native"], "the FMU of controller, the FMU of disturbance, the FMU of planner"),
     ],

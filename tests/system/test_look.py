@@ -36,8 +36,8 @@ def test_plot_draws_results_over_each_other(results, tmp_path, monkeypatch, caps
     assert (tmp_path / "plot.png").read_bytes().startswith(b"\x89PNG")
     assert main(["plot", *both, "plant.nu", "--out", "below/nu.svg"]) == 0
     text = (tmp_path / "below" / "nu.svg").read_text()
-    assert "noisy" in text
-    assert "quiet" in text
+    for label in ("plant.noise.std = 0.001", "plant.noise.std = 0"):
+        assert f"<!-- {label} -->" in text
 
 
 def test_plots_need_no_record(results, tmp_path):

@@ -14,10 +14,12 @@ from orchestrator import sweep
 from orchestrator.commands.main import main
 from orchestrator.experiments.preparation import loaded
 from orchestrator.experiments.scenario import Scenario
+from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import INDICES
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import BATCH, ENGINES, read_study, study_of
+from orchestrator.studies.sweep import Means, faster
 from support import others
 from support.machine import contents
 
@@ -59,6 +61,29 @@ def check(result: Any, outcomes: list[Any]) -> None:
     for name in INDICES:
         expected = [outcome.indices.get(name, np.nan) for outcome in outcomes]
         assert np.array_equal(result[name], expected, equal_nan=True), name
+
+
+@pytest.mark.parametrize(
+    ("scenario", "kind", "n", "option"),
+    [
+        ("fig5", "python", 100, "--engine batch"),
+        ("fig5", "native", 2500, "--engine batch"),
+        ("fig5", "python", 99, ""),
+        ("fault-sensor", "python", 100, "--kind native"),
+        ("fault-sensor", "native", 100, ""),
+    ],
+)
+def test_option_that_makes_many_runs_sooner_is_named(scenario, kind, n, option, monkeypatch):
+    """Events are what the batch engine does not know."""
+    monkeypatch.setattr("orchestrator.studies.sweep.machines_compiler", lambda: "cc")
+    runs = {"scenario": scenario, "vary": {"plant.eta0.y": {"from": 0, "to": 1, "n": n}}}
+    space = Space(study_of("many", runs), {scenario: loaded(scenario, kind)})
+    said = faster(space, FmuEngine(space.prepared), Means(kind=kind))
+    assert said.endswith(
+        f"{option} gives the same numbers in a fraction of the time" * bool(option)
+    )
+    assert said.startswith(f"{n:,} runs by FMUs of the {kind} kind; " * bool(option))
+    assert faster(space, BatchEngine({}), Means(kind=kind)) == ""
 
 
 def test_command_makes_what_is_missing_and_nothing_twice(study, capfd):

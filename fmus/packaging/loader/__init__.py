@@ -23,15 +23,21 @@ FLAGS = (
     "fmi2.c", "-ldl",
 )  # fmt: skip
 
+#: C compilers, the first of which is taken that there is. The orchestrator has the same.
+COMPILERS = ("cc", "gcc", "clang")
+
 #: Where PythonFMU's own library goes when the loader takes its name.
 _LINUX = "binaries/linux64/"
 
 
 def compiler() -> str | None:
     """The C compiler, if this is a platform that the loader is for and there is one."""
-    if not sys.platform.startswith("linux"):
-        return None
-    return shutil.which("cc") or shutil.which("gcc")
+    return machines_compiler() if sys.platform.startswith("linux") else None
+
+
+def machines_compiler() -> str | None:
+    """The C compiler of this machine, if it has one."""
+    return next(filter(None, map(shutil.which, COMPILERS)), None)
 
 
 def run_compiler(

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import os
 from importlib.util import find_spec
 
 import pytest
 
-from fmus.packaging import compilers
+from fmus.packaging import compilers, loader
 from fmus.packaging.compilers import compiler_for, library
 from fmus.packaging.platforms import platforms
+from orchestrator.master.library import COMPILERS, machines_compiler
 
 OWN = "/usr/bin/own-cc"
 
-needs_compiler = pytest.mark.skipif(compilers.compiler() is None, reason="there is no C compiler")
+needs_compiler = pytest.mark.skipif(
+    compilers.machines_compiler() is None, reason="there is no C compiler"
+)
 needs_zig = pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
 
 SOURCES = {
@@ -25,7 +29,7 @@ SOURCES = {
 def machine(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """An x86-64 Linux with a compiler of its own and without ziglang."""
     monkeypatch.setattr(compilers, "this_machine", lambda: "x86_64-linux")
-    monkeypatch.setattr(compilers, "compiler", lambda: OWN)
+    monkeypatch.setattr(compilers, "machines_compiler", lambda: OWN)
     monkeypatch.setattr(compilers, "_version_of", lambda command: command)
     monkeypatch.setattr(compilers, "find_spec", lambda name: None)
     return monkeypatch
@@ -56,8 +60,36 @@ def test_only_what_cannot_be_made_is_named(machine: pytest.MonkeyPatch):
         compiler_for(platforms("2", "linux64,win64"))
 
 
+def test_apples_compiler_makes_what_a_mac_runs(machine: pytest.MonkeyPatch):
+    machine.setattr(compilers, "this_machine", lambda: "aarch64-darwin")
+    for fmi, name in (("2", "darwin64"), ("3", "aarch64-darwin"), ("3", "x86_64-darwin")):
+        made = compiler_for(platforms(fmi, name))
+        assert made.command == [OWN], "none of the options of Linux"
+        assert made.targets["aarch64-darwin"] == ("-arch", "arm64")
+    with pytest.raises(OSError, match="no C compiler for linux64: pip install"):
+        compiler_for(platforms("2", "linux64,darwin64"))
+
+
+@pytest.mark.skipif(loader.compiler() is None, reason="there is no C compiler")
+@pytest.mark.parametrize("name", COMPILERS)
+def test_any_one_compiler_will_do(name, tmp_path, monkeypatch):
+    """By the packaging and by the master, under whichever of its names there is."""
+    real = compilers.machines_compiler()
+    assert real is not None
+    wrapper = tmp_path / name
+    wrapper.write_text(f'#!/bin/sh\nPATH={os.environ["PATH"]} exec {real} "$@"\n')
+    wrapper.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert loader.COMPILERS == COMPILERS
+    assert loader.machines_compiler() == machines_compiler() == str(wrapper)
+    [own] = platforms("2" if compilers.this_machine() == "x86_64-linux" else "3")
+    assert library(compiler_for([own]), own, "Answer", SOURCES, "main.c")
+    loader.compiled.cache_clear()
+    assert b"fmi2DoStep" in loader.compiled()
+
+
 def test_machine_without_a_compiler(machine: pytest.MonkeyPatch):
-    machine.setattr(compilers, "compiler", lambda: None)
+    machine.setattr(compilers, "machines_compiler", lambda: None)
     with pytest.raises(
         OSError, match="no C compiler for linux64: install gcc or clang, or pip install"
     ):

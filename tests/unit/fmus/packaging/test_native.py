@@ -14,7 +14,7 @@ from fmus.packaging.native import fmu_entries
 from fmus.packaging.platforms import platforms
 from support.instances import NAMES
 
-ANY = Compiler("any", ["any"], targets=True)
+ANY = Compiler("any", ["any"], targets={})
 
 
 @pytest.fixture(autouse=True)

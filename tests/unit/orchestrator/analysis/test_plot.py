@@ -37,6 +37,27 @@ def test_runs_lie_over_each_other_with_labels_of_their_own():
         np.testing.assert_array_equal(lines["plant.eta.x\n[m]", label][1], table["plant.eta.x"])
 
 
+@pytest.mark.parametrize("n", [2, 3, 7])
+def test_legends_of_many_runs_leave_the_panels_their_room(n, tmp_path):
+    """Members have their colours in the panel, runs their styles above all: all of it in sight."""
+    labels = [f"another scenario with a long name, controller.k_p = {i}" for i in range(n)]
+    figure = plot([(label, loop_table()) for label in labels], ["plant.eta", "plant.tau"])
+    save(figure, tmp_path / "plot.png")
+    [runs] = figure.legends
+    assert [text.get_text() for text in runs.texts] == labels
+    assert {line.get_color() for line in runs.get_lines()} == {"black"}
+    page = figure.bbox
+    for axes in figure.axes:
+        assert axes.get_position().width > 0.75
+        for legend in filter(None, (runs, axes.get_legend())):
+            box = legend.get_window_extent()
+            assert page.x0 <= box.x0 and box.x1 <= page.x1 and box.y1 <= page.y1
+            assert not box.overlaps(axes.get_window_extent())
+    members = figure.axes[0].get_legend()
+    assert [text.get_text() for text in members.texts] == ["x", "y", "z"]
+    assert len({line.get_color() for line in members.get_lines()}) == 3
+
+
 def test_a_signal_that_one_run_lacks_is_drawn_of_the_other():
     own = table_of(mine__a=np.arange(10.0))
     lines = drawn(plot([("loop", loop_table()), ("own", own)], ["mine.a"]))
