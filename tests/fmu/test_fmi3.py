@@ -530,7 +530,7 @@ def test_messages_are_no_formats_and_name_no_variables(unpacked: Path):
     controller = Fmi3Library(unpacked / "ObserverController")
     saturation = controller.description.find("saturation")
     with instance(controller) as host:
-        assert host.set("String", [saturation.reference], [b"50%#1#"]) == Status.Discard
+        assert host.set("String", [saturation.reference], [b"50%#1#"]) == Status.Error
         [message] = host.messages
     assert message.text.startswith("saturation = '50%##1##':")
 

@@ -832,7 +832,7 @@ def test_value_of_another_type_is_told_in_the_call_that_meets_it(foreign, foreig
     assert foreign.GetReal(made, x, 1, value) == OK
     assert foreign.DoStep(made, 2.0, 0.1, 1) == OK
     foreign.messages.clear()
-    assert foreign.GetReal(made, x, 1, value) != FATAL
+    assert foreign.GetReal(made, x, 1, value) == ERROR
     assert "could not convert string to float" in foreign.messages[-1].text
     assert foreign.messages[-1].status == ERROR
     assert foreign.DoStep(made, 3.0, 0.1, 1) == DISCARD
