@@ -221,11 +221,11 @@ static int set_none(void *handle, string function, string kind, const uint32_t r
                                    size_t n_v) {                                                 \
         string wrong = wrong_numbers(n, r, v, n_v);                                              \
         for (size_t i = 0; i < n && wrong == NULL; i++) v[i] = 0;                                \
-        return get_none(handle, "fmi3Get" #kind, #kind, r, n, wrong);                   \
+        return get_none(handle, "fmi3Get" #kind, #kind, r, n, wrong);                            \
     }                                                                                            \
     EXPORT int FMI3(fmi3Set##kind)(void *handle, const uint32_t r[], size_t n, const type v[],   \
                                    size_t n_v) {                                                 \
-        return set_none(handle, "fmi3Set" #kind, #kind, r, n, wrong_numbers(n, r, v, n_v));   \
+        return set_none(handle, "fmi3Set" #kind, #kind, r, n, wrong_numbers(n, r, v, n_v));      \
     }
 
 NO_VARIABLE(Float32, float)
@@ -255,8 +255,7 @@ EXPORT int FMI3(fmi3GetBinary)(void *handle, const uint32_t r[], size_t n, size_
 
 EXPORT int FMI3(fmi3SetBinary)(void *handle, const uint32_t r[], size_t n, const size_t sizes[],
                                const uint8_t *const v[], size_t n_v) {
-    return set_none(handle, "fmi3SetBinary", "Binary", r, n,
-                       wrong_binaries(n, r, sizes, v, n_v));
+    return set_none(handle, "fmi3SetBinary", "Binary", r, n, wrong_binaries(n, r, sizes, v, n_v));
 }
 
 EXPORT int FMI3(fmi3GetClock)(void *handle, const uint32_t r[], size_t n, boolean v[]) {

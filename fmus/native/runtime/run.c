@@ -198,12 +198,12 @@ static int advance(instance *it, double time, double step, message *why) {
 static void take_step(call *this, double time, double step) {
     instance *it = this->instance;
     message why, said;
-    int follows_start = follows(this, STEPPING);
-    int taken = follows_start && advance(it, time, step, &why);
+    int can_step = follows(this, STEPPING);
+    int taken = can_step && advance(it, time, step, &why);
     it->last_successful_time = taken ? time + step : time;
     if (taken) return;
     it->wants_to_terminate = 1;
-    if (!follows_start) return;
+    if (!can_step) return;
     compose(&said, "step refused at t = %g s: %s", time, why.text);
     discard(this, &said, why.text);
 }

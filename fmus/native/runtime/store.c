@@ -223,8 +223,8 @@ static int take_value(setting *it, const port *port, double number, string text,
 /* A run with another parameter than the host asked for must not begin. */
 static void give_up(setting *it, message *why) {
     it->good = 0;
-    it->call->instance->run.fault = 1;
     if (it->tunes && it->call->instance->run.mode != STEPPING) {
+        it->call->instance->run.fault = 1;
         fail(it->call, why);
     } else {
         discard(it->call, why, NULL);

@@ -74,8 +74,6 @@ static int is_in_logger(instance *it) {
     return it->telling;
 }
 
-static const char NOT_ALIVE[] = "not a live instance of this FMU";
-
 /* A host that ends Python first lets its instances go after that: there is nothing left to end. */
 static int lets_go(string function) {
     return strcmp(function, "fmi2Terminate") == 0 || strcmp(function, "fmi2FreeInstance") == 0;
@@ -83,7 +81,7 @@ static int lets_go(string function) {
 
 call begin(component handle, string function, when when) {
     call this = {.function = function, .status = FMI_ERROR, .handle = handle};
-    string wrong = NOT_ALIVE;
+    string wrong = "not a live instance of this FMU";
     instance *it = NULL;
     if (python_runs()) {
         this.lock = py.PyGILState_Ensure();
