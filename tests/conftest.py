@@ -40,7 +40,8 @@ _MISSING = re.compile(r"^(there is |there are )?no | (is|are) not installed$")
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Note what a test would be skipped without."""
     for mark in item.iter_markers("skipif"):
-        item.user_properties.append(("needs", _MISSING.sub("", mark.kwargs["reason"])))
+        needed, found = _MISSING.subn("", mark.kwargs["reason"])
+        item.user_properties += [("needs", needed)] * found
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
