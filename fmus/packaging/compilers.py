@@ -43,12 +43,14 @@ class Compiler(NamedTuple):
         name: with its version.
         command: that runs it, with options of its own.
         targets: what it is told for each machine, if it makes libraries for several.
+        limit: how long it may take [s].
 
     """
 
     name: str
     command: Sequence[str]
     targets: Mapping[str, Sequence[str]]
+    limit: float = _LIMIT
 
 
 def compiler_for(platforms: Sequence[Platform]) -> Compiler:
@@ -67,7 +69,7 @@ def compiler_for(platforms: Sequence[Platform]) -> Compiler:
         return Compiler(_version_of(own), [own, *options], targets)
     if find_spec("ziglang") is not None:
         command = [sys.executable, "-m", "ziglang", "cc"]
-        return Compiler(f"ziglang {version('ziglang')}", command, _ZIG)
+        return Compiler(f"ziglang {version('ziglang')}", command, _ZIG, _LIMIT_OF_ZIG)
     names = ", ".join(others or [platform.name for platform in platforms])
     remedy = "pip install 'auv-fmu[native]' brings one"
     if not others and machine.endswith("-linux"):
@@ -106,8 +108,7 @@ def library(
             target = compiler.targets.get(machine, ())
             size = _SMALL if machine.endswith("-windows") else _NO_TABLES
             options = [*target, *FLAGS, *size, "-o", made.name, main, "-lm"]
-            limit = _LIMIT_OF_ZIG if compiler.targets is _ZIG else _LIMIT
-            process = run_compiler([*compiler.command, *options], Path(folder), limit)
+            process = run_compiler([*compiler.command, *options], Path(folder), compiler.limit)
             if process.returncode != 0:
                 raise OSError(
                     f"{compiler.name} makes no {name} for {machine}: {_complaint(process)}"

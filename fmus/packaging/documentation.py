@@ -75,16 +75,12 @@ def page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
     module = components()[name]
     text = (folder_of(module) / "page.md").read_text(encoding="utf-8").strip()
     ports: Sequence[Port] = (*import_module(module.replace(".slave", ".ports")).PORTS, FAULT)
-    refusals = _REFUSALS.replace("fmi2GetReal", "fmi3GetFloat64") if fmi == "3" else _REFUSALS
+    refusals = _REFUSALS
+    if fmi == "3":
+        refusals = refusals.replace("fmi2GetReal", "fmi3GetFloat64").replace("fmi2", "fmi3")
     made_of = (_NATIVE,) if kind == NATIVE else ()
     tables = _tables(ports, KINDS if fmi == "3" else {})
-    parts = (
-        text,
-        *made_of,
-        *tables,
-        refusals.replace("fmi2", f"fmi{fmi}"),
-        _EXAMPLE.format(name=name),
-    )
+    parts = (text, *made_of, *tables, refusals, _EXAMPLE.format(name=name))
     return "\n\n".join(parts) + "\n"
 
 

@@ -156,7 +156,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
     def _set(self, vrs: list[int], values: Sequence[Value], kind: str) -> None:
         """Take all values of a call, or none."""
         if self._mode == TERMINATED:
-            self._fail(f"fmi2Set{kind} is not allowed when {self._mode}")
+            self._follows(f"fmi2Set{kind}", STEPPING)
             return
         try:
             ports = [self._store.port(reference, kind) for reference in vrs]

@@ -199,8 +199,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         is refused. After a refusal everything is as it was before the step.
         """
         if self._mode != STEPPING:
-            self._follows("fmi2DoStep", STEPPING)
-            return False
+            return self._follows("fmi2DoStep", STEPPING)
         try:
             store = self._store
             if self._untold:

@@ -15,6 +15,7 @@ from typing import Any, Callable, TypeVar
 from pythonfmu.enums import Fmi2Status
 
 from fmus.slave.loading import ANSWER, has_loader
+from fmus.slave.store import MISSING
 
 Slave = TypeVar("Slave", bound=type)
 
@@ -25,14 +26,14 @@ _SEAL = "".join(re.findall(r"_[0-9a-f]{12}$", __name__.partition(".")[0]))
 _OURS = tuple(f"{package}{_SEAL}" for package in ("fmus", "auv_fmu", "pythonfmu"))
 
 #: What is answered in the place of values that could not be had.
-_MISSING = {"get_real": 0.0, "get_integer": 0, "get_boolean": False, "get_string": ""}
+_MISSING = {f"get_{kind.lower()}": value for kind, value in MISSING.items()}
 
 _CALLS = (
     "setup_experiment",
     "enter_initialization_mode",
     "exit_initialization_mode",
     "terminate",
-    *(f"set_{kind}" for kind in ("real", "integer", "boolean", "string")),
+    *(f"set_{kind.lower()}" for kind in MISSING),
     *_MISSING,
 )
 

@@ -34,6 +34,7 @@ from support.raw import (
     Status,
     Variable,
 )
+from support.raw_fmi import OF_MODEL_EXCHANGE
 
 Arguments = dict[str, Any]
 
@@ -53,18 +54,7 @@ NOT_UTF_8 = "\udcff"
 MANY = 100_000
 
 #: The functions of FMI 2.0 that only model exchange has.
-MODEL_EXCHANGE_FUNCTIONS = (
-    "fmi2EnterEventMode",
-    "fmi2NewDiscreteStates",
-    "fmi2EnterContinuousTimeMode",
-    "fmi2CompletedIntegratorStep",
-    "fmi2SetTime",
-    "fmi2SetContinuousStates",
-    "fmi2GetDerivatives",
-    "fmi2GetEventIndicators",
-    "fmi2GetContinuousStates",
-    "fmi2GetNominalsOfContinuousStates",
-)
+MODEL_EXCHANGE_FUNCTIONS = tuple(f"fmi2{name}" for name in OF_MODEL_EXCHANGE)
 
 #: More than this many internal steps are taken for a mistake.
 MOST_INTERNAL_STEPS = 1_000_000
