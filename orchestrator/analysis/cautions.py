@@ -8,6 +8,7 @@ from auv_fmu.observer import EXACT, FORMS, exact_gain
 from auv_fmu.proof.gain_conditions import bounds
 from auv_fmu.proof.sampling import observer_rate, robust_rate
 from orchestrator.analysis.signals import (
+    ATTITUDE,
     CONTROLLER,
     ELL,
     LIMITS,
@@ -25,6 +26,11 @@ from orchestrator.system.structure import System
 
 _K_D, _LAMBDA, _EPS_T = "controller.k_d", "controller.lambda", "controller.eps_t"
 _H_MAX, _OBSERVER = "controller.h_max", "controller.observer"
+
+_PITCH, _ROLL = ATTITUDE[1], "plant.roll"
+
+#: Columns whose extremes :func:`cautions_after` looks at.
+WATCHED = (THETA_HAT[0], _PITCH)
 
 #: References that are farther apart are not the same [m].
 _SAME = 1e-6
@@ -93,10 +99,12 @@ def _parameter(system: System, name: PortName) -> float | None:
 
 
 def cautions_after(table: Table) -> list[str]:
-    """What a run has shown, in lines for the user.
+    """What a run has shown, in lines for the user."""
+    return [*_of_the_robust_term(table), *_of_the_vertical(table)]
 
-    theta_hat[1] is the part of rho_hat that is there at any speed.
-    """
+
+def _of_the_robust_term(table: Table) -> list[str]:
+    """Whether it chatters; theta_hat[1] is the part of rho_hat that is there at any speed."""
     if len(table) < 2 or table.missing(THETA_HAT[:1], (_EPS_T, _H_MAX, ELL, *VEHICLE)):
         return []
     rho_hat, eps_t = float(table[THETA_HAT[0]].max()), parameter(table, _EPS_T)
@@ -110,6 +118,20 @@ def cautions_after(table: Table) -> list[str]:
         f"the robust term chatters: with theta_hat[1] up to {rho_hat:.3g} N and {_EPS_T} = "
         f"{eps_t:g} W it has h p = {h_p:.3g} and reverses in every step above {_REVERSES:g}; "
         "raise eps_t or take smaller steps"
+    ]
+
+
+def _of_the_vertical(table: Table) -> list[str]:
+    """Whether a vehicle of five degrees of freedom has passed it."""
+    if not len(table) or table.missing((_PITCH,), (_ROLL,)):
+        return []
+    beyond = np.cos(table[_PITCH]) * np.cos(table[_PITCH][0]) <= 0.0
+    if table.parameters[port_name(_ROLL)] is not False or not beyond.any():
+        return []
+    return [
+        f"the pitch passes 90 degrees by t = {table.time[beyond.argmax()]:g} s, where (1) has a "
+        f"pole: with {_ROLL} = false what follows depends on rounding, so quote no single run; "
+        f"compare runs whose plant.eta0 differs by 1e-6 m, or set {_ROLL} = true"
     ]
 
 

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.analysis.cautions import cautions, cautions_after, cautions_beside
+from orchestrator.analysis.cautions import WATCHED, cautions, cautions_after, cautions_beside
 from orchestrator.analysis.certificates import CertificatesFile
 from orchestrator.analysis.figures import Drawn, draw, figure_files
 from orchestrator.analysis.metrics import Metrics
 from orchestrator.analysis.sensors import velocities_reaching
-from orchestrator.analysis.signals import CONTROLLER, THETA_HAT
+from orchestrator.analysis.signals import CONTROLLER
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError, reason
 from orchestrator.experiments.checkpoints import FOLDER, checkpoints_of, leave
@@ -243,7 +243,7 @@ class _Running:
         self._folder, self._prepared = folder, prepared
         self._metrics = Metrics()
         # Without figures the cautions alone look at what was seen.
-        self._seen = VisibleRows() if files.figures else VisibleRows(THETA_HAT[:1])
+        self._seen = VisibleRows() if files.figures else VisibleRows(WATCHED)
         self._table = FORMATS[files.format](folder / f"result.{files.format}")
         self.observers: list[Observer] = [
             Selection(self._table, files.interval, columns),

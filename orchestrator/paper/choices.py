@@ -62,10 +62,12 @@ class Choice(NamedTuple):
     of_proposed: bool = False
 
 
-_WAVES = Disturbance()
+_WAVES, _SIGN = Disturbance(), "(2): the minus of tau_w"
 
 #: What the reference's surge force drives it at, straight on [m/s].
 _UNDER_WAY = TAU_D[0] / Vehicle().d11
+
+VEHICLE = "vehicle"
 
 #: Choices that a run depends on.
 OF_RUNS = (
@@ -107,11 +109,10 @@ OF_RUNS = (
         ),
     ),
     Choice(
-        "vehicle",
+        VEHICLE,
         (
             Option("six degrees of freedom, 5 N·m rights the roll"),
             Option("six, nothing rights the roll", {"plant.righting.roll": 0.0}),
-            Option("five", {"plant.roll": False}, "4.1: 6-DOF"),
         ),
     ),
     Choice(
@@ -121,8 +122,10 @@ OF_RUNS = (
             Option(
                 "-tau_w",
                 {"disturbance.A_f": -_WAVES.A_f, "disturbance.A_d": -_WAVES.A_d},
-                "(2): the minus of tau_w",
+                _SIGN,
             ),
+            Option("its friction reversed", {"disturbance.A_f": -_WAVES.A_f}, _SIGN),
+            Option("its waves reversed", {"disturbance.A_d": -_WAVES.A_d}, _SIGN),
         ),
     ),
     Choice(
@@ -152,16 +155,39 @@ OF_RUNS = (
     ),
 )
 
+#: The vehicle of (1) and (2), and what it contradicts. From 30 m away it passes the pole of (1),
+#: and no single run says what it gives then.
+FIVE, AGAINST_FIVE = Option("five degrees of freedom", {"plant.roll": False}), "4.1: 6-DOF"
+
+#: What a run of five depends on, of what contradicts nothing else.
+OF_RUNS_OF_FIVE = tuple(
+    choice._replace(options=(FIVE,))
+    if choice.name == VEHICLE
+    else choice._replace(options=tuple(each for each in choice.options if not each.against))
+    for choice in OF_RUNS
+)
+
 #: What the efforts are taken of: (59) speaks of "the control input".
-SIGNALS = (
-    Option("applied, (u, q, r)"),
-    Option("commanded, (u, q, r)"),
-    Option("applied, (u, r, q)", against="below (6): tau_a = (tau_u, tau_q, tau_r)"),
+SIGNALS = (Option("applied"), Option("commanded"))
+
+#: The order in which they are printed.
+ORDERS_OF_EFFORTS = (
+    Option("(u, q, r)"),
+    Option("(u, r, q)", against="below (6): tau_a = (tau_u, tau_q, tau_r)"),
+)
+
+#: What they are: with signals within 80, (59) as printed cannot be 130.
+FORMULAS = (
+    Option("L2 norm, (59) without 1/T_f"),
+    Option("(59) as a sum over steps, without the step"),
+    Option("mean square, (59) without the root"),
 )
 
 #: Choices that are left when a run is done.
 OF_READING = (
-    Choice("efforts", SIGNALS),
+    Choice("efforts of the signal", SIGNALS),
+    Choice("order of the efforts", ORDERS_OF_EFFORTS),
+    Choice("formula of the efforts", FORMULAS),
     Choice(
         "T_f",
         tuple(Option(f"{time:g} s") for time in END_TIMES),

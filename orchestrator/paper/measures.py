@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from orchestrator.analysis.signals import APPLIED, THETA_HAT, tracking_error
 from orchestrator.master.table import Table
 from orchestrator.studies.engine import REACHED
+
+
+def sum_without_step(l2: Any, duration: Any, h: float) -> Any:
+    """(59) coded as sqrt(sum of tau_k^2 / T_f): a sum over steps that leaves out their length.
+
+    Args:
+        l2: norm of the signal, sqrt(sum of h tau_k^2).
+        duration: T_f [s].
+        h: step [s].
+
+    """
+    return l2 / np.sqrt(h * duration)
 
 
 class Way(NamedTuple):
@@ -32,31 +44,32 @@ class Way(NamedTuple):
         """
         return abs(self.impulse) / sqrt(self.duration)
 
+    def contradicts_until(self, effort: float, h: float) -> float:
+        """The T_f before which :func:`sum_without_step` cannot be as small as an effort [s]."""
+        return (self.least_effort / effort) ** 2 / h
+
     def soonest(self, effort: float) -> float:
         """The least time in which a force of an L2 norm [N.s^0.5] can have this impulse [s]."""
         return (self.impulse / effort) ** 2
 
 
-def way(table: Table, reached: float | None) -> Way | None:
+def way_of(table: Table, error: np.ndarray | None = None) -> Way | None:
     """The way of a run to its reference; None if it does not come there, or is there already.
 
     Args:
         table: of the run.
-        reached: when |e| first is at most :data:`REACHED` [s]; None: never.
+        error: of each row [m]; None: :func:`.tracking_error`.
 
     """
-    if not reached:
+    if error is None:
+        error = tracking_error(table)
+    near = np.linalg.norm(error, axis=1) <= REACHED
+    first = int(near.argmax())
+    if not near[first] or not first:
         return None
-    until = table.time <= reached
     # A row holds what was applied in the step that ends there: the first one holds none.
-    force = table[APPLIED[0]][until][1:]
-    return Way(reached, float(force @ np.diff(table.time[until])))
-
-
-def way_of(table: Table) -> Way | None:
-    """The same, with the error of the table."""
-    near = np.linalg.norm(tracking_error(table), axis=1) <= REACHED
-    return way(table, float(table.time[near.argmax()]) if near.any() else None)
+    force = table[APPLIED[0]][1 : first + 1]
+    return Way(float(table.time[first]), float(force @ np.diff(table.time[: first + 1])))
 
 
 def turning_radius(table: Table) -> float:

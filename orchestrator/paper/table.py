@@ -13,7 +13,7 @@ import numpy as np
 from orchestrator.experiments.folder import replaced
 from orchestrator.experiments.record import PACKAGES, Clock, write_files
 from orchestrator.paper.printed_table import NUMBERS, section
-from orchestrator.paper.sensitivity import PUBLISHED, Sensitivity
+from orchestrator.paper.sensitivity import PUBLISHED, Found
 from orchestrator.paper.variants import all_variants
 from orchestrator.paper.workers import workers
 from orchestrator.system.ledger import RECORD
@@ -59,20 +59,23 @@ def _record(command: Sequence[str], clock: Clock) -> dict[str, object]:
     }
 
 
-def write_variants(path: Path, found: Sensitivity) -> None:
-    """A row for each combination of options, at the end time at which it scores best."""
-    ends = found.scores.argmin(axis=-1)
+def write_variants(path: Path, found: Found) -> None:
+    """A row for each combination of options of the runs, as its numbers score best when read."""
     names = [name for scenario in PUBLISHED for name in NUMBERS[scenario]]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow([*(choice.name for choice in found.choices), "score", *names])
-        for options in np.ndindex(ends.shape):
-            variant = found.variant((*options, int(ends[options])))
-            chosen = zip(found.choices, variant.options, strict=True)
-            writer.writerow(
-                [
-                    *(choice.options[i].text for choice, i in chosen),
-                    variant.score,
-                    *(value for scenario in PUBLISHED for value in variant.numbers[scenario]),
-                ]
-            )
+        writer.writerow([*(choice.name for choice in found.six.choices), "score", *names])
+        for held in (found.six, found.five):
+            of_runs = held.scores.shape[: len(held.of_runs)]
+            for options in np.ndindex(of_runs):
+                scores = held.scores[options]
+                reading = np.unravel_index(int(scores.argmin()), scores.shape)
+                variant = held.variant((*options, *map(int, reading)))
+                chosen = zip(held.choices, variant.options, strict=True)
+                writer.writerow(
+                    [
+                        *(choice.options[i].text for choice, i in chosen),
+                        variant.score,
+                        *(value for scenario in PUBLISHED for value in variant.numbers[scenario]),
+                    ]
+                )

@@ -2,41 +2,68 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
 
-from orchestrator.analysis.signals import ACTUATORS, AXES, COMMANDED
+from orchestrator.analysis.metrics import LAST_SECONDS
+from orchestrator.analysis.signals import (
+    APPLIED,
+    ATTITUDE,
+    AXES,
+    COMMANDED,
+    ELL,
+    POSITION,
+    Y_D,
+    parameter,
+)
 from orchestrator.experiments.preparation import loaded
 from orchestrator.master.table import Table
-from orchestrator.paper.choices import END_TIMES, OF_RUNS, SIGNALS, Choice, options_of, runs
-from orchestrator.paper.measures import Way, way
-from orchestrator.paper.sensitivity import PUBLISHED, Sensitivity
+from orchestrator.paper.choices import (
+    END_TIMES,
+    OF_RUNS,
+    OF_RUNS_OF_FIVE,
+    SIGNALS,
+    Choice,
+    options_of,
+    runs,
+)
+from orchestrator.paper.measures import Way, way_of
+from orchestrator.paper.sensitivity import (
+    FARTHEST,
+    PUBLISHED,
+    QUANTILES,
+    SEARCHED,
+    SHOWN,
+    Found,
+    Sensitivity,
+    Variant,
+)
 from orchestrator.paper.workers import Workers
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import Outcome, Run
+from orchestrator.studies.engine import Run
 from orchestrator.studies.sweep import check_installed
 
 #: Runs that a worker makes at a time.
 _BLOCK = 16
 
-#: Indices of an outcome.
-_EFFORT = [f"l2_effort.{k}" for k in ACTUATORS]
-_ERROR = [f"final_error.{k}" for k in AXES]
-_INDICES = (*_EFFORT, *_ERROR)
-_REACHED = "time_to_reach"
 
-#: u, r and q of (u, q, r).
-_EXCHANGED = [0, 2, 1]
-
-
-def all_variants(crew: Workers, of_runs: Sequence[Choice] = OF_RUNS) -> Sensitivity:
+def all_variants(
+    crew: Workers,
+    of_runs: Sequence[Choice] = OF_RUNS,
+    of_five: Sequence[Choice] = OF_RUNS_OF_FIVE,
+    searched: Sequence[int] = SEARCHED,
+    shown: Sequence[int] = SHOWN,
+) -> Found:
     """Make the runs of all combinations.
 
     Args:
         crew: that makes them.
         of_runs: choices that they depend on.
+        of_five: the same with five degrees of freedom.
+        searched: starts that those with five are searched with.
+        shown: starts of the variants whose numbers are printed.
 
     Raises:
         InputError: a package is missing.
@@ -45,21 +72,75 @@ def all_variants(crew: Workers, of_runs: Sequence[Choice] = OF_RUNS) -> Sensitiv
     """
     check_installed()
     engine = BatchEngine({scenario: loaded(scenario)[1] for scenario in PUBLISHED})
-    wanted = {scenario: list(runs(scenario, of_runs)) for scenario in PUBLISHED}
+    six = _six(crew, engine, of_runs)
+    five = _five(crew, engine, of_five, searched)
+    nearest = (
+        (six, six.ours),
+        (six, six.nearest(consistent=True)),
+        (six, six.nearest(consistent=False)),
+        (five, five.nearest(consistent=True)),
+    )
+    tasks = {
+        (i, scenario): partial(quantiles_of, engine, _run_of(found, variant, scenario), shown)
+        for i, (found, variant) in enumerate(nearest)
+        for scenario in PUBLISHED
+    }
+    taken = dict(crew.results(tasks, "variant"))
+    printed = tuple(
+        found.over_starts(variant, {scenario: taken[i, scenario] for scenario in PUBLISHED})
+        for i, (found, variant) in enumerate(nearest)
+    )
+    return Found(six, five, printed)
+
+
+def _six(crew: Workers, engine: BatchEngine, of_runs: Sequence[Choice]) -> Sensitivity:
+    """Each combination by one run."""
     blocks = {
         (scenario, first): partial(taken_of, engine, found[first : first + _BLOCK])
-        for scenario, found in wanted.items()
+        for scenario in PUBLISHED
+        for found in [list(runs(scenario, of_runs))]
         for first in range(0, len(found), _BLOCK)
     }
     taken = dict(crew.results(blocks, "block of runs"))
     numbers, ways = {}, {}
-    for scenario, found in wanted.items():
-        parts = [taken[scenario, first] for first in range(0, len(found), _BLOCK)]
-        sizes = [len(options_of(choice, scenario)) for choice in of_runs]
+    for scenario in PUBLISHED:
+        parts = (taken[block] for block in blocks if block[0] == scenario)
         sixes, pairs = map(np.concatenate, zip(*parts, strict=True))
-        numbers[scenario] = sixes.reshape(*sizes, *sixes.shape[1:])
-        ways[scenario] = pairs.reshape(*sizes, *pairs.shape[1:])
+        numbers[scenario] = _by_choice(sixes, scenario, of_runs)
+        ways[scenario] = _by_choice(pairs, scenario, of_runs)
     return Sensitivity(numbers, ways, of_runs)
+
+
+def _five(
+    crew: Workers, engine: BatchEngine, of_runs: Sequence[Choice], starts: Sequence[int]
+) -> Sensitivity:
+    """Each combination by medians over starts."""
+    tasks = {
+        (scenario, run.number): partial(quantiles_of, engine, run, starts)
+        for scenario in PUBLISHED
+        for run in runs(scenario, of_runs)
+    }
+    taken = dict(crew.results(tasks, "variant of five degrees of freedom"))
+    middle = QUANTILES.index(0.5)
+    numbers, ways = {}, {}
+    for scenario in PUBLISHED:
+        medians = np.stack([taken[task][middle] for task in tasks if task[0] == scenario])
+        numbers[scenario] = _by_choice(medians, scenario, of_runs)
+        ways[scenario] = np.full((*numbers[scenario].shape[:-3], len(Way._fields)), np.nan)
+    return Sensitivity(numbers, ways, of_runs)
+
+
+def _by_choice(found: np.ndarray, scenario: str, of_runs: Sequence[Choice]) -> np.ndarray:
+    """With an axis for each choice in place of one for the runs."""
+    return found.reshape(*(len(options_of(each, scenario)) for each in of_runs), *found.shape[1:])
+
+
+def _run_of(found: Sensitivity, variant: Variant, scenario: str) -> Run:
+    """The run of a variant in a scenario."""
+    shape = found.numbers[scenario].shape[: len(found.of_runs)]
+    options = np.minimum(variant.options[: len(shape)], np.subtract(shape, 1))
+    all_runs = list(runs(scenario, found.of_runs))
+    return all_runs[int(np.ravel_multi_index(tuple(options), shape))]
 
 
 def taken_of(engine: BatchEngine, block: Sequence[Run]) -> tuple[np.ndarray, np.ndarray]:
@@ -67,34 +148,56 @@ def taken_of(engine: BatchEngine, block: Sequence[Run]) -> tuple[np.ndarray, np.
 
     Those of a run that has failed are not numbers, nor is the way of one that has not arrived.
     """
-    numbers = np.full((len(block), len(SIGNALS), len(END_TIMES), len(_INDICES)), np.nan)
-    ways = np.full((len(block), len(Way._fields)), np.nan)
-    for i, run in enumerate(block):
-        outcomes = engine.outcomes_at(run, END_TIMES)
-        if outcomes[-1].failure is None:
-            table = engine.table(run)
-            numbers[i] = numbers_of(outcomes, table)
-            ways[i] = way(table, outcomes[-1].indices.get(_REACHED)) or np.nan
-    return numbers, ways
+    tables = [engine.table(run) for run in block]
+    ways = [way_of(table, errors(table)) or (np.nan, np.nan) for table in tables]
+    return np.stack([numbers_of(table) for table in tables]), np.array(ways)
 
 
-def numbers_of(outcomes: Sequence[Outcome], table: Table) -> np.ndarray:
-    """Three L2 efforts and three e_f, an axis each for SIGNALS and END_TIMES before the six.
+def quantiles_of(engine: BatchEngine, run: Run, starts: Sequence[int]) -> np.ndarray:
+    """The numbers of a run from moved starts, an axis for QUANTILES first; a task for a worker."""
+    found = [numbers_of(engine.table(each)) for each in moved(engine, run, starts)]
+    quantiles: np.ndarray = np.quantile(found, QUANTILES, axis=0)
+    return quantiles
+
+
+def moved(engine: BatchEngine, run: Run, starts: Sequence[int]) -> Iterator[Run]:
+    """A run from starts that are moved by :data:`FARTHEST` at most, each by its number."""
+    start = engine.setting(run).plant.eta0[: len(AXES)]
+    for number in starts:
+        away = np.random.default_rng(number).uniform(-FARTHEST, FARTHEST, len(AXES))
+        values = zip(AXES, np.add(start, away).tolist(), strict=True)
+        yield run._replace(
+            parameters={**run.parameters, **{f"plant.eta0.{axis}": x for axis, x in values}}
+        )
+
+
+def errors(table: Table) -> np.ndarray:
+    """e of all rows at once, far sooner than :func:`.tracking_error` and equal up to rounding."""
+    _, theta, psi = table.group(*ATTITUDE).T
+    ahead = np.cos(theta) * np.cos(psi), np.cos(theta) * np.sin(psi), -np.sin(theta)
+    y = table.group(*POSITION) + parameter(table, ELL) * np.column_stack(ahead)
+    error: np.ndarray = y - table.group(*Y_D)
+    return error
+
+
+def numbers_of(table: Table) -> np.ndarray:
+    """Three L2 norms and three e_f, an axis each for SIGNALS and END_TIMES before the six.
 
     Args:
-        outcomes: of a run, at each of END_TIMES.
-        table: its rows, for what no index is of.
+        table: of a run until the last of END_TIMES; what has failed before gives no numbers.
 
     """
-    applied, error = (
-        np.array([[outcome.indices[name] for name in names] for outcome in outcomes])
-        for names in (_EFFORT, _ERROR)
-    )
+    if table.time[-1] < END_TIMES[-1] - table.time[1]:
+        return np.full((len(SIGNALS), len(END_TIMES), 6), np.nan)
     h = np.diff(table.time)[:, np.newaxis]
-    squares = np.cumsum(table.group(*COMMANDED)[1:] ** 2 * h, axis=0)
-    # The steps that end there: half a step is more than times are rounded by.
-    ends = np.searchsorted(table.time[1:], np.subtract(END_TIMES, 0.5 * table.time[1]))
-    commanded = np.sqrt(squares[ends])
-    return np.stack(
-        [np.hstack((effort, error)) for effort in (applied, commanded, applied[:, _EXCHANGED])]
+    # Half a step is more than times are rounded by.
+    ends = np.searchsorted(table.time, np.subtract(END_TIMES, 0.5 * table.time[1]))
+    begins = np.searchsorted(table.time, table.time[ends] - LAST_SECONDS)
+    error = np.abs(errors(table))
+    final = np.stack([error[i : k + 1].max(axis=0) for i, k in zip(begins, ends, strict=True)])
+    # A row holds the signal of the step that ends there: the first one holds none.
+    efforts = (
+        np.sqrt(np.cumsum(table.group(*names)[1:] ** 2 * h, axis=0)[ends - 1])
+        for names in (APPLIED, COMMANDED)
     )
+    return np.stack([np.hstack((effort, final)) for effort in efforts])

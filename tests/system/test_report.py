@@ -18,7 +18,7 @@ from orchestrator.paper.errata import errata, of_the_paper
 from orchestrator.paper.report import write_report
 from orchestrator.paper.studies import make_studies, sections
 from orchestrator.studies.study import ready_studies
-from support.variants import planted
+from support.variants import found, planted
 
 STRANGER = """\
 title = "Mine | <b>own</b>"
@@ -68,7 +68,7 @@ def folder(tmp_path_factory, dist: Path) -> Path:
     report = tmp_path_factory.mktemp("report")
     files = [str(theirs / f"{name}.toml") for name in ("stranger", "lost")]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("orchestrator.paper.report.all_variants", lambda crew: planted())
+        patch.setattr("orchestrator.paper.report.all_variants", lambda crew: found(planted()))
         write_report(
             report, [*SCENARIOS, *files], ["auv-fmu", "report"], stop_time=1.0, variants=True
         )
@@ -96,7 +96,7 @@ def test_every_claim_has_a_row_and_every_effect_a_section(text):
 def test_the_printed_table_stands_beside_every_reading(text):
     """Ours is twice what is printed."""
     assert "\n## The printed table against every reading\n" in text
-    assert "\n| proposed L2 effort u [N·√s] | 130 | 260 |" in text
+    assert "\n| proposed effort u | 130 | 260 |" in text
 
 
 def test_the_stranger_is_in_the_report(folder, text, page):

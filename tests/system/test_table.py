@@ -10,8 +10,9 @@ import pytest
 from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.paper import table
-from orchestrator.paper.choices import OF_RUNS, PD, PROPOSED, SIGNALS, Choice
+from orchestrator.paper.choices import OF_RUNS, OF_RUNS_OF_FIVE, PD, PROPOSED, Choice
 from orchestrator.paper.measures import way_of
+from orchestrator.paper.sensitivity import FARTHEST
 from orchestrator.paper.variants import all_variants
 
 pytest.importorskip("numba", reason="needs the extra `studies`")
@@ -30,36 +31,80 @@ class Here:
             yield key, task()
 
 
+#: Starts of five degrees of freedom that are compared, and others that are printed.
+SEARCHED, SHOWN = range(3), range(3, 6)
+
+
 @pytest.fixture(scope="module")
 def found():
-    return all_variants(Here(), [reduced(choice) for choice in OF_RUNS])
+    six, five = ([reduced(choice) for choice in choices] for choices in (OF_RUNS, OF_RUNS_OF_FIVE))
+    return all_variants(Here(), six, five, SEARCHED, SHOWN)
 
 
 def test_ours_is_what_the_scenarios_give(found):
-    numbers = found.ours.numbers
+    numbers = found.six.ours.numbers
     for scenario in (PROPOSED, PD):
         result = simulate(scenario, stop_time=100.0, kind="native")
         metrics = result.metrics()
         np.testing.assert_allclose(
-            numbers[scenario], [*metrics["l2_effort"], *metrics["final_error"]], rtol=1e-12
+            numbers[scenario], [*metrics["l2_effort"], *metrics["final_error"]], rtol=1e-11
         )
-        assert found.ways_of(scenario)[0] == pytest.approx(way_of(result), rel=1e-12)
+        assert found.six.ways_of(scenario)[0] == pytest.approx(way_of(result), rel=1e-12)
+    # With six degrees of freedom 1e-6 m at the start is nothing.
+    assert found.printed[0].options == found.six.ours.options and found.printed[0].bands is None
 
 
 def test_options_are_those_of_the_runs(found):
-    """Jacobi order, eps_t = 1, 57 s; for PD eps_t stays 10."""
-    axes = [choice.name for choice in found.choices]
-    options = list(found.ours.options)
-    for name in TRIED:
-        options[axes.index(name)] = 1
-    options[-1] = [option.text for option in found.choices[-1].options].index("57 s")
-    variant = found.variant(tuple(options))
+    """Jacobi order, eps_t = 1, as sums without the step at 57 s; for PD eps_t stays 10."""
+    names = [choice.name for choice in found.six.choices]
+    options = list(found.six.ours.options)
+    for name in (*TRIED, "formula of the efforts"):
+        options[names.index(name)] = 1
+    options[-1] = [option.text for option in found.six.choices[-1].options].index("57 s")
+    variant = found.six.variant(tuple(options))
     for scenario, parameters in ((PROPOSED, {"controller.eps_t": 1.0}), (PD, {})):
         result = simulate(scenario, parameters, stop_time=57.0, order="jacobi", kind="native")
-        metrics = result.metrics()
+        applied = np.column_stack([result[f"plant.tau_applied.{k}"][1:] for k in "uqr"])
         np.testing.assert_allclose(
-            variant.numbers[scenario], [*metrics["l2_effort"], *metrics["final_error"]], rtol=1e-12
+            variant.numbers[scenario],
+            [*np.sqrt(np.sum(applied**2, axis=0) / 57.0), *result.metrics()["final_error"]],
+            rtol=1e-11,
         )
+
+
+def test_five_degrees_of_freedom_are_medians_over_starts_with_a_band(found):
+    """Runs of the FMUs from the same starts, which have the same bits."""
+    shown, names = found.printed[-1], [choice.name for choice in found.five.choices]
+    options = {
+        name: choice.options[i].parameters
+        for name, choice, i in zip(names, found.five.choices, shown.options, strict=True)
+    }
+    signal, order, formula, end = shown.options[-4:]
+    time = float(found.five.choices[-1].options[end].text.removesuffix(" s"))
+    order_of_evaluation = found.five.choices[names.index("order")].options
+    assert (signal, order) == (0, 0) and formula < 2
+    for scenario in (PROPOSED, PD):
+        sixes = []
+        for number in SHOWN:
+            away = np.random.default_rng(number).uniform(-FARTHEST, FARTHEST, 3)
+            start = dict(zip("xyz", np.add((2.0, 6.0, 0.0), away).tolist(), strict=True))
+            parameters = {"plant.roll": False, **{f"plant.eta0.{k}": x for k, x in start.items()}}
+            if scenario == PROPOSED:
+                parameters |= options["eps_t of the proposed controller"]
+            result = simulate(
+                scenario,
+                parameters,
+                stop_time=time,
+                order=order_of_evaluation[shown.options[names.index("order")]].order or None,
+                kind="native",
+            )
+            metrics = result.metrics()
+            factor = (0.02 * time) ** (-0.5 * formula)
+            sixes.append([*np.multiply(metrics["l2_effort"], factor), *metrics["final_error"]])
+        low, median, high = np.quantile(sixes, (0.1, 0.5, 0.9), axis=0)
+        np.testing.assert_allclose(shown.numbers[scenario], median, rtol=1e-9)
+        np.testing.assert_allclose(shown.bands[scenario].low, low, rtol=1e-9)
+        np.testing.assert_allclose(shown.bands[scenario].high, high, rtol=1e-9)
 
 
 def test_the_command_leaves_table_variants_and_record(found, monkeypatch, tmp_path, capsys):
@@ -72,5 +117,6 @@ def test_the_command_leaves_table_variants_and_record(found, monkeypatch, tmp_pa
     assert record["command"] == ["auv-fmu", "table", "--out", str(tmp_path)]
     assert record["files"] == ["run.json", "table.md", "variants.csv"]
     rows = (tmp_path / "variants.csv").read_text(encoding="utf-8").splitlines()
-    assert len(rows) == 1 + 2 * 2 * len(SIGNALS)
-    assert "| proposed L2 effort u [N·√s] | 130 | 183 |" in (tmp_path / "table.md").read_text()
+    # With six degrees of freedom, and with five.
+    assert len(rows) == 1 + 2 * (2 * 2)
+    assert "| proposed effort u | 130 | 183 |" in (tmp_path / "table.md").read_text()

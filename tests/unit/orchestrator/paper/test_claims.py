@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -76,6 +76,15 @@ def test_efforts_by_59_as_printed_differ_unless_both_are_near():
     assert claims.effort_as_printed(*near).verdict.startswith("agrees")
     far = outcome(rms_effort=(13.0, 4.0, 5.3))
     assert claims.effort_as_printed(far, near[1]).verdict.startswith("**differs**")
+
+
+def test_efforts_as_a_sum_are_norms_by_the_root_of_h_and_the_time():
+    """sqrt(0.02 * 200) is 2."""
+    run = {"stop_time": 200.0, "step": 0.02}
+    five = outcome(l2_effort=(260.0, 40.0, 106.0), **run)
+    found = claims.effort_as_a_sum(five, outcome(l2_effort=(470.0, 163.0, 344.0), **run))
+    assert found.ours.startswith("130 N; 20, 53 N·m, and 235 N; 81.5, 172 N·m, at T_f = 200 s")
+    assert found.verdict.startswith("ratio 1, 0.5, 1, and ratio 1, 0.5, 1")
 
 
 def test_final_errors_are_given_in_parts_of_the_published_ones():
@@ -205,6 +214,10 @@ def test_no_force_has_less_effort_than_its_impulse_takes(force):
     assert found.duration == 200.0
     effort = np.sqrt(20.0 * np.sum(force[1:] ** 2))
     assert found.least_effort <= effort * (1.0 + 1e-12) + 1e-12
+    # Without the step the same force is contradicted by nothing that comes later.
+    coded = np.sqrt(np.sum(force[1:] ** 2) / found.duration)
+    assume(coded > 1e-9)
+    assert found.contradicts_until(coded, 20.0) <= found.duration * (1.0 + 1e-9)
 
 
 def test_a_constant_force_has_the_least_effort():
@@ -239,6 +252,8 @@ def test_efforts_are_held_against_the_impulse_of_the_way():
     found = claims.effort_of_the_way(enough, short)
     assert found.ours.startswith("1000 N·s in 200 s, and 4000 N·s in 200 s")
     assert "not below 70.7, 283 N" in found.ours
+    # (1,000 N.s)^2 / 200 s / (130 N)^2, in steps of 20 s.
+    assert "from T_f = 0.0148, 0.0724 s on" in found.verdict
     assert found.verdict.startswith("**differs**")
     away = outcome(still(np.array([9.0, 8.0])))
     assert claims.effort_of_the_way(away, enough).verdict == "none"

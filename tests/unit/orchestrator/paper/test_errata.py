@@ -18,6 +18,7 @@ from auv_fmu.vehicle import Vehicle, accelerations
 from orchestrator.analysis import gains
 from orchestrator.experiments.wiring import closed_loop as loop_of
 from orchestrator.paper.errata import errata, errata_page, of_the_paper, section
+from orchestrator.paper.measures import sum_without_step
 from orchestrator.paper.published import EFFORT_PD, EFFORT_PROPOSED, TURNING_RADIUS
 
 ROOT = Path(__file__).parents[4]
@@ -78,7 +79,7 @@ def figure_5(controller):
 
 
 def test_surge_efforts_cannot_be_smaller():
-    text = text_of("4.2: surge efforts below what the way takes")
+    text = text_of("4.2: as L2 norms, surge efforts below what the way takes")
     least = []
     for controller in (Gains(eps_t=10.0), PdGains(eps_t=10.0)):
         impulse, square = 0.0, 0.0
@@ -92,6 +93,9 @@ def test_surge_efforts_cannot_be_smaller():
         assert least[-1] <= np.sqrt(square)
     assert f"at least {least[0]:.0f} and {least[1]:.0f} N·√s" in text
     assert least[0] > EFFORT_PROPOSED[0] and least[1] > EFFORT_PD[0]
+    # Where the bound of the sum, least / sqrt(h T_f), is what is printed.
+    free = np.square(np.divide(least, (EFFORT_PROPOSED[0], EFFORT_PD[0]))) / PAPER.h
+    assert f"From T_f = {free[0]:.0f} s on with the proposed controller and {free[1]:.0f} s" in text
 
 
 def effort(controller, h):
@@ -101,13 +105,14 @@ def effort(controller, h):
     return np.sqrt(h * (taus**2).sum(axis=0))
 
 
-def test_pd_effort_belongs_to_the_step():
-    text = text_of("4.2: an effort that belongs to the step of 20 ms")
-    printed, half = (effort(PdGains(eps_t=10.0), h) for h in (0.02, 0.01))
+def test_pd_efforts_belong_to_the_step():
+    text = text_of("4.2: efforts that belong to the step of 20 ms")
+    printed, half, quarter = (effort(PdGains(eps_t=10.0), h) for h in (0.02, 0.01, 0.005))
     assert f"is {printed[1]:.0f} N·m·√s after 60 s at the printed step" in text
     assert f"and {half[1]:.0f} at half of it" in text
-    printed, half = (effort(Gains(eps_t=10.0), h) for h in (0.02, 0.01))
-    np.testing.assert_allclose(half, printed, rtol=0.03)
+    assert f"is {printed[2]:.0f} at the printed step and {quarter[2]:.0f} at a quarter" in text
+    printed, quarter = (effort(Gains(eps_t=10.0), h) for h in (0.02, 0.005))
+    np.testing.assert_allclose(quarter, printed, rtol=0.04)
 
 
 def test_the_circle_is_the_one_of_2():
@@ -131,3 +136,14 @@ def test_the_circle_is_the_one_of_2():
 def test_59_cannot_exceed_the_limit(tau):
     assert np.sqrt(np.mean(np.square(tau))) <= 80.0 * (1.0 + 1e-12)
     assert max(EFFORT_PROPOSED) > 80.0 and min(EFFORT_PD) > 80.0
+
+
+@given(st.lists(st.floats(-80.0, 80.0), min_size=1), st.floats(1e-3, 1.0))
+def test_a_sum_without_the_step_is_the_norm_at_50_s(tau, h):
+    """(59) with a sum in place of the integral, and no step in it."""
+    duration = h * len(tau)
+    coded = np.sqrt(np.sum(np.square(tau)) / duration)
+    norm = np.sqrt(np.sum(h * np.square(tau)))
+    assert sum_without_step(norm, duration, h) == pytest.approx(coded, rel=1e-9, abs=1e-150)
+    assert sum_without_step(norm, 50.0, PAPER.h) == pytest.approx(norm)
+    assert sum_without_step(norm, 50.1, PAPER.h) <= norm
