@@ -23,6 +23,9 @@ from orchestrator.paper.sensitivity import (
 )
 from orchestrator.studies.engine import REACHED
 
+#: The score is told of so much less and more than T_f [s], for e_f moves with the waves.
+_AROUND = 10
+
 #: How near is near, in parts of a printed number.
 _TOLERANCES = (0.1, 0.25, 0.5)
 
@@ -119,14 +122,18 @@ def _number(value: float) -> str:
 
 
 def _described(found: Sensitivity, variant: Variant) -> str:
-    """Where a variant differs from ours, and its end time."""
+    """Where a variant differs from ours, its end time, and how much hangs on that."""
     *others, end = (
         (choice, choice.options[i], i)
         for choice, i in zip(found.choices, variant.options, strict=True)
     )
     words = [f"{choice.name}: {option.text}" for choice, option, i in others if i != choice.ours]
-    choice, option, _ = end
-    return plain("; ".join((*words, f"{choice.name} = {option.text}")))
+    choice, option, last = end
+    scores = found.scores[variant.options[:-1]]
+    around = [i for i in (last - _AROUND, last + _AROUND) if 0 <= i < len(END_TIMES)]
+    beside = " and ".join(f"{scores[i]:.2f} at {END_TIMES[i]:g} s" for i in around)
+    text = plain("; ".join((*words, f"{choice.name} = {option.text}")))
+    return f"{text}; the score is {beside}"
 
 
 def _starts(variants: Sequence[Variant]) -> str:
@@ -162,6 +169,10 @@ def _reached(found: Found) -> str:
         ]
         many = f"what is never reached is {_and(missed)}" if missed else "each is reached"
         texts.append(f"with the {name}, {many}")
+    near = [
+        numbers([100 * held.efforts_within(formula) for formula in range(len(_FORMULAS))])
+        for held in (found.six, found.five)
+    ]
     percent = numbers([100 * tolerance for tolerance in _TOLERANCES])
     counts = [
         numbers([held.most_within(tolerance) for tolerance in _TOLERANCES])
@@ -170,7 +181,9 @@ def _reached(found: Found) -> str:
     return (
         f"**Among variants that contradict nothing, {'; '.join(texts)}.** At most {counts[0]} of "
         f"the twelve come at once within {percent} % of what is printed in any variant with six "
-        f"degrees of freedom, and {counts[1]} with five."
+        f"degrees of freedom, and {counts[1]} with five. The six efforts alone, of what "
+        f"contradicts nothing, are at once within {near[0]} % with the two formulas and six "
+        f"degrees of freedom, and within {near[1]} % with five."
     )
 
 

@@ -170,6 +170,25 @@ class Sensitivity:
             for reading in _READINGS
         )
 
+    def efforts_within(self, formula: int) -> float:
+        """How near all six efforts are at once, in parts of the printed ones: the farthest of them.
+
+        At best, of what contradicts nothing that is printed and has come to the reference.
+        """
+        farthest = []
+        for scenario, numbers in self.numbers.items():
+            taken = self._arrived(scenario)
+            taken = taken & contradicts_nothing(scenario, (*self.of_runs, _SIGNALS, _T_FS))
+            efforts = as_read(numbers, 0, formula)[..., :3]
+            away = np.abs(efforts / PUBLISHED[scenario][:3] - 1.0).max(axis=-1)
+            farthest.append(np.where(taken, away, np.inf))
+        return float(np.maximum(*farthest).min())
+
+    def _arrived(self, scenario: str) -> np.ndarray:
+        """What has come to the reference by its end, with axes for SIGNALS and END_TIMES last."""
+        arrived: np.ndarray = (self.numbers[scenario][..., 3:] <= REACHED).all(axis=-1)
+        return arrived
+
     def span(self, scenario: str, consistent: bool, formula: int | None = None) -> Range:
         """Over what has come to the reference by its end.
 
@@ -179,10 +198,9 @@ class Sensitivity:
             formula: of the efforts, by FORMULAS; None: all.
 
         """
-        numbers = self.numbers[scenario]
-        taken = (numbers[..., 3:] <= REACHED).all(axis=-1)
+        numbers, taken = self.numbers[scenario], self._arrived(scenario)
         if consistent:
-            taken &= contradicts_nothing(scenario, (*self.of_runs, _SIGNALS, _T_FS))
+            taken = taken & contradicts_nothing(scenario, (*self.of_runs, _SIGNALS, _T_FS))
         sixes = (
             as_read(numbers, *reading)[taken]
             for reading in _READINGS

@@ -181,6 +181,18 @@ def test_ranges_are_of_what_has_arrived_and_of_what_is_consistent():
     assert found.ways_of(PROPOSED) == [Way(40.0, 1000.0)] * 2
 
 
+def test_how_near_all_six_efforts_are_at_once():
+    """What contradicts something, or is lost, is not looked at."""
+    where, lost = (0, 0, COMMANDED, T_F[72.0]), (0, 1, APPLIED, T_F[50.0])
+    efforts = {(*where, i): effort for i, effort in enumerate((1.2, 0.9, 1.32))}
+    far = {(*lost, slice(3)): 1.0, (*lost, 4): 1e3, (1, 0, APPLIED, T_F[60.0]): 1.0}
+    pd = {(0, 0, *where[2:]): 1.14, (0, 0, *lost[2:]): 1.0, (1, 0, APPLIED, T_F[60.0]): 1.0}
+    assert planted(proposed={**efforts, **far}, pd=pd).efforts_within(L2) == pytest.approx(0.32)
+    assert planted().efforts_within(L2) == pytest.approx(1.0)
+    # At 200 s the sum is half of L2.
+    assert planted().efforts_within(SUM) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_a_run_that_has_failed_is_no_variant():
     found = planted(proposed={(0, 0): np.nan, (1, 0): 0.9})
     assert np.isinf(found.scores[0, 0]).all()
@@ -214,8 +226,11 @@ def test_the_section_says_what_was_planted():
     text = section(found(planted(proposed={met: 1.0}, pd={(1, 0, *met[2:]): 1.0})))
     row = "| proposed effort u | 130 | 260 | 130 | 130 | 260 (130 to 650) | **260 to 260** |"
     assert row in text
-    assert "- nearest of all: sea: rough; observer: fast; T_f = 60 s." in text
-    assert "- ours: T_f = 100 s." in text
+    assert (
+        "- nearest of all: sea: rough; observer: fast; T_f = 60 s; the score is 8.32 at 50 s"
+        in text
+    )
+    assert "- ours: T_f = 100 s; the score is 8.32 at 90 s and 8.32 at 110 s." in text
     assert "The numbers of nearest of five depend on that" in text
     assert "with the L2 norm, what is never reached is proposed effort u, " in text
     assert "with the sum without the step, what is never reached is proposed e_f x" in text
