@@ -116,6 +116,13 @@ OF_RUNS = (
         ),
     ),
     Choice(
+        "plant",
+        (
+            Option("Euler's scheme"),
+            Option("Runge and Kutta's", {"plant.integrator": "rk4"}, "4.1: Euler, 20 ms"),
+        ),
+    ),
+    Choice(
         "disturbance",
         (
             Option("tau_w as in (2)"),

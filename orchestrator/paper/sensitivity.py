@@ -178,7 +178,7 @@ class Sensitivity:
         farthest = []
         for scenario, numbers in self.numbers.items():
             taken = self._arrived(scenario)
-            taken = taken & contradicts_nothing(scenario, (*self.of_runs, _SIGNALS, _T_FS))
+            taken = np.logical_and(taken, self._consistent(scenario))
             efforts = as_read(numbers, 0, formula)[..., :3]
             away = np.abs(efforts / PUBLISHED[scenario][:3] - 1.0).max(axis=-1)
             farthest.append(np.where(taken, away, np.inf))
@@ -186,8 +186,11 @@ class Sensitivity:
 
     def _arrived(self, scenario: str) -> np.ndarray:
         """What has come to the reference by its end, with axes for SIGNALS and END_TIMES last."""
-        arrived: np.ndarray = (self.numbers[scenario][..., 3:] <= REACHED).all(axis=-1)
-        return arrived
+        return np.asarray((self.numbers[scenario][..., 3:] <= REACHED).all(axis=-1))
+
+    def _consistent(self, scenario: str) -> np.ndarray:
+        """What contradicts nothing that is printed, with axes as :meth:`_arrived` has them."""
+        return contradicts_nothing(scenario, (*self.of_runs, _SIGNALS, _T_FS))
 
     def span(self, scenario: str, consistent: bool, formula: int | None = None) -> Range:
         """Over what has come to the reference by its end.
@@ -200,7 +203,7 @@ class Sensitivity:
         """
         numbers, taken = self.numbers[scenario], self._arrived(scenario)
         if consistent:
-            taken = taken & contradicts_nothing(scenario, (*self.of_runs, _SIGNALS, _T_FS))
+            taken = np.logical_and(taken, self._consistent(scenario))
         sixes = (
             as_read(numbers, *reading)[taken]
             for reading in _READINGS

@@ -231,3 +231,11 @@ def test_chatter_of_the_robust_term_is_told(capsys: pytest.CaptureFixture[str]):
     assert "warning" not in capsys.readouterr().err
     assert main([*quiet, "--set", "controller.eps_t=0.01"]) == 0
     assert "warning: fig4: the robust term chatters" in capsys.readouterr().err
+
+
+def test_a_run_that_passes_the_pole_is_told(capsys: pytest.CaptureFixture[str]):
+    upright = ["run", "fig5-pd", "--no-figures", "--stop-time", "10"]
+    assert main(upright) == 0
+    assert "warning" not in capsys.readouterr().err
+    assert main([*upright, "--set", "plant.roll=false"]) == 0
+    assert "warning: fig5-pd: the pitch passes 90 degrees by t = " in capsys.readouterr().err
