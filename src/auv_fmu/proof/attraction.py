@@ -126,6 +126,20 @@ def alpha_1_at_most(lambda_d2: float, k: float) -> float:
     return 64.0 / 27.0 * lambda_d2**3 / k**2 / (4.0 + 2.0 * sqrt(5.0))
 
 
+def ball(theta: float, eps_t: float, mu_sigma: float) -> float:
+    """sqrt(gamma / c) of (44), the radius of Omega_p, at the kappa of (41) that makes it least.
+
+    c is mu_sigma (1 - 0.5 / kappa^2) at most, and gamma = 0.5 mu_sigma kappa^2 theta^2 + 3 eps_t.
+
+    Args:
+        theta: |theta - theta_0|, in SI units.
+        eps_t: width of the boundary layer [W].
+        mu_sigma: smallest entry of Sigma.
+
+    """
+    return 0.5 * (theta + sqrt(theta * theta + 12.0 * eps_t / mu_sigma))
+
+
 def stretch(known: Bounds, gains: Gains, maximum_slope: float, v0: float = 1.0) -> float:
     """sqrt(max{lambda_u / lambda_x, lambda_max(Gamma^-1) / (2 lambda_x)}) of (46) and (33).
 

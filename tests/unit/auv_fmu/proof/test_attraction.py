@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from auv_fmu import motion_planner
 from auv_fmu.output_feedback import Gains
-from auv_fmu.proof.attraction import alpha_1_at_most, alphas, reach, stretch, theorem
+from auv_fmu.proof.attraction import alpha_1_at_most, alphas, ball, reach, stretch, theorem
 from auv_fmu.proof.gain_conditions import Bounds, bounds, conditions
 from auv_fmu.proof.zetas import Zetas, coupling
 from auv_fmu.vehicle import Vehicle
@@ -159,6 +159,46 @@ def test_a_vehicle_and_gains_that_the_theorem_may_cover():
     found = theorem(DAMPED, ELL, QUICK, 1.0)
     assert [condition.verdict for condition in found.conditions] == ["met", "open", "open"]
     assert 0.0 < found.radius == found.x_at_most / found.stretch
+
+
+@given(theta=st.floats(0.0, 300.0), eps_t=positive, mu_sigma=st.floats(1e-4, 0.1))
+def test_ball_of_44_at_the_best_kappa(theta, eps_t, mu_sigma):
+    """No kappa makes it smaller, and one comes close; it falls as Sigma grows."""
+    square = np.geomspace(0.500001, 1e6, 20_000)
+    gamma = 0.5 * mu_sigma * square * theta**2 + 3.0 * eps_t
+    least = np.sqrt(np.min(gamma / (mu_sigma * (1.0 - 0.5 / square))))
+    found = ball(theta, eps_t, mu_sigma)
+    assert found <= least * (1.0 + 1e-12)
+    assert found == pytest.approx(least, rel=1e-3)
+    assert ball(theta, eps_t, 2.0 * mu_sigma) < found
+
+
+@given(e_z=three, z=three)
+def test_ball_of_44_holds_every_error(e_z, z):
+    """With the values of section 4.1 and theta known beforehand, which makes it smallest."""
+    assert np.linalg.norm(np.tanh([*e_z, *z])) <= np.sqrt(6.0) < ball(0.0, 1.0, 0.001)
+
+
+def test_41_needs_the_largest_entry_of_sigma():
+    """At kappa = 1, half-way to theta_0 in the entry that is forgotten a hundred times faster."""
+    sigma, away = np.array([0.001, 0.001, 0.001, 0.1]), np.array([0.0, 0.0, 0.0, 1.0])
+    tilde = 0.5 * away
+    left = tilde @ (sigma * (away - tilde))  # theta_hat - theta_0 = away - tilde
+    assert left == pytest.approx(0.025)
+    assert -min(sigma) * 0.5 * (tilde @ tilde) + 0.5 * min(sigma) * (away @ away) < 0.0004
+
+
+@given(
+    sigma=vectors(st.floats(1e-4, 1.0), 4),
+    away=vectors(speeds, 4),
+    tilde=vectors(speeds, 4),
+    square=st.floats(0.51, 100.0),
+)
+def test_41_holds_with_the_largest_entry_of_sigma(sigma, away, tilde, square):
+    sigma, away, tilde = map(np.array, (sigma, away, tilde))
+    bound = -min(sigma) * (1.0 - 0.5 / square) * (tilde @ tilde)
+    bound += 0.5 * max(sigma) * square * (away @ away)
+    assert tilde @ (sigma * (away - tilde)) <= bound + 1e-9
 
 
 @given(room=positive, k=positive, share=st.floats(0.0, 1.0))
