@@ -59,7 +59,8 @@ def theorem(
     """
     known, k = bounds(vehicle, ell), coupling(vehicle, ell)
     zetas = at_least(vehicle, ell, gains.lambda_, v0)
-    found = conditions(known, zetas, *gains[:4], maximum_slope, v0)
+    K1, K2, lambda_, k_d, *_ = gains
+    found = conditions(known, zetas, K1, K2, lambda_, k_d, maximum_slope, v0)
     return Theorem(
         known,
         zetas,

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from auv_fmu.attitude import rotation_from_euler
+from auv_fmu.proof.control_point_model import C_2
 from auv_fmu.proof.error_dynamics import chi_1, chi_2
 from auv_fmu.proof.zetas import at_least, coupling
 from auv_fmu.vehicle import Vehicle
@@ -49,7 +50,8 @@ def test_chi_1_is_half_the_coupling_times_the_square_of_r_1(vehicle, ell, size):
 def test_chi_1_is_the_coupling_times_a_reference_ahead(vehicle, ell, speed, size):
     """In proportion to r_1, so that zeta_1 is k |dy_r| at least. Ahead it damps, astern it drives.
 
-    No gain is in it but lambda, and that not where e = z.
+    No gain is in it but lambda, and that not where e = z. Without P2.3, chi_1 has C_2(r_1) dy_r for
+    C_2(dy_r) r_1: it is as large with the two directions exchanged.
     """
     at, ahead = (vehicle, 0.0, YAW, STILL), turned((speed, 0.0, 0.0))
     for sign in (1.0, -1.0):
@@ -60,6 +62,12 @@ def test_chi_1_is_the_coupling_times_a_reference_ahead(vehicle, ell, speed, size
             work.append(sign * chi @ r_1)
         assert max(found) == pytest.approx(coupling(vehicle, ell) * speed * size, abs=1e-9)
         assert max(work) <= 1e-9
+    found = []
+    for dy_r in (turned((0.0, speed, 0.0)), turned((0.0, 0.0, speed))):
+        r_1 = turned((size, 0.0, 0.0))
+        crossed = C_2(*at[:3], dy_r, ell) @ r_1 - C_2(*at[:3], r_1, ell) @ dy_r
+        found.append(np.linalg.norm(chi_1(*at, dy_r, r_1, ell) + crossed))
+    assert max(found) == pytest.approx(coupling(vehicle, ell) * speed * size, abs=1e-9)
 
 
 @given(vehicle=vehicles, ell=distances, lambda_=lambdas, v0=units)
