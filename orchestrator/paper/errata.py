@@ -195,6 +195,17 @@ def errata() -> tuple[Erratum, ...]:
             ),
         ),
         Erratum(
+            "(33) has min where (47) needs max",
+            "(47) has the sum (lambda_u / lambda_x) |u|^2 + (0.5 lambda_max(Gamma^-1) / lambda_x) "
+            "|theta - theta_hat|^2, which only the larger factor times |vartheta|^2 bounds. On the "
+            "boundary of (33) with all of vartheta in u, (47) is missed. With the values of "
+            f"section 4.1, in SI units, the radius is smaller by a factor of {factor:.1f}.",
+            (
+                f"{_ATTRACTION}::test_33_as_printed_admits_starts_that_47_excludes",
+                f"{_ATTRACTION}::test_33_needs_the_max_for_47",
+            ),
+        ),
+        Erratum(
             "(41) needs the largest entry of Sigma",
             "Completing the square leaves 0.5 kappa^2 lambda_max(Sigma) |theta - theta_0|^2 in "
             "gamma, where (41) has mu_sigma, which is the smallest. With Sigma = diag(0.001, "
@@ -212,17 +223,6 @@ def errata() -> tuple[Erratum, ...]:
             "(45) has V(0) only. Start at e = z = r_1 = r_2 = 0 with theta_0 = theta: V(0) = 0, "
             "and the first disturbance makes V positive. (46), (47) and (33) inherit it.",
             (f"{_ERRATA}::test_v_rises_from_zero",),
-        ),
-        Erratum(
-            "(33) has min where (47) needs max",
-            "(47) has the sum (lambda_u / lambda_x) |u|^2 + (0.5 lambda_max(Gamma^-1) / lambda_x) "
-            "|theta - theta_hat|^2, which only the larger factor times |vartheta|^2 bounds. On the "
-            "boundary of (33) with all of vartheta in u, (47) is missed. With the values of "
-            f"section 4.1, in SI units, the radius is smaller by a factor of {factor:.1f}.",
-            (
-                f"{_ATTRACTION}::test_33_as_printed_admits_starts_that_47_excludes",
-                f"{_ATTRACTION}::test_33_needs_the_max_for_47",
-            ),
         ),
         Erratum(
             "4.1: the quoted turning radius has the size of the diameter",
@@ -313,8 +313,8 @@ def errata() -> tuple[Erratum, ...]:
             "ahead at V, and r_1 to starboard. Then |chi_1| = k V |r_1| with k = m11 m66 / "
             f"(m22 ell^3) = {k:.1f} kg/m, so 0.5 (zeta_1 + zeta_2) >= 0.5 k V, whatever the gains "
             f"and v0; lambda_d2 is {there:g} kg/s, and V must be below {speed:.2f} m/s. The "
-            "reference of section 4.1 makes 0.167. (Without P2.3 the same holds, for a reference "
-            "to starboard.) Even for one at rest, with e astern and r_1 halfway between ahead and "
+            "reference of section 4.1 makes 0.167 m/s. (Without P2.3 the same holds, for a "
+            "reference to starboard.) Even for one at rest, with e astern and r_1 halfway between ahead and "
             "starboard, 0.5 (zeta_1 + zeta_2) >= 0.25 k sqrt(v0^2 + lambda^2). So lambda must be "
             f"below {2.0 * speed:.2f} m/s whatever v0 is, and as printed, at v0 = 1 m/s, no gains "
             f"do: {found.zeta_of_any_gains:.1f} kg/s at lambda = 0, {second.least:.1f} at 1 m/s, "
@@ -355,8 +355,8 @@ def errata() -> tuple[Erratum, ...]:
             "(44): the ball holds every position error",
             "c < mu_sigma and gamma >= 3 eps_t. At the best kappa, sqrt(gamma / c) is "
             f"{balls[0]:.1f} even if theta_0 = theta, and {balls[1]:.0f} with |theta - theta_0| = "
-            f"lambda_M2 = {of_theta:.0f} kg, which theta_4 must be to bound M_2 ddy_r, and "
-            f"theta_0 = 0; at eps_t = 10, {balls[2]:.0f} and {balls[3]:.0f}. But both Tanh in x "
+            f"lambda_M2 = {of_theta:.0f}, which is theta_4 by P2.1 where theta_0 = 0, in SI "
+            f"units; at eps_t = 10, {balls[2]:.0f} and {balls[3]:.0f}. But both Tanh in x "
             "stay below sqrt(6) together: Omega_p holds every e and z, and that e is bounded does "
             "not follow. So far this is owed to the units in p, and (43) mends it: V falls where "
             "c_m |x|^2 > gamma. That bounds e if gamma is below c_m, and so below alpha_1. But "
@@ -455,7 +455,7 @@ def errata() -> tuple[Erratum, ...]:
             TENSION,
         ),
         Erratum(
-            "4.1: exponentially, from a metre on",
+            "4.1: exponential convergence, within a metre",
             "The tracking errors are said to converge exponentially. Where r_1 = z = 0, (17) is "
             "de/dt = -lambda tanh(e) in each direction, which has sinh(e), not e, fall "
             "exponentially: beyond a metre e falls at the constant speed lambda, from 6 to 1.1 m "

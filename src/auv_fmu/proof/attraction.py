@@ -59,8 +59,9 @@ def theorem(
     """
     known, k = bounds(vehicle, ell), coupling(vehicle, ell)
     zetas = at_least(vehicle, ell, gains.lambda_, v0)
-    K1, K2, lambda_, k_d, *_ = gains
-    found = conditions(known, zetas, K1, K2, lambda_, k_d, maximum_slope, v0)
+    found = conditions(
+        known, zetas, gains.K1, gains.K2, gains.lambda_, gains.k_d, maximum_slope, v0
+    )
     return Theorem(
         known,
         zetas,
