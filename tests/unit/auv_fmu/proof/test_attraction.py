@@ -211,6 +211,14 @@ def test_no_zetas_reach_further(room, k, share):
     assert not twice_alpha_3 > zeta_1 + zeta_2 * x**2
 
 
+@given(room=positive, k=positive, zeta_2=st.floats(0.0, 100.0), x=st.floats(0.0, 1.0))
+def test_no_ball_is_left_for_a_reference_that_moves(room, k, zeta_2, x):
+    """Faster than room / k, which is half of what (31) asks for: zeta_1 is k |dy_d| at least."""
+    speed = 0.5001 * reach(room, k)
+    zeta_1 = k * speed
+    assert not 2.0 * room - (zeta_1 + zeta_2) > zeta_1 + zeta_2 * x**2
+
+
 def test_zetas_that_reach_as_far_are_there():
     """zeta_1 = k |x| / 2 and zeta_2 = 0, for states up to |x|."""
     x = 0.999 * reach(30.0, 500.0)
