@@ -18,13 +18,13 @@ from orchestrator.system.structure import System
 #: What the paper says of these conditions, in Remark 4, and what they leave open.
 _NOTE = """\
 The conditions are sufficient, and Remark 4 calls them conservative: a run may well be stable
-where they are violated. The zetas of (26) and (29) are known from below only: a condition that is
-open with the least of them may be violated with the true ones, and none that has them can be met
-for certain, because C_2 has a pole at the vertical. The report has the proofs, under "What is wrong
-in the paper"; so has docs/paper.md."""
+where they are violated. The zetas of (26) and (29) are known from below only, by states of a level
+vehicle. C_2 has a pole at the vertical, so that no finite zetas hold at all attitudes: open means
+that a condition may hold for pitches that keep off it. The report has the proofs, under "What is
+wrong in the paper"; so has docs/paper.md."""
 
 _PAPER = """\
-These are the paper's own gains: they miss (30), and no gains meet (31) for this vehicle."""
+These are the paper's own gains: as printed they miss (30), and (31) in any unit of speed."""
 
 
 def evaluate(system: System) -> Theorem:
@@ -69,33 +69,41 @@ def stated(found: Theorem) -> Iterator[str]:
     yield "over all attitudes:"
     yield f"  lambda_m2 = {known.lambda_m2:.6g} kg, lambda_M2 = {known.lambda_M2:.6g} kg"
     yield f"  lambda_d2 = {known.lambda_d2:.6g} kg/s, lambda_D2 = {known.lambda_D2:.6g} kg/s"
+    yield ""
+    yield "as printed, with speeds in m/s:"
     yield f"  zeta_1 + zeta_2 >= {zetas.zeta_1_2:.4g} kg/s"
     yield f"  zeta_3 + zeta_4 >= {zetas.zeta_3_4:.4g} kg/s"
-    yield ""
     for condition in found.conditions:
         least = f" + {condition.zetas}, at least {condition.right + condition.least:.4g}"
-        yield f"{condition.number}  {condition.statement}"
+        yield f"  {condition.number}  {condition.statement}"
         yield (
-            f"  {condition.left:.6g} > {condition.right:.6g}{least if condition.zetas else ''}: "
+            f"    {condition.left:.6g} > {condition.right:.6g}{least if condition.zetas else ''}: "
             f"{condition.verdict}"
         )
     if found.zeta_of_any_gains >= known.lambda_d2:
         least = f"{known.lambda_d2:.6g} > 0.5 (zeta_1 + zeta_2), at least "
-        yield f"(31), (53)  by any gains: {least}{found.zeta_of_any_gains:.4g}: violated"
-    yield ""
+        yield f"  (31), (53)  by any gains: {least}{found.zeta_of_any_gains:.4g}: violated"
     yield (
-        f"(40)  alpha_1 = {alphas.alpha_1:.4g}, alpha_2 = {alphas.alpha_2:.4g}, "
+        f"  (40)  alpha_1 = {alphas.alpha_1:.4g}, alpha_2 = {alphas.alpha_2:.4g}, "
         f"alpha_3 <= {alphas.alpha_3:.4g}, alpha_4 <= {alphas.alpha_4:.4g}"
     )
     yield (
-        f"(33)  R_A lies within |vartheta| < {found.radius:.3g}"
+        f"  (33)  R_A lies within |vartheta| < {found.radius:.3g}"
         if found.radius
-        else "(33)  R_A is empty"
+        else "  (33)  R_A is empty"
     )
     yield (
-        "(42)  with zetas for a part of the states alone: holds for |x| < "
+        "  (42)  with zetas for a part of the states only: holds for |x| < "
         f"{found.x_at_most:.3g} at most, with any gains for |x| < {found.x_of_any_gains:.3g}"
     )
+    yield ""
+    yield "with any gains, and with speeds in any unit:"
+    yield (
+        f"  (31), (53)  asks for lambda < {2.0 * found.speed_of_any_gains:.3g} m/s and "
+        f"|dy_d| < {found.speed_of_any_gains:.3g} m/s"
+    )
+    yield f"  (40)  alpha_1 < {found.alpha_1_of_any_gains:.3g} W, where (31) holds"
+    yield f"  (42)  holds for |r_1| < {found.speed_of_any_gains:.3g} m/s at most"
 
 
 def _sampling(system: System) -> list[str]:

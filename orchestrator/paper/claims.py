@@ -421,8 +421,8 @@ def region_is_arbitrarily_large() -> Finding:
     found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE["tanh"])
     least, there = found.zeta_of_any_gains, found.bounds.lambda_d2
     return Finding(
-        f"by any gains (31) asks for lambda_d2 > {least:.4g}, which is {there:g}; (42) holds for "
-        f"|x| < {found.x_of_any_gains:.2g} at most",
+        f"as printed, (31) asks for lambda_d2 > {least:.4g} with any gains, which is {there:g}; "
+        f"(42) holds for |x| < {found.x_of_any_gains:.2g} at most",
         f"{said(least < there)}: no gain enters alpha_3 with a plus "
         "([the proof](#the-region-of-attraction-does-not-grow-with-the-gains))",
     )

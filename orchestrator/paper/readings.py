@@ -51,8 +51,9 @@ READINGS: dict[int, tuple[str, str]] = {
     ),
     10: (
         "Gain conditions.",
-        "The paper's gains violate (30), and any gains (31): Theorem 1 does not apply to this "
-        "vehicle. Remark 4 calls the conditions sufficient and conservative.",
+        "As printed, the paper's gains violate (30), and any gains (31); the paper's do so in any "
+        "unit of speed: Theorem 1 does not apply to this loop. Remark 4 calls the conditions "
+        "sufficient and conservative.",
     ),
     11: (
         "Turning radius.",

@@ -16,7 +16,7 @@ from auv_fmu.vehicle import Vehicle
 
 
 class Alphas(NamedTuple):
-    """What alpha_1 to alpha_4, which (40) leaves of (37), are at most; two need no zetas."""
+    """What alpha_1 to alpha_4 [W], which (40) leaves of (37), are at most; two need no zetas."""
 
     alpha_1: float
     alpha_2: float
@@ -34,6 +34,8 @@ class Theorem(NamedTuple):
     x_at_most: float  #: |x| at which (42) may hold, at most, with these gains
     x_of_any_gains: float  #: the same with any gains
     zeta_of_any_gains: float  #: what 0.5 (zeta_1 + zeta_2) of (31) is at least with any gains
+    speed_of_any_gains: float  #: with any gains and v0, |r_1| of (42) and the reference are slower
+    alpha_1_of_any_gains: float  #: alpha_1 where (31) holds, at most, with any gains and v0 [W]
     stretch: float  #: sqrt of the max in (33): |x| never exceeds this times |vartheta(0)|
 
     @property
@@ -42,7 +44,9 @@ class Theorem(NamedTuple):
         return self.x_at_most / self.stretch if min(self.alphas) > 0.0 else 0.0
 
 
-def theorem(vehicle: Vehicle, ell: float, gains: Gains, maximum_slope: float) -> Theorem:
+def theorem(
+    vehicle: Vehicle, ell: float, gains: Gains, maximum_slope: float, v0: float = 1.0
+) -> Theorem:
     """The conditions, the alphas and the region of attraction.
 
     Args:
@@ -50,42 +54,57 @@ def theorem(vehicle: Vehicle, ell: float, gains: Gains, maximum_slope: float) ->
         ell: distance of the control point [m].
         gains: of the controller.
         maximum_slope: s'_MM of its saturation function; 1 is Theorem 1.
+        v0: unit of speed [m/s], see :mod:`.gain_conditions`.
 
     """
-    known, zetas = bounds(vehicle, ell), at_least(vehicle, ell, gains.lambda_)
-    found = conditions(known, zetas, gains.K1, gains.K2, gains.lambda_, gains.k_d, maximum_slope)
-    k = coupling(vehicle, ell)
+    known, k = bounds(vehicle, ell), coupling(vehicle, ell)
+    zetas = at_least(vehicle, ell, gains.lambda_, v0)
+    found = conditions(
+        known, zetas, gains.K1, gains.K2, gains.lambda_, gains.k_d, maximum_slope, v0
+    )
     return Theorem(
         known,
         zetas,
         found,
-        alphas(known, found, gains),
-        reach(found[1].room, k),
+        alphas(known, found, gains, v0),
+        reach(found[1].room, k) / v0,
+        reach(known.lambda_d2, k) / v0,
+        0.5 * at_least(vehicle, ell, 0.0, v0).zeta_1_2,
         reach(known.lambda_d2, k),
-        0.5 * at_least(vehicle, ell, 0.0).zeta_1_2,
-        stretch(known, gains, maximum_slope),
+        alpha_1_at_most(known.lambda_d2, k),
+        stretch(known, gains, maximum_slope, v0),
     )
 
 
-def alphas(known: Bounds, found: tuple[Condition, Condition, Condition], gains: Gains) -> Alphas:
+def alphas(
+    known: Bounds, found: tuple[Condition, Condition, Condition], gains: Gains, v0: float = 1.0
+) -> Alphas:
     """alpha_1 to alpha_4, defined below (40): the margins of (30) to (32), and one more.
 
     Args:
         known: eigenvalues of M_2.
         found: the conditions.
         gains: of the controller.
+        v0: unit of speed [m/s].
 
     """
     first, second, third = (condition.margin for condition in found)
-    return Alphas(first, first + 0.5 * max(gains.K2), second, third * known.lambda_m2)
+    square = v0 * v0
+    return Alphas(
+        first,
+        first + 0.5 * max(gains.K2) * v0,
+        second * square,
+        third * known.lambda_m2 * square,
+    )
 
 
 def reach(room: float, k: float) -> float:
-    """What |x| is at most where (42) holds, even if (26) is asked for no further than there.
+    """What v0 |x| [m/s] is at most where (42) holds, even if (26) holds no further than there.
 
     (42) and alpha_m <= alpha_3 ask for 2 zeta_1 + zeta_2 (1 + |x|^2) < 2 room; a chi_1 of
-    k |x|^2 / 2 asks for zeta_1 + zeta_2 |x| >= k |x| / 2. As 1 + |x|^2 >= 2 |x|, both need
-    k |x| < 2 room.
+    k |r_1|^2 / 2 with |r_1| = v0 |x| asks for zeta_1 + zeta_2 |x| >= k v0 |x| / 2. As
+    1 + |x|^2 >= 2 |x|, both need k v0 |x| < 2 room. So does (31) of the speed of a reference: see
+    :func:`.coupling`.
 
     Args:
         room: lambda_d2 less what the gains take of it in (31) [kg/s].
@@ -95,7 +114,35 @@ def reach(room: float, k: float) -> float:
     return max(2.0 * room / k, 0.0)
 
 
-def stretch(known: Bounds, gains: Gains, maximum_slope: float) -> float:
+def alpha_1_at_most(lambda_d2: float, k: float) -> float:
+    """What alpha_1 [W] is at most where (31) holds, whatever the gains and v0.
+
+    (31) has k_2max < 2 v0 (lambda_d2 - k sqrt(v0^2 + lambda^2) / 4), and alpha_1 is
+    k_2max (lambda / 2 - v0) at most. The product is largest at lambda = (2 + sqrt(5)) v0.
+
+    Args:
+        lambda_d2: smallest eigenvalue of D_2 [kg/s].
+        k: coupling [kg/m].
+
+    """
+    return 64.0 / 27.0 * lambda_d2**3 / k**2 / (4.0 + 2.0 * sqrt(5.0))
+
+
+def ball(theta: float, eps_t: float, mu_sigma: float) -> float:
+    """sqrt(gamma / c) of (44), the radius of Omega_p, at the kappa of (41) that makes it least.
+
+    c is mu_sigma (1 - 0.5 / kappa^2) at most, and gamma = 0.5 mu_sigma kappa^2 theta^2 + 3 eps_t.
+
+    Args:
+        theta: |theta - theta_0|, in SI units.
+        eps_t: width of the boundary layer [W].
+        mu_sigma: smallest entry of Sigma.
+
+    """
+    return 0.5 * (theta + sqrt(theta * theta + 12.0 * eps_t / mu_sigma))
+
+
+def stretch(known: Bounds, gains: Gains, maximum_slope: float, v0: float = 1.0) -> float:
     """sqrt(max{lambda_u / lambda_x, lambda_max(Gamma^-1) / (2 lambda_x)}) of (46) and (33).
 
     (33) prints min for max, but (47) has a sum over both parts of vartheta, which only the larger
@@ -105,9 +152,11 @@ def stretch(known: Bounds, gains: Gains, maximum_slope: float) -> float:
         known: eigenvalues of M_2.
         gains: of the controller.
         maximum_slope: s'_MM of its saturation function.
+        v0: unit of speed [m/s].
 
     """
-    lambda_x = 0.5 * min(min(gains.K2) / maximum_slope, known.lambda_m2)
-    lambda_u = 0.5 * max(max(gains.K2) * maximum_slope, known.lambda_M2)
+    square = v0 * v0
+    lambda_x = 0.5 * min(min(gains.K2) / maximum_slope, known.lambda_m2 * square)
+    lambda_u = 0.5 * max(max(gains.K2) * maximum_slope, known.lambda_M2 * square)
     of_theta = 0.5 / gains.gamma if gains.gamma else inf
     return sqrt(max(lambda_u, of_theta) / lambda_x)

@@ -4,6 +4,11 @@ The zetas of (26) and (29) bound what the paper leaves unknown, and :mod:`.zetas
 below. So a condition is stated as its left side, the known part of the right side, and what the
 zetas take at least. It is violated if they take more than there is, met if it has none, open
 otherwise.
+
+(30) adds N to N m/s, (31) adds N to kg/s, and |x| adds m/s to pure numbers: the paper counts speeds
+in m/s. In another unit v0, with r_1 / v0 and r_2 / v0 in x and with |chi_i| / v0 in (26) and (29),
+the same steps give the same conditions with k_2max v0 for k_2max in (30), and k_2max / v0 for it in
+(31) and (32). k_1max has the slope of Tanh(dy_o - dy_r) in (21), which is per m/s in any case.
 """
 
 from __future__ import annotations
@@ -77,6 +82,7 @@ def conditions(
     lambda_: float,
     k_d: float,
     maximum_slope: float,
+    v0: float = 1.0,
 ) -> tuple[Condition, Condition, Condition]:
     """(52) to (54), which for tanh, with s'_MM = 1, are (30) to (32).
 
@@ -87,6 +93,7 @@ def conditions(
         lambda_: diagonal entry of Lambda [m/s].
         k_d: gain of the observer [1/s].
         maximum_slope: s'_MM of the saturation function.
+        v0: unit of speed [m/s]; at 1 the conditions are as printed.
 
     """
     k_1, k_2 = max(K1), max(K2)
@@ -95,7 +102,7 @@ def conditions(
             "(30), (52)",
             "lambda_min(K_2 Lambda) > 0.5 k_2max lambda + k_2max",
             min(K2) * lambda_,
-            0.5 * k_2 * lambda_ + k_2,
+            0.5 * k_2 * lambda_ + k_2 * v0,
             "",
             0.0,
         ),
@@ -103,7 +110,7 @@ def conditions(
             "(31), (53)",
             "lambda_d2 > s'_MM k_1max + 0.5 k_2max + 0.5 (zeta_1 + zeta_2)",
             known.lambda_d2,
-            maximum_slope * k_1 + 0.5 * k_2,
+            maximum_slope * k_1 + 0.5 * k_2 / v0,
             "0.5 (zeta_1 + zeta_2)",
             0.5 * zetas.zeta_1_2,
         ),
@@ -111,7 +118,7 @@ def conditions(
             "(32), (54)",
             "k_d > (2 s'_MM k_1max + k_2max + 0.5 (zeta_3 + zeta_4)) / lambda_m2",
             k_d,
-            (2.0 * maximum_slope * k_1 + k_2) / known.lambda_m2,
+            (2.0 * maximum_slope * k_1 + k_2 / v0) / known.lambda_m2,
             "0.5 (zeta_3 + zeta_4) / lambda_m2",
             0.5 * zetas.zeta_3_4 / known.lambda_m2,
         ),

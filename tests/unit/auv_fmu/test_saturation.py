@@ -1,6 +1,6 @@
 """Definition 2 and Lemma 1."""
 
-from math import cosh, log, tanh
+from math import asinh, cosh, exp, log, sinh, tanh
 
 import numpy as np
 import pytest
@@ -109,9 +109,24 @@ def test_lemma_1_iv_to_vi(name, x, k, psi):
 
 
 def test_lemma_1_as_printed_fails():
-    """(vi) without its square for 2 tanh(xi), s'_M = 2; (i) for ln(cosh(xi)) at k_1 = 2."""
+    """(vi) without its square for 2 tanh(xi), s'_M = 2; (i) for ln(cosh(xi)) at k_1 = 2; (v)."""
+    x, psi = np.array([10.0, -1.0]), np.array([[1.0, 5.0], [5.0, 26.0]])
+    assert np.linalg.eigvalsh(psi)[0] > 0.0
+    assert x @ psi @ np.tanh(x) == pytest.approx(-13.3, abs=0.05)
     assert (2.0 * tanh(0.1)) ** 2 > 2.0 * 0.1**2
     assert tanh(2.0 * 0.1) ** 2 / (2.0 * 2.0) > log(cosh(0.1))
+
+
+@given(start=st.floats(-10.0, 10.0), t=st.floats(0.0, 20.0))
+def test_a_saturated_error_falls_at_constant_speed_first(start, t):
+    """de/dt = -tanh(e) has sinh(e) = sinh(e(0)) exp(-t): from 6 m it comes to 1.1 m in 5 s."""
+
+    def e(start, t):
+        return asinh(sinh(start) * exp(-t))
+
+    rate = (e(start, t + 1e-5) - e(start, t - 1e-5)) / 2e-5
+    assert rate == pytest.approx(-tanh(e(start, t)), abs=1e-6)
+    assert e(6.0, 5.0) == pytest.approx(1.1, abs=0.05)
 
 
 @every

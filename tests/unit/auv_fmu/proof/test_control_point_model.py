@@ -56,6 +56,33 @@ def test_equations_6_and_7_are_equation_2(theta, nu, tau, tau_w):
     np.testing.assert_allclose(rate_bar, [dv, dw], atol=1e-12)
 
 
+def test_1_and_2_turn_a_body_on_which_nothing_acts():
+    """A sphere in (2), at u = 1 m/s, that yaws at 0.6 rad/s with a pitch of 0.6 rad.
+
+    (1) holds its roll, which takes p = -r tan(theta); (2) has no p. So its velocity along z goes
+    from -sin(0.6) to sin(0.6) m/s in pi / 0.6 s, by Runge and Kutta's fourth order.
+    """
+    sphere = Vehicle(20.0, 20.0, 20.0, 5.0, 5.0, *(0.0,) * 6)
+
+    def rate(x):
+        _, theta, _, *nu = x
+        u, _, w, q, r = nu
+        dz = -u * np.sin(theta) + w * np.cos(theta)
+        rest = accelerations(sphere, nu, np.sin(theta), (0.0,) * 3, (0.0,) * 5)
+        return np.array([dz, *euler_rates(theta, q, r), *rest])
+
+    x, n = np.array([0.0, 0.6, 0.0, 1.0, 0.0, 0.0, 0.0, 0.6]), 1000
+    h, before = np.pi / 0.6 / n, rate(x)[0]
+    for _ in range(n):
+        a = rate(x)
+        b = rate(x + h / 2 * a)
+        c = rate(x + h / 2 * b)
+        x = x + h / 6 * (a + 2 * b + 2 * c + rate(x + h * c))
+    assert (before, rate(x)[0]) == pytest.approx((-np.sin(0.6), np.sin(0.6)), abs=1e-9)
+    assert np.sin(0.6) == pytest.approx(0.56, abs=0.005)
+    assert np.pi / 0.6 == pytest.approx(5.2, abs=0.05)
+
+
 @given(theta=pitch_angles, psi=angles, nu=vectors(speeds, 5), tau=vectors(forces, 3))
 def test_equation_14_holds_along_the_motion_of_the_vehicle(theta, psi, nu, tau):
     """M_1 J^-1 (d2y - dJ/dt v - dJ_delta/dt) + C_1 v + D_1 v + G_1 = tau_a.

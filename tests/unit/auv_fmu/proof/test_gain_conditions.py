@@ -79,6 +79,20 @@ def test_condition_30_can_be_met_by_a_larger_lambda():
     assert conditions(known, NO_ZETAS, K1, K2, 2.01, k_d, slope)[0].verdict == "met"
 
 
+@given(v0=st.floats(0.01, 10.0))
+def test_another_unit_of_speed_is_other_units_throughout(v0):
+    """Numbers counted in s / v0 for s, all but the slope of Tanh(dy_o - dy_r): as printed."""
+    known, (K1, K2, lambda_, k_d, slope) = bounds(Vehicle(), 0.35), PAPER
+    found = conditions(known, Zetas(20.0, 30.0), *PAPER, v0)
+    m, d = np.array(known[:2]), np.array(known[2:]) / v0
+    counted = Bounds(*m, *d)
+    K1, K2 = (tuple(np.array(K) / v0**2) for K in (K1, K2))
+    zetas = Zetas(20.0 / v0, 30.0 / v0)
+    printed = conditions(counted, zetas, K1, K2, lambda_ / v0, k_d / v0, slope * v0)
+    for condition, other, unit in zip(found, printed, (v0**3, v0, v0), strict=True):
+        assert condition.margin == pytest.approx(other.margin * unit)
+
+
 def test_theorem_2_weighs_k1_with_the_largest_slope():
     known = bounds(Vehicle(), 0.35)
     _, second, third = conditions(known, NO_ZETAS, *PAPER[:-1], 2.0)

@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
+from auv_fmu.adaptation import robust_force
 from auv_fmu.attitude import rotation_from_euler
+from auv_fmu.output_feedback import estimated_error_sum
 from auv_fmu.proof.control_point_model import M_2
 from auv_fmu.proof.gain_conditions import bounds
 from auv_fmu.proof.lyapunov import Errors, composite_errors, kinetic, lyapunov
@@ -14,6 +17,7 @@ from support.strategies import angles, lengths, pitch_angles, speeds, vectors
 
 VEHICLE, K2 = Vehicle(), (10.0, 20.0, 30.0)
 three = vectors(speeds, 3)
+bounds_of_xi, widths = st.floats(0.0, 100.0), st.floats(0.1, 10.0)
 
 
 @given(theta=pitch_angles, psi=angles, r=three, ell=lengths)
@@ -31,6 +35,39 @@ def test_composite_errors_are_17_and_19(dy, dy_d, dy_hat, e_z, z):
     de, dz = np.subtract(dy, dy_d), np.subtract(dy, dy_hat)
     np.testing.assert_allclose(r_1, de + 0.7 * np.tanh(e_z), atol=1e-14)
     np.testing.assert_allclose(r_2, dz + 0.7 * np.tanh(z), atol=1e-14)
+
+
+@given(dy=three, dy_d=three, dy_hat=three, e_z=three, z=three)
+def test_remark_5_leaves_out_twice_the_rate_of_z(dy, dy_d, dy_hat, e_z, z):
+    """r_1 + r_2 less the estimate below (21), and |dz/dt| within (1 + lambda) |x|."""
+    r_1, r_2 = composite_errors(dy, dy_d, dy_hat, e_z, z, 0.7, SATURATIONS["tanh"])
+    estimated = estimated_error_sum(dy_hat, dy_d, tuple(np.tanh(e_z)), tuple(np.tanh(z)), 0.7)
+    dz = np.subtract(dy, dy_hat)
+    np.testing.assert_allclose(np.add(r_1, r_2) - estimated, 2.0 * dz, atol=1e-13)
+    x = np.linalg.norm([*np.tanh(e_z), *np.tanh(z), *r_1, *r_2])
+    assert np.linalg.norm(dz) <= 1.7 * x + 1e-12
+
+
+@given(estimated=three, dz=three, rho=bounds_of_xi, rho_hat=bounds_of_xi, eps_t=widths)
+def test_what_remark_5_leaves_out(estimated, dz, rho, rho_hat, eps_t):
+    """In the derivative of (34), with a xi of |xi| = rho along r_1 + r_2.
+
+    Where the estimate is exact these terms are 3 eps_t at most, as below (39). What (38) leaves out
+    is within 2 (sqrt(3) rho_hat + rho) |dz/dt|, and 2 rho |dz/dt| where the estimate is zero and
+    theta_hat = theta.
+    """
+    estimated, dz = np.array(estimated), np.array(dz)
+
+    def terms(estimated, rho_hat):
+        exact = estimated + 2.0 * dz
+        robust = np.array(robust_force(rho_hat, tuple(estimated), eps_t))
+        adaptive = (rho - rho_hat) * np.linalg.norm(estimated)
+        return -exact @ robust + rho * np.linalg.norm(exact) - adaptive
+
+    size = np.linalg.norm(dz)
+    left_out = 2.0 * (np.sqrt(3.0) * rho_hat + rho) * size
+    assert terms(estimated, rho_hat) <= 3.01 * eps_t + left_out + 1e-9 * (1.0 + left_out)
+    assert terms(np.zeros(3), rho) == pytest.approx(2.0 * rho * size)
 
 
 @pytest.mark.parametrize("name", SATURATIONS)

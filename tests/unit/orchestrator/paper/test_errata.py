@@ -10,10 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu import motion_planner, plant
+from auv_fmu import motion_planner, output_feedback, plant
 from auv_fmu.closed_loop import PAPER, LongestSteps, closed_loop
-from auv_fmu.output_feedback import Gains
+from auv_fmu.output_feedback import Gains, Measurement, estimated_error_sum
 from auv_fmu.pd import PdGains
+from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
 from auv_fmu.vehicle import Vehicle, accelerations
 from orchestrator.analysis import gains
 from orchestrator.experiments.wiring import closed_loop as loop_of
@@ -60,15 +61,94 @@ def test_every_point_is_shown_by_tests_that_are_there(erratum):
         assert f"\ndef {name}(" in (ROOT / file).read_text(encoding="utf-8")
 
 
-def peak(lambda_):
+def test_v_rises_from_zero():
+    """Of Fig. 4 on its reference, without noise: V but for its last term, which is not negative.
+
+    With theta_0 = theta the last term is zero at first, whatever theta is.
+    """
+    there = QUIET.plant._replace(eta0=(0.0, 0.0, -2.0, 0.0, 0.0, 0.0))
+    gains = Gains(theta_0=(100.0, 100.0, 100.0, 184.0))
+    V = []
+    for instant in closed_loop(50, QUIET._replace(plant=there, controller=gains)):
+        _, dy_d, _ = instant.scene.reference
+        _, dy_hat, e, z, *_ = instant.signals
+        e_z = tuple(np.subtract(e, z))
+        r = composite_errors(instant.scene.plant.dy, dy_d, dy_hat, e_z, z, gains.lambda_, gains.s)
+        errors = Errors(e, z, *r)
+        rotation = instant.vehicles.rotation
+        V.append(lyapunov(Vehicle(), rotation, errors, gains.K2, gains.s, gains.ell))
+    assert V[0] == 0.0 < min(V[1:])
+
+
+def largest_drift(setting):
+    """Largest |(v, w)| in the first 50 s [m/s]."""
+    return max(np.hypot(*instant.scene.plant.nu[1:3]) for instant in closed_loop(2500, setting))
+
+
+def test_sway_and_heave_depend_on_controller_and_start():
+    text = text_of("Assumption 1 is about the closed loop")
+    moving = QUIET.plant._replace(nu0=(2.5, 0.0, 0.0, 0.0, 0.0, 4.0))
+    settings = (
+        figure_5(Gains(eps_t=10.0)),
+        figure_5(PdGains(eps_t=10.0)),
+        QUIET._replace(plant=moving),
+    )
+    found = [f"{largest_drift(setting):.2f}" for setting in settings]
+    assert re.findall(r"\d\.\d\d", text) == found
+
+
+@given(limit=st.floats(100.0, 1e6))
+def test_rho_hat_takes_the_command_beyond_any_limit(limit):
+    """A metre from the reference, at rest, with a theta_0 of that size."""
+    gains = Gains(theta_0=(limit + 100.0, 0.0, 0.0, 0.0))
+    here, there = (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    measured = Measurement(here, there, there, there, there)
+    state = output_feedback.initial_state(gains, here)
+    assert abs(output_feedback.evaluate(gains, state, measured).tau[0]) > limit
+
+
+def test_the_helix_is_not_bounded():
+    text = text_of("Assumption 4: the helix is not bounded")
+    planner = motion_planner.Parameters()
+    state, moving = motion_planner.begin(planner)
+    found = []
+    for steps in (0, 5_000, 45_000):
+        if steps:
+            state, moving = motion_planner.steps(planner, state, moving, PAPER.h, steps)
+        found.append(f"{motion_planner.reference(state, moving, planner.ell).y_d[2]:.1f}")
+    assert re.findall(r"-\d+\.\d", text) == found
+
+
+def test_remark_5_in_figure_4():
+    """Twice the rate of z over the estimate below (21), in per cent."""
+    text = text_of("(38) rests on an approximation")
+    found = []
+    for setting in (QUIET, PAPER):
+        gains, shares = setting.controller, []
+        for instant in closed_loop(2500, setting):
+            _, dy_d, _ = instant.scene.reference
+            _, dy_hat, e, z, *_ = instant.signals
+            s_ez, s_z = tuple(np.tanh(np.subtract(e, z))), tuple(np.tanh(z))
+            estimate = estimated_error_sum(dy_hat, dy_d, s_ez, s_z, gains.lambda_)
+            dz = np.subtract(instant.scene.plant.dy, dy_hat)
+            shares.append(200.0 * np.linalg.norm(dz) / np.linalg.norm(estimate))
+        found.append((np.median(shares), max(shares)))
+    (median, most), (noisy, _) = found
+    assert median < 1.0
+    assert f"is below 1 % of the estimate in the median and {most:.0f} % at most" in text
+    assert f"it is {noisy:.0f} % in the median" in text
+
+
+def peak(lambda_, h=PAPER.h):
     """Largest surge command of Fig. 4 without noise [N]; it comes within the first seconds."""
-    setting = QUIET._replace(controller=Gains(lambda_=lambda_))
-    return max(abs(instant.command[0]) for instant in closed_loop(1500, setting))
+    setting = QUIET._replace(controller=Gains(lambda_=lambda_), h=h, h_max=LongestSteps())
+    return max(abs(instant.command[0]) for instant in closed_loop(round(4.0 / h), setting))
 
 
 def test_30_costs_what_is_said():
     text = text_of("(30) and the limits (3) pull apart")
     assert f"{peak(2.1):.0f} N where 80 can be had" in text
+    assert f"{peak(2.1, 0.002):.0f} N in steps of 2 ms" in text
     assert f"{peak(1.0):.0f} N at the paper's 1" in text
 
 
