@@ -494,6 +494,7 @@ def errata() -> tuple[Erratum, ...]:
                 f"{_CLAIMS}::test_no_force_has_less_effort_than_its_impulse_takes",
                 f"{_CLAIMS}::test_a_way_against_damping_takes_an_impulse_of_its_own",
             ),
+            TENSION,
         ),
         Erratum(
             "4.2: efforts that belong to the step of 20 ms",
@@ -503,6 +504,7 @@ def errata() -> tuple[Erratum, ...]:
             "quarter of it. The rest is Euler's scheme, and no property of the controller. The "
             "proposed controller's efforts change by 4 % at most.",
             (f"{_ERRATA}::test_pd_efforts_belong_to_the_step",),
+            TENSION,
         ),
     )
 

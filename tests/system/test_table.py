@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,10 +13,13 @@ from orchestrator.commands.main import main
 from orchestrator.paper import table
 from orchestrator.paper.choices import OF_RUNS, OF_RUNS_OF_FIVE, PD, PROPOSED, Choice
 from orchestrator.paper.measures import way_of
-from orchestrator.paper.sensitivity import FARTHEST
+from orchestrator.paper.printed_table import NUMBERS
+from orchestrator.paper.sensitivity import FARTHEST, PUBLISHED
 from orchestrator.paper.variants import all_variants
 
 pytest.importorskip("numba", reason="needs the extra `studies`")
+
+PAGE = Path(__file__).parents[2] / "docs" / "table.md"
 
 #: The first two options of these, and ours of all others.
 TRIED = ("eps_t of the proposed controller", "order")
@@ -52,6 +56,16 @@ def test_ours_is_what_the_scenarios_give(found):
         assert found.six.ways_of(scenario)[0] == pytest.approx(way_of(result), rel=1e-12)
     # With six degrees of freedom 1e-6 m at the start is nothing.
     assert found.printed[0].options == found.six.ours.options and found.printed[0].bands is None
+
+
+def test_the_page_shows_ours(found):
+    """All other columns take all variants."""
+    page = PAGE.read_text(encoding="utf-8")
+    for scenario, published in PUBLISHED.items():
+        ours = found.six.ours.numbers[scenario]
+        for name, printed, value in zip(NUMBERS[scenario], published, ours, strict=True):
+            assert f"\n| {name} | {printed:g} | {value:.3g} | " in page
+    assert f"\n| score |  | {found.six.ours.score:.2f} | " in page
 
 
 def test_options_are_those_of_the_runs(found):
