@@ -186,7 +186,7 @@ def test_how_near_all_six_efforts_are_at_once():
     """What contradicts something, or is lost, is not looked at."""
     where, lost = (0, 0, COMMANDED, T_F[72.0]), (0, 1, APPLIED, T_F[50.0])
     efforts = {(*where, i): effort for i, effort in enumerate((1.2, 0.9, 1.32))}
-    far = {(*lost, slice(3)): 1.0, (*lost, 4): 1e3, (1, 0, APPLIED, T_F[60.0]): 1.0}
+    far = {lost: 1.0, (*lost, 4): 1e3, (1, 0, APPLIED, T_F[60.0]): 1.0}
     pd = {(0, 0, *where[2:]): 1.14, (0, 0, *lost[2:]): 1.0, (1, 0, APPLIED, T_F[60.0]): 1.0}
     assert planted(proposed={**efforts, **far}, pd=pd).efforts_within(L2) == pytest.approx(0.32)
     assert planted().efforts_within(L2) == pytest.approx(1.0)
