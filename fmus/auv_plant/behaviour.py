@@ -19,10 +19,11 @@ _MOST_DEVIATIONS = 9.0
 
 
 class Inputs(NamedTuple):
-    """Commanded force and moments, and the disturbance."""
+    """Commanded force and moments, the disturbance, and the velocity of the water."""
 
     tau: Vector3
     tau_w: Vector6
+    water: Vector3
 
 
 class Outputs(TypedDict):
@@ -33,6 +34,7 @@ class Outputs(TypedDict):
     y: Vector3
     dy: Vector3
     tau_applied: Vector3
+    nu_r: Vector6
 
 
 def check(parameters: Parameters) -> None:
@@ -58,7 +60,8 @@ def _check_roll(name: str, value: float) -> None:
 
 def begin(parameters: Parameters, inputs: Inputs) -> tuple[PlantState, Rotation, Outputs]:
     """State, its attitude and outputs at the start."""
-    state, rotation = plant.begin(parameters, plant.applied(parameters, inputs.tau))
+    tau, water = plant.applied(parameters, inputs.tau), plant.flow(parameters, inputs.water)
+    state, rotation = plant.begin(parameters, tau, water)
     return state, rotation, _seen(parameters, state, rotation)
 
 
@@ -71,8 +74,8 @@ def advance(
     parameters: Parameters, state: PlantState, derived: Rotation, inputs: Inputs, h: float, n: int
 ) -> tuple[PlantState, Rotation, Outputs]:
     """State, its attitude and outputs after n steps of h seconds."""
-    tau = plant.applied(parameters, inputs.tau)
-    state, derived = plant.steps(parameters, state, derived, tau, inputs.tau_w, h, n)
+    tau, water = plant.applied(parameters, inputs.tau), plant.flow(parameters, inputs.water)
+    state, derived = plant.steps(parameters, state, derived, tau, inputs.tau_w, water, h, n)
     return state, derived, _seen(parameters, state, derived)
 
 
@@ -107,21 +110,23 @@ def expected(parameters: Parameters, state: PlantState, outputs: Outputs) -> Out
         ),
         "dy": seen["dy"],
         "tau_applied": plant.applied(parameters, seen["tau_applied"]),
+        "nu_r": seen["nu_r"],
     }
 
 
 def _check_level(state: PlantState, rotation: Rotation) -> None:
     """Refuse a state that rolls: the starboard axis is no longer level."""
-    if state.nu[3] or not abs(rotation[1][2]) <= _ROUNDING:
+    if state.nu_r[3] or not abs(rotation[1][2]) <= _ROUNDING:
         raise Refusal("its roll, which is held at zero, is not zero")
 
 
 def _seen(parameters: Parameters, state: PlantState, rotation: Rotation) -> Outputs:
-    euler, y, dy, nu = plant.outputs(state, rotation, parameters.ell, parameters.roll.rolls)
+    euler, y, dy, nu, nu_r = plant.outputs(state, rotation, parameters.ell, parameters.roll.rolls)
     return {
         "eta": (*state.position, *euler),
         "nu": nu,
         "y": y,
         "dy": dy,
         "tau_applied": state.tau,
+        "nu_r": nu_r,
     }

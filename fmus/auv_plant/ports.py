@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from auv_fmu.plant import ETA_0, NU_0, Localisation, Parameters, RollAxis
+from auv_fmu.plant import ETA_0, INTEGRATORS, NU_0, Localisation, Parameters, RollAxis
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters
 from fmus.ports.quantities import ETA, LAG, NU, POSITION, TAU, TAU_W, VELOCITY
@@ -38,6 +38,15 @@ _LAGS = parameters(
     LAG,
     "Time constant of the actuator behind its limits, 0: none; not in the paper (Remark 2)",
     minimum=0.0,
+)
+_INTEGRATOR = Port(
+    "integrator",
+    "parameter",
+    "fixed",
+    "String",
+    "Scheme that integrates (1) and (2): euler, as in the paper, or rk4",
+    start="euler",
+    choices=INTEGRATORS,
 )
 
 PARAMETERS = ParameterSet(
@@ -80,9 +89,12 @@ PARAMETERS = ParameterSet(
     ),
     current=_CURRENT,
     T=_LAGS,
+    integrator=_INTEGRATOR,
 )
 
-_LATER = (_ROLLS, *_CURRENT, *_LAGS)
+_LATER = (_ROLLS, *_CURRENT, *_LAGS, _INTEGRATOR)
+
+_WATER = inputs("water", VELOCITY, "Velocity of the water in the earth frame, added to current")
 
 PORTS: tuple[Port, ...] = (
     *_COMMAND,
@@ -95,4 +107,6 @@ PORTS: tuple[Port, ...] = (
     *PARAMETERS.before(*_LATER),
     H_MAX,
     *_LATER,
+    *_WATER,
+    *outputs("nu_r", NU, "Velocity through the water in the body frame", initially=_WATER),
 )

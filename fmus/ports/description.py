@@ -104,7 +104,8 @@ def dependencies(ports: Sequence[Port]) -> Iterator[Dependency]:
             # FMI 2.0 has no variable for the time.
             direct = [places[name] for name in port.feedthrough if name in places]
             # fault is false at the start, unless what is set is refused.
-            initial = [*direct, *parameters] if port.kind == "Real" else []
+            start = [places[name] for name in port.initially]
+            initial = [*direct, *start, *parameters] if port.kind == "Real" else []
             yield Dependency(places[port.name], direct, initial)
 
 

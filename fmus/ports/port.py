@@ -44,6 +44,7 @@ class Port:
         minimum, maximum: inclusive bounds of a number.
         choices: values that a String may have, with what each stands for in the equations.
         feedthrough: of an output, what it depends on without a state between: inputs, the time.
+        initially: of an output, inputs that its value at the start depends on besides.
 
     """
 
@@ -58,6 +59,7 @@ class Port:
     maximum: float | None = None
     choices: Mapping[str, object] = field(default_factory=dict)
     feedthrough: tuple[str, ...] = ()
+    initially: tuple[str, ...] = ()
 
     def checked(self, value: Value) -> Value:
         """The value, if this port can take it.
@@ -103,7 +105,11 @@ def inputs(group: str, members: Members, description: str) -> tuple[Port, ...]:
 
 
 def outputs(
-    group: str, members: Members, description: str, feedthrough: Sequence[Port] = ()
+    group: str,
+    members: Members,
+    description: str,
+    feedthrough: Sequence[Port] = (),
+    initially: Sequence[Port] = (),
 ) -> tuple[Port, ...]:
     """Real outputs, one for each member of a group, each depending directly on the given inputs."""
     return tuple(
@@ -115,6 +121,7 @@ def outputs(
             f"{description}: {member}",
             unit=unit,
             feedthrough=tuple(port.name for port in feedthrough),
+            initially=tuple(port.name for port in initially),
         )
         for member, unit in members.items()
     )

@@ -157,13 +157,9 @@ def metrics_of(table: Table) -> Metrics:
 
 
 def changed_parameters(system: System, header: Header) -> dict[str, Any]:
-    """Parameters that differ from the FMU's defaults, and inputs that were set."""
-    changed = {
+    """Values of parameters, and of inputs that were set, that differ from the FMU's defaults."""
+    return {
         str(name): value
-        for name, value in header.parameters.items()
+        for name, value in {**header.parameters, **system.parameters}.items()
         if value != system.component(name.component).start(name.port)
     }
-    for name, value in system.parameters.items():
-        if system.component(name.component).variable(name.port).causality == "input":
-            changed[str(name)] = value
-    return changed

@@ -56,7 +56,8 @@ $wires
 
 Inputs that nothing feeds, and that neither parameters, a table nor an event sets, are named in a
 warning, with the wire that they seem to want; `--strict` refuses them. Those whose wires a file
-removes with `only` or `false` are open on purpose.
+removes with `only` or `false` are open on purpose, and `plant.water` is zero unless a file says
+otherwise.
 
 ## Figures
 

@@ -53,10 +53,19 @@ def closed_loop(
     for target, source in wires.items():
         with findings.collecting():
             connections += _wire(components, target, source)
+    fed = {connection.target for connection in connections}
+    still = {
+        PortName(name, variable.name): value
+        for group, value in wiring["still"].items()
+        for name, component in components.items()
+        for variable in component.having("input")
+        if f"{name}.{variable.name}".startswith(f"{group}.")
+    }
     system = System(
         name=wiring["name"],
         components=components,
         connections=tuple(connections),
+        parameters={port: value for port, value in still.items() if port not in fed},
         stop_time=wiring["experiment"]["stop_time"],
         step=wiring["experiment"]["step"],
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp
+from math import exp, expm1
 from typing import NamedTuple
 
 from auv_fmu.types import Vector3
@@ -39,6 +39,15 @@ def limit_all(tau: Vector3, tau_min: Vector3, tau_max: Vector3) -> Vector3:
     )
 
 
+class Drive(NamedTuple):
+    """What the actuators u, q, r give within a step [N, N.m]."""
+
+    first: Vector3  #: at its beginning
+    middle: Vector3  #: halfway, as Simpson's rule needs it for the mean
+    last: Vector3  #: at its end
+    mean: Vector3  #: over it
+
+
 def respond(before: float, tau_k: float, T: float, h: float) -> float:
     """One actuator of first order, T dtau_a/dt = tau_k - tau_a, after a step: exactly.
 
@@ -52,10 +61,45 @@ def respond(before: float, tau_k: float, T: float, h: float) -> float:
     return tau_k + (before - tau_k) * exp(-h / T) if T else tau_k
 
 
-def respond_all(before: Vector3, tau: Vector3, T: Vector3, h: float) -> Vector3:
-    """The actuators u, q, r after a step."""
-    return (
+def mean_response(before: float, tau_k: float, T: float, h: float) -> float:
+    """The mean of the same actuator over the step: its impulse divided by h, exactly."""
+    if not T:
+        return tau_k
+    x = h / T
+    return tau_k + (before - tau_k) * (-expm1(-x) / x if x else 1.0)
+
+
+def drive(before: Vector3, tau: Vector3, T: Vector3, h: float) -> Drive:
+    """What the actuators u, q, r give within a step.
+
+    A vehicle that takes the mean feels the true impulse, and so does one whose scheme weighs
+    first, middle and last by 1, 4, 1: the middle is off by O(h^4), and right for any T.
+
+    Args:
+        before: what they gave at its beginning [N, N.m].
+        tau: what they are to give, held during the step, within the limits of (3) [N, N.m].
+        T: their time constants [s]; 0: they follow at once.
+        h: step [s].
+
+    """
+    first = (
+        before[0] if T[0] else tau[0],
+        before[1] if T[1] else tau[1],
+        before[2] if T[2] else tau[2],
+    )
+    last = (
         respond(before[0], tau[0], T[0], h),
         respond(before[1], tau[1], T[1], h),
         respond(before[2], tau[2], T[2], h),
     )
+    mean = (
+        mean_response(before[0], tau[0], T[0], h),
+        mean_response(before[1], tau[1], T[1], h),
+        mean_response(before[2], tau[2], T[2], h),
+    )
+    middle = (
+        0.25 * (6.0 * mean[0] - first[0] - last[0]),
+        0.25 * (6.0 * mean[1] - first[1] - last[1]),
+        0.25 * (6.0 * mean[2] - first[2] - last[2]),
+    )
+    return Drive(first, middle, last, mean)

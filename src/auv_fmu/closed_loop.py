@@ -87,7 +87,7 @@ class Scene(NamedTuple):
 
 def begin(setting: Setting) -> Vehicles:
     """Both vehicles at the start."""
-    state, rotation = plant.begin(setting.plant, _NO_COMMAND)
+    state, rotation = plant.begin(setting.plant, _NO_COMMAND, setting.plant.current)
     planned, moving = motion_planner.begin(setting.planner)
     return Vehicles(state, rotation, planned, moving)
 
@@ -109,7 +109,7 @@ def scene(setting: Setting, vehicles: Vehicles, t: float, n: Vector3) -> Scene:
         seen,
         plant.measure(seen.y, n, setting.plant.noise.std),
         motion_planner.reference(vehicles.planner, vehicles.moving, setting.planner.ell),
-        disturbance(setting.disturbance, seen.nu, t),
+        disturbance(setting.disturbance, seen.nu_r, t),
     )
 
 
@@ -133,6 +133,7 @@ def move(
         vehicles.rotation,
         tau,
         tau_w,
+        setting.plant.current,
         h / parts.plant,
         parts.plant,
     )

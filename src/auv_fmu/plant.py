@@ -4,7 +4,7 @@ The controller is derived on five degrees of freedom; the paper simulates six an
 roll interaction as an external disturbance". The plant does that to the letter: the terms that
 roll adds to (2) enter through tau_w, so (2) stands once and is met exactly when p = 0
 (reading 1). Not in the paper, and off by default: roll that is held at zero, which leaves (1) and
-(2) alone, an ocean current, and actuators with dynamics.
+(2) alone, water that moves, actuators with dynamics, and an integrator of fourth order.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 from random import Random
 from typing import NamedTuple
 
-from auv_fmu.actuators import Limits, limit_all, respond_all
+from auv_fmu.actuators import Drive, Limits, drive, limit_all
 from auv_fmu.attitude import (
     euler_from_rotation,
     euler_without_roll,
@@ -36,6 +36,18 @@ NU_0: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 _NO_FORCE = (0.0, 0.0, 0.0)
 _STILL = (0.0, 0.0, 0.0)
+
+#: A way to integrate (1) and (2) over a step, as a value: which one of these.
+Integrator = int
+
+#: Euler's scheme, which section 4.1 simulates with.
+EULER: Integrator = 0
+
+#: The classical Runge-Kutta scheme of fourth order. Not in the paper.
+RK4: Integrator = 1
+
+#: Both by the names users select them with.
+INTEGRATORS: dict[str, Integrator] = {"euler": EULER, "rk4": RK4}
 
 
 class RollAxis(NamedTuple):
@@ -66,6 +78,7 @@ class Parameters(NamedTuple):
     noise: Localisation = Localisation()
     current: Vector3 = (0.0, 0.0, 0.0)  #: velocity of the water [m/s], earth frame
     T: Vector3 = (0.0, 0.0, 0.0)  #: time constants of the actuators u, q, r [s]; 0: none
+    integrator: Integrator = EULER
 
 
 class PlantState(NamedTuple):
@@ -73,7 +86,7 @@ class PlantState(NamedTuple):
 
     position: Vector3  #: centre of mass (x, y, z) [m], earth frame
     quaternion: Vector4  #: attitude, body to earth, scalar first
-    nu: Vector6  #: (u, v, w, p, q, r) through the water [m/s, rad/s], body frame
+    nu_r: Vector6  #: (u, v, w, p, q, r) through the water [m/s, rad/s], body frame
     tau: Vector3  #: (tau_u, tau_q, tau_r) that acts [N, N.m]
     water: Vector3  #: velocity of the water that nu is through [m/s], earth frame
 
@@ -85,43 +98,52 @@ class PlantOutputs(NamedTuple):
     y: Vector3  #: control point [m], earth frame, without measurement noise
     dy: Vector3  #: velocity of the control point [m/s], earth frame
     nu: Vector6  #: (u, v, w, p, q, r) over ground [m/s, rad/s], body frame
+    nu_r: Vector6  #: the same through the water
 
 
-def over_ground(nu: Vector6, rotation: Rotation, current: Vector3) -> Vector6:
-    """Velocity over ground of a vehicle that moves through water with nu [m/s, rad/s].
+class Rates(NamedTuple):
+    """What (1) and (2) say at a state."""
 
-    A constant current without rotation enters (2) through this alone: the terms of (2) take the
+    position: Vector3  #: [m/s], earth frame
+    attitude: Vector4  #: of the quaternion; without roll, of (0, 0, theta, psi) [1/s, rad/s]
+    nu_r: Vector6  #: d/dt (u, v, w, p, q, r) [m/s2, rad/s2]
+
+
+def over_ground(nu_r: Vector6, rotation: Rotation, water: Vector3) -> Vector6:
+    """Velocity over ground of a vehicle that moves through water with nu_r [m/s, rad/s].
+
+    A constant current without rotation enters (2) only through this: the terms of (2) take the
     velocity through the water in the place of nu (Fossen).
 
     Args:
-        nu: (u, v, w, p, q, r) through the water, body frame.
+        nu_r: (u, v, w, p, q, r) through the water, body frame.
         rotation: body to earth.
-        current: velocity of the water [m/s], earth frame.
+        water: velocity of the water [m/s], earth frame.
 
     """
-    u, v, w, p, q, r = nu
-    u_c, v_c, w_c = rotate_back(rotation, current)
+    u, v, w, p, q, r = nu_r
+    u_c, v_c, w_c = rotate_back(rotation, water)
     return u + u_c, v + v_c, w + w_c, p, q, r
 
 
-def immersed(state: PlantState, rotation: Rotation, current: Vector3) -> PlantState:
-    """The same motion over ground, in water that moves with a current.
+def immersed(state: PlantState, rotation: Rotation, water: Vector3) -> PlantState:
+    """The same motion over ground, in water that moves at another velocity.
 
-    A current that changes at an instant changes the velocity through the water, as a vehicle with
-    a mass keeps its own.
+    Water whose velocity changes at an instant changes the velocity through the water, as a vehicle
+    with a mass keeps its own.
 
     Args:
         state: of the vehicle, in whatever water it has been.
         rotation: body to earth, of its quaternion.
-        current: velocity of the water from now on [m/s], earth frame.
+        water: velocity of the water from now on [m/s], earth frame.
 
     """
-    change = difference(state.water, current)
+    change = difference(state.water, water)
     c_x, c_y, c_z = change
     if not (c_x or c_y or c_z):
         return state
-    nu = over_ground(state.nu, rotation, change)
-    return PlantState(state.position, state.quaternion, nu, state.tau, current)
+    nu_r = over_ground(state.nu_r, rotation, change)
+    return PlantState(state.position, state.quaternion, nu_r, state.tau, water)
 
 
 def accelerations_6dof(
@@ -168,71 +190,163 @@ def accelerations_6dof(
     return du, dv, dw, dp if rolls else 0.0, dq, dr
 
 
-def turned_without_roll(rotation: Rotation, q: float, r: float, h: float) -> Vector4:
-    """Attitude after one Euler step of (1), whose roll is zero.
-
-    Args:
-        rotation: body to earth, without roll.
-        q, r: pitch and yaw rate in the body frame [rad/s].
-        h: step [s].
-
-    """
-    phi, theta, psi = euler_without_roll(rotation)
-    dtheta, dpsi = euler_rates(theta, q, r)
-    return quaternion_from_euler(phi, theta + h * dtheta, psi + h * dpsi)
-
-
-def step(
+def rates(
     vehicle: Vehicle,
     roll: RollAxis,
     state: PlantState,
     rotation: Rotation,
     tau: Vector3,
     tau_w: Vector6,
-    h: float,
-) -> PlantState:
-    """One Euler step of the vehicle under held inputs.
+) -> Rates:
+    """How the motion changes: (1) and (2).
 
     Args:
         vehicle, roll: parameters.
+        state: of the vehicle.
+        rotation: body to earth, of its quaternion.
+        tau: (tau_u, tau_q, tau_r) that acts [N, N.m].
+        tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
+
+    """
+    _, quaternion, nu_r, _, water = state
+    u, v, w, p, q, r = nu_r
+    velocity = rotate(rotation, (u, v, w))
+    c_x, c_y, c_z = water
+    if c_x or c_y or c_z:
+        velocity = velocity[0] + c_x, velocity[1] + c_y, velocity[2] + c_z
+    dnu = accelerations_6dof(vehicle, roll, nu_r, rotation, tau, tau_w)
+    if roll.rolls:
+        return Rates(velocity, quaternion_rates(quaternion, (p, q, r)), dnu)
+    _, theta, _ = euler_without_roll(rotation)
+    dtheta, dpsi = euler_rates(theta, q, r)
+    return Rates(velocity, (0.0, 0.0, dtheta, dpsi), dnu)
+
+
+def moved(
+    roll: RollAxis, state: PlantState, rotation: Rotation, rate: Rates, tau: Vector3, h: float
+) -> PlantState:
+    """The state that h seconds at constant rates lead to.
+
+    Args:
+        roll: parameters.
+        state: of the vehicle.
+        rotation: body to earth, of its quaternion.
+        rate: of the state.
+        tau: (tau_u, tau_q, tau_r) that acts after that time [N, N.m].
+        h: time [s].
+
+    """
+    (x, y, z), (a, b, c, d), (u, v, w, p, q, r), _, water = state
+    (dx, dy, dz), (da, db, dc, dd), (du, dv, dw, dp, dq, dr) = rate
+    position = x + h * dx, y + h * dy, z + h * dz
+    nu = u + h * du, v + h * dv, w + h * dw, p + h * dp, q + h * dq, r + h * dr
+    if roll.rolls:
+        attitude = normalised((a + h * da, b + h * db, c + h * dc, d + h * dd))
+        return PlantState(position, attitude, nu, tau, water)
+    phi, theta, psi = euler_without_roll(rotation)
+    attitude = quaternion_from_euler(phi, theta + h * dc, psi + h * dd)
+    return PlantState(position, attitude, nu, tau, water)
+
+
+def step(
+    parameters: Parameters,
+    state: PlantState,
+    rotation: Rotation,
+    acting: Drive,
+    tau_w: Vector6,
+    h: float,
+) -> PlantState:
+    """One step of Euler's scheme under held inputs.
+
+    Args:
+        parameters: of the plant.
         state: at the beginning of the step.
         rotation: body to earth, of its quaternion; its outputs need it too.
-        tau: (tau_u, tau_q, tau_r) that acts [N, N.m].
+        acting: what the actuators give.
         tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
         h: step [s].
 
     """
-    (x, y, z), quaternion, nu, _, water = state
-    u, v, w, p, q, r = nu
-    du, dv, dw, dp, dq, dr = accelerations_6dof(vehicle, roll, nu, rotation, tau, tau_w)
-    dx, dy, dz = rotate(rotation, (u, v, w))
-    c_x, c_y, c_z = water
-    position = x + h * dx, y + h * dy, z + h * dz
-    if c_x or c_y or c_z:
-        position = x + h * (dx + c_x), y + h * (dy + c_y), z + h * (dz + c_z)
-    moved = u + h * du, v + h * dv, w + h * dw, p + h * dp, q + h * dq, r + h * dr
-    if not roll.rolls:
-        return PlantState(position, turned_without_roll(rotation, q, r, h), moved, tau, water)
-    a, b, c, d = quaternion
-    da, db, dc, dd = quaternion_rates(quaternion, (p, q, r))
-    attitude = normalised((a + h * da, b + h * db, c + h * dc, d + h * dd))
-    return PlantState(position, attitude, moved, tau, water)
+    vehicle, roll = parameters.vehicle, parameters.roll
+    rate = rates(vehicle, roll, state, rotation, acting.mean, tau_w)
+    return moved(roll, state, rotation, rate, acting.last, h)
 
 
-def begin(parameters: Parameters, tau: Vector3) -> tuple[PlantState, Rotation]:
+def step_rk4(
+    parameters: Parameters,
+    state: PlantState,
+    rotation: Rotation,
+    acting: Drive,
+    tau_w: Vector6,
+    h: float,
+) -> PlantState:
+    """One step of the classical Runge-Kutta scheme under held inputs; arguments as of Euler's."""
+    vehicle, roll = parameters.vehicle, parameters.roll
+    one = rates(vehicle, roll, state, rotation, acting.first, tau_w)
+    near = moved(roll, state, rotation, one, acting.middle, 0.5 * h)
+    turned = rotation_from_quaternion(near.quaternion)
+    two = rates(vehicle, roll, near, turned, acting.middle, tau_w)
+    near = moved(roll, state, rotation, two, acting.middle, 0.5 * h)
+    turned = rotation_from_quaternion(near.quaternion)
+    three = rates(vehicle, roll, near, turned, acting.middle, tau_w)
+    near = moved(roll, state, rotation, three, acting.last, h)
+    turned = rotation_from_quaternion(near.quaternion)
+    four = rates(vehicle, roll, near, turned, acting.last, tau_w)
+    rate = weighted(one, two, three, four)
+    return moved(roll, state, rotation, rate, acting.last, h)
+
+
+def weighted(one: Rates, two: Rates, three: Rates, four: Rates) -> Rates:
+    """The mean rates of a step, of those at its beginning, twice halfway, and at its end."""
+    return Rates(
+        (
+            mean(one.position[0], two.position[0], three.position[0], four.position[0]),
+            mean(one.position[1], two.position[1], three.position[1], four.position[1]),
+            mean(one.position[2], two.position[2], three.position[2], four.position[2]),
+        ),
+        (
+            mean(one.attitude[0], two.attitude[0], three.attitude[0], four.attitude[0]),
+            mean(one.attitude[1], two.attitude[1], three.attitude[1], four.attitude[1]),
+            mean(one.attitude[2], two.attitude[2], three.attitude[2], four.attitude[2]),
+            mean(one.attitude[3], two.attitude[3], three.attitude[3], four.attitude[3]),
+        ),
+        (
+            mean(one.nu_r[0], two.nu_r[0], three.nu_r[0], four.nu_r[0]),
+            mean(one.nu_r[1], two.nu_r[1], three.nu_r[1], four.nu_r[1]),
+            mean(one.nu_r[2], two.nu_r[2], three.nu_r[2], four.nu_r[2]),
+            mean(one.nu_r[3], two.nu_r[3], three.nu_r[3], four.nu_r[3]),
+            mean(one.nu_r[4], two.nu_r[4], three.nu_r[4], four.nu_r[4]),
+            mean(one.nu_r[5], two.nu_r[5], three.nu_r[5], four.nu_r[5]),
+        ),
+    )
+
+
+def mean(one: float, two: float, three: float, four: float) -> float:
+    """Simpson's mean, with two values for the middle."""
+    return (one + 2.0 * (two + three) + four) / 6.0
+
+
+def begin(parameters: Parameters, tau: Vector3, water: Vector3) -> tuple[PlantState, Rotation]:
     """State at the start, and its attitude.
 
     Args:
         parameters: of the plant.
         tau: (tau_u, tau_q, tau_r) after the limits of (3), if it is known [N, N.m].
+        water: velocity of the water [m/s], earth frame.
 
     """
     x, y, z, phi, theta, psi = parameters.eta0
     quaternion = quaternion_from_euler(phi, theta, psi)
     rotation = rotation_from_quaternion(quaternion)
-    acting = respond_all(_NO_FORCE, tau, parameters.T, 0.0)
+    acting = drive(_NO_FORCE, tau, parameters.T, 0.0).last
     state = PlantState((x, y, z), quaternion, parameters.nu0, acting, _STILL)
-    return immersed(state, rotation, parameters.current), rotation
+    return immersed(state, rotation, water), rotation
+
+
+def flow(parameters: Parameters, water: Vector3) -> Vector3:
+    """Velocity of the water: the parameter `current` and what is told beside it [m/s]."""
+    c_x, c_y, c_z = parameters.current
+    return c_x + water[0], c_y + water[1], c_z + water[2]
 
 
 def applied(parameters: Parameters, tau: Vector3) -> Vector3:
@@ -246,6 +360,7 @@ def steps(
     rotation: Rotation,
     tau: Vector3,
     tau_w: Vector6,
+    water: Vector3,
     h: float,
     n: int,
 ) -> tuple[PlantState, Rotation]:
@@ -256,25 +371,21 @@ def steps(
         state, rotation: at the beginning.
         tau: (tau_u, tau_q, tau_r) after the limits of (3) [N, N.m].
         tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
+        water: velocity of the water [m/s], earth frame.
         h: step [s].
         n: how many.
 
     """
     T_u, T_q, T_r = parameters.T
-    acting = tau
-    state = immersed(state, rotation, parameters.current)
+    acting = Drive(tau, tau, tau, tau)
+    state = immersed(state, rotation, water)
     while n > 0:
         if T_u or T_q or T_r:
-            acting = respond_all(state.tau, tau, parameters.T, h)
-        state = step(
-            parameters.vehicle,
-            parameters.roll,
-            state,
-            rotation,
-            acting,
-            tau_w,
-            h,
-        )
+            acting = drive(state.tau, tau, parameters.T, h)
+        if parameters.integrator == RK4:
+            state = step_rk4(parameters, state, rotation, acting, tau_w, h)
+        else:
+            state = step(parameters, state, rotation, acting, tau_w, h)
         rotation = rotation_from_quaternion(state.quaternion)
         n -= 1
     return state, rotation
@@ -290,10 +401,11 @@ def outputs(state: PlantState, rotation: Rotation, ell: float, rolls: bool) -> P
         rolls: whether the vehicle does.
 
     """
-    position, _, nu, _, water = state
+    position, _, nu_r, _, water = state
+    nu = nu_r
     c_x, c_y, c_z = water
     if c_x or c_y or c_z:
-        nu = over_ground(nu, rotation, water)
+        nu = over_ground(nu_r, rotation, water)
     euler = euler_from_rotation(rotation)
     if not rolls:
         euler = euler_without_roll(rotation)
@@ -302,6 +414,7 @@ def outputs(state: PlantState, rotation: Rotation, ell: float, rolls: bool) -> P
         control_point(position, rotation, ell),
         control_point_velocity(rotation, nu, ell),
         nu,
+        nu_r,
     )
 
 

@@ -32,7 +32,7 @@ TOLERANCE = 1e-9
 _TWISTER, _WORD = 624, 2**32
 
 #: Where the groups eta, nu, y, dy and tau_applied of the plant's outputs begin and end.
-_PLANT_OUTPUTS = (0, 6, 12, 15, 18, 21)
+_PLANT_OUTPUTS = (0, 6, 12, 15, 18, 21, 27)
 
 #: random.gauss cannot go further from zero: it takes the logarithm of a number of 53 bits.
 _MOST_SIGMAS = 8.6
@@ -168,7 +168,7 @@ def _is_unit(vector: Sequence[float]) -> bool:
 
 
 def _plant(said: dict[str, Any]) -> Iterator[str]:
-    position, quaternion, nu, acting, _ = said["state"]
+    position, quaternion, nu_r, acting, _ = said["state"]
     if not _is_unit(quaternion):
         yield f"a quaternion that is no unit: {quaternion}"
         return
@@ -177,12 +177,13 @@ def _plant(said: dict[str, Any]) -> Iterator[str]:
     state = PlantState(*map(tuple, said["state"]))
     rotation = rotation_from_quaternion(state.quaternion)
     known = OF_THE_PLANT.of(parameters)
-    euler, y, dy, over_ground = plant.outputs(state, rotation, known.ell, known.roll.rolls)
-    if not parameters["roll"] and (nu[3] or abs(rotation[1][2]) > TOLERANCE):
+    euler, y, dy, nu, _ = plant.outputs(state, rotation, known.ell, known.roll.rolls)
+    if not parameters["roll"] and (nu_r[3] or abs(rotation[1][2]) > TOLERANCE):
         yield "roll where there is none"
-    eta, found_nu, found_y, found_dy, tau = (outputs[i:j] for i, j in pairwise(_PLANT_OUTPUTS))
-    shown = [*eta, *found_nu, *found_dy, *tau]
-    if not _near(shown, [*position, *euler, *over_ground, *dy, *acting]):
+    parts = (outputs[i:j] for i, j in pairwise(_PLANT_OUTPUTS))
+    eta, found_nu, found_y, found_dy, tau, found_nu_r = parts
+    shown = [*eta, *found_nu, *found_dy, *tau, *found_nu_r]
+    if not _near(shown, [*position, *euler, *nu, *dy, *acting, *nu_r]):
         yield "outputs that are not those of the state"
     most = _MOST_SIGMAS * parameters["noise.std"] + TOLERANCE * hypot(*y)
     if any(abs(measured - true) > most for measured, true in zip(found_y, y, strict=True)):

@@ -12,7 +12,7 @@ from auv_fmu.output_feedback import ControllerState
 def straight_rows(setting: Setting, steps: int, delayed: bool) -> np.ndarray:
     """Time and values after every step: what a row of the FMUs' table holds."""
     instants = list(closed_loop(steps, setting, delayed))
-    start, _ = plant.begin(setting.plant, instants[0].tau)
+    start, _ = plant.begin(setting.plant, instants[0].tau, setting.plant.current)
     acting = [start.tau, *(instant.vehicles.plant.tau for instant in instants[1:])]
     pairs = zip([instants[0], *instants[:-1]], instants, acting, strict=True)
     return np.array([_row(*pair) for pair in pairs])

@@ -97,8 +97,10 @@ ADDITIONS: list[dict[str, Any]] = [
     {"controller.observer": "integral", "controller.printed_jacobian": True},
     {"controller.innovation_gate": 0.001, "plant.noise.std": 0.01, "plant.noise.seed": -7},
     {"plant.roll": False, "plant.noise.std": 0.001},
-    {"plant.current.x": 0.4, "plant.current.z": -0.2},
+    {"plant.current.x": 0.4, "plant.current.z": -0.2, "plant.water.y": 0.3, "plant.water.z": 0.1},
     {"plant.actuator.T.u": 0.3, "plant.actuator.T.r": 0.05, "plant.tau_max.u": 20.0},
+    {"plant.integrator": "rk4", "plant.current.y": 0.3, "plant.actuator.T.q": 0.1},
+    {"plant.integrator": "rk4", "plant.roll": False, "plant.h_max": 0.01},
     {"planner.nu0.u": 0.2, "planner.h_max": 0.003, "controller.h_max": 0.007},
     {"plant.ell": 0.5, "plant.h_max": 0.004, "planner.m11": 20.0},
 ]

@@ -12,6 +12,7 @@ import pytest
 
 from auv_fmu import motion_planner, plant
 from auv_fmu.closed_loop import Instant, Setting, closed_loop, measurement
+from auv_fmu.disturbance import Disturbance
 from auv_fmu.observer import EXACT, INTEGRAL
 from auv_fmu.output_feedback import Gains
 from auv_fmu.plant import RollAxis
@@ -61,9 +62,11 @@ def row(now: Instant, before: Instant) -> dict[str, float]:
     planned, reference = now.vehicles.planner, now.scene.reference
     both(("plant.tau", "controller.tau"), UQR, signals.tau)
     both(("plant.tau_w", "disturbance.tau_w"), "uvwpqr", before.tau_w)
-    group("disturbance.nu", "uvwpqr", before.scene.plant.nu)
+    group("disturbance.nu", "uvwpqr", before.scene.plant.nu_r)
+    group("plant.water", XYZ, (0.0, 0.0, 0.0))
     group("plant.eta", (*XYZ, "phi", "theta", "psi"), (*vehicle.position, *seen.euler))
     group("plant.nu", "uvwpqr", seen.nu)
+    group("plant.nu_r", "uvwpqr", seen.nu_r)
     group("plant.y", XYZ, now.scene.y)
     group("plant.dy", XYZ, seen.dy)
     group("plant.tau_applied", UQR, before.tau if now is before else vehicle.tau)
@@ -120,6 +123,20 @@ def test_loop_of_fmus_is_the_straight_line_bit_for_bit(noisy: Table):
                     roll=RollAxis(rolls=False), current=(0.2, 0.0, 0.0), T=(0.1, 0.0, 0.0)
                 ),
                 planner=motion_planner.Parameters(nu0=(0.1, 0.0, 0.0, 0.0, 0.0)),
+            ),
+        ),
+        (
+            {
+                "plant.integrator": "rk4",
+                "plant.current.z": -0.2,
+                "plant.actuator.T.q": 0.1,
+                "disturbance.A_f": 2.0,
+            },
+            Setting(
+                plant=plant.Parameters(
+                    current=(0.0, 0.0, -0.2), T=(0.0, 0.1, 0.0), integrator=plant.RK4
+                ),
+                disturbance=Disturbance(A_f=2.0),
             ),
         ),
     ],

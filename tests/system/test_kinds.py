@@ -79,6 +79,8 @@ def test_scenario_is_the_same_to_its_end(dist: Path, native: Path, scenario: str
         ("fig5-pd", {"plant.roll": False, "plant.actuator.T.q": 0.1}),
         ("fig4", {"plant.current.x": 0.2, "plant.current.z": -0.1, "planner.nu0.u": 0.2}),
         ("fig5-pd", {"plant.actuator.T.u": 0.5, "plant.actuator.T.r": 0.001}),
+        ("fig5", {"plant.integrator": "rk4", "plant.current.y": 0.1, "plant.actuator.T.r": 0.1}),
+        ("fig5-pd", {"plant.integrator": "rk4", "plant.roll": False}),
     ],
     ids=str,
 )

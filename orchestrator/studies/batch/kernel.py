@@ -130,7 +130,9 @@ def begin(setting: Setting, n: Vector3) -> tuple[Moment, Done]:
     control = law.start(gains, measured)
     state, signals = law.command(gains, control, measured)
     velocity, theta_hat = law.estimates(state, signals, measured)
-    driven, _ = plant.begin(setting.plant, plant.applied(setting.plant, signals.tau))
+    driven, _ = plant.begin(
+        setting.plant, plant.applied(setting.plant, signals.tau), setting.plant.current
+    )
     return (
         Moment(vehicles, scene, control, (signals.tau, scene.tau_w)),
         Done(velocity, theta_hat, signals.tau, signals.tau, driven.tau, scene.tau_w),

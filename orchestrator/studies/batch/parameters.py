@@ -11,6 +11,7 @@ from auv_fmu.disturbance import Disturbance
 from auv_fmu.observer import FORMS
 from auv_fmu.output_feedback import Gains
 from auv_fmu.pd import PdGains
+from auv_fmu.plant import INTEGRATORS
 from auv_fmu.saturation import SATURATIONS
 from auv_fmu.vehicle import Vehicle
 from orchestrator.analysis.signals import ACTUATORS, AXES, DIRECTIONS, EULER
@@ -22,6 +23,9 @@ from orchestrator.system.values import Value
 Path = tuple[str | int, ...]
 
 _H_MAX = "h_max"
+
+#: Inputs of the plant that the loop leaves open.
+_WATER = [PortName("plant", f"water.{axis}") for axis in AXES]
 
 
 def _members(group: str, members: Iterable[object], *path: str) -> dict[str, Path]:
@@ -62,6 +66,7 @@ PATHS: Mapping[str, Mapping[str, Path]] = {
         "noise.seed": ("noise", "seed"),
         **_members("current", AXES),
         **_members("actuator.T", ACTUATORS, "T"),
+        "integrator": ("integrator",),
     },
     "ObserverController": {
         **_BOTH_CONTROLLERS,
@@ -82,7 +87,11 @@ PATHS: Mapping[str, Mapping[str, Path]] = {
 }
 
 #: Those that are texts, and what each text stands for.
-CHOICES: Mapping[str, Mapping[str, int]] = {"saturation": SATURATIONS, "observer": FORMS}
+CHOICES: Mapping[str, Mapping[str, int]] = {
+    "saturation": SATURATIONS,
+    "observer": FORMS,
+    "integrator": INTEGRATORS,
+}
 
 #: The sets by the names of the FMUs, with the FMUs' own values.
 DEFAULTS: Mapping[str, Any] = {
@@ -113,10 +122,13 @@ def setting_of(
     for name, value in parameters.items():
         if name.port == _H_MAX:
             longest[name.component] = value
-        else:
+        elif name not in _WATER:
             path = PATHS[fmus[name.component]][name.port]
             meant = _meant(name, value)
             sets[name.component] = _replaced(sets[name.component], path, meant)
+    water: Any = tuple(parameters.get(name, 0.0) for name in _WATER)
+    still = sets["plant"]
+    sets["plant"] = still._replace(current=plant.flow(still, water))
     return Setting(**sets, h_max=LongestSteps(**longest), h=step)
 
 

@@ -52,7 +52,7 @@ def misfit(setting: Setting) -> str:
 
 
 def _plant_at_start(setting: Setting) -> _Result:
-    return _plant(setting, *plant.begin(setting.plant, _NO_FORCE))
+    return _plant(setting, *plant.begin(setting.plant, _NO_FORCE, setting.plant.current))
 
 
 def _planner_at_start(setting: Setting) -> _Result:
@@ -124,8 +124,8 @@ class _Step:
         return after, _named("tau", ACTUATORS, signals.tau)
 
     def disturbance(self) -> _Result:
-        nu = self._moment.scene.plant.nu
-        tau_w = disturbance(self._setting.disturbance, nu, self.t)
+        nu_r = self._moment.scene.plant.nu_r
+        tau_w = disturbance(self._setting.disturbance, nu_r, self.t)
         return (), _named("tau_w", DIRECTIONS, tau_w)
 
     def plant(self) -> _Result:
@@ -133,11 +133,11 @@ class _Step:
         told, tau_w = self._moment.before
         if not self._delayed:
             told, tau_w = self._signals()[1].tau, self._moment.scene.tau_w
-        tau = plant.applied(parameters, told)
-        return _plant(
-            self._setting,
-            *plant.steps(parameters, vehicles.plant, vehicles.rotation, tau, tau_w, self._h / n, n),
+        tau, state = plant.applied(parameters, told), vehicles.plant
+        moved = plant.steps(
+            parameters, state, vehicles.rotation, tau, tau_w, parameters.current, self._h / n, n
         )
+        return _plant(self._setting, *moved)
 
     def planner(self) -> _Result:
         parameters, vehicles, n = self._setting.planner, self._moment.vehicles, self._parts.planner

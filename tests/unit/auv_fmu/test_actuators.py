@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu.actuators import limit, limit_all, respond
+from auv_fmu.actuators import drive, limit, limit_all, mean_response, respond
 from support.strategies import forces, vectors
 
 
@@ -41,3 +41,23 @@ def test_no_time_constant_is_too_small_or_too_large(before, tau, T):
     assert low - 1e-12 <= respond(before, tau, T, 0.02) <= high + 1e-12
     assert respond(before, tau, 5e-324, 0.02) == respond(before, tau, 0.0, 0.02) == tau
     assert respond(before, tau, 1e300, 0.02) == pytest.approx(before, abs=1e-12)
+    assert low - 1e-9 <= mean_response(before, tau, T, 0.02) <= high + 1e-9
+
+
+@given(before=forces, tau=forces, T=st.floats(1e-3, 10.0), h=st.floats(1e-4, 1.0))
+def test_mean_of_an_actuator_is_its_impulse(before, tau, T, h):
+    """The equation says it: T (tau_a(h) - tau_a(0)) = h tau - integral of tau_a."""
+    change = respond(before, tau, T, h) - before
+    assert h * mean_response(before, tau, T, h) == pytest.approx(
+        h * tau - T * change, rel=1e-9, abs=1e-9
+    )
+
+
+@given(before=vectors(forces, 3), tau=vectors(forces, 3), T=vectors(st.floats(0.0, 10.0), 3))
+def test_actuators_of_a_step_have_the_mean_that_simpsons_rule_finds(before, tau, T):
+    first, middle, last, mean = map(np.array, drive(before, tau, T, 0.02))
+    scale = np.abs([before, tau]).max() + 1.0
+    np.testing.assert_allclose((first + 4 * middle + last) / 6, mean, atol=1e-12 * scale)
+    halfway = [respond(b, t, T_k, 0.01) for b, t, T_k in zip(before, tau, T, strict=True)]
+    slow = np.array(T) > 0.2
+    np.testing.assert_allclose(middle[slow], np.array(halfway)[slow], atol=1e-7 * scale)

@@ -23,7 +23,7 @@ def test_loop_starts_where_section_4_1_says():
     assert start.t == 0.0
     level = (1.0, 0.0, 0.0, 0.0)
     assert start.vehicles.plant == ((2.0, 6.0, 0.0), level, (0.0,) * 6, origin, origin)
-    assert start.scene.plant == (origin, y, origin, (0.0,) * 6)
+    assert start.scene.plant == (origin, y, origin, (0.0,) * 6, (0.0,) * 6)
     assert start.vehicles.planner == ((0.0, 0.0, -2.0), 0.0, 0.0, (0.0,) * 5)
     assert start.controller_state == (y, origin, (0.0,) * 4)
     assert start.scene.y == y
@@ -40,7 +40,7 @@ def test_first_step_moves_no_position_but_all_velocities():
     assert first.vehicles.plant.position == start.vehicles.plant.position
     tau_u, tau_q, tau_r = start.tau
     expected = (0.02 * tau_u / 25.0, 0.0, 0.0, 0.0, 0.02 * tau_q / 22.5, 0.02 * tau_r / 15.0)
-    assert first.vehicles.plant.nu == pytest.approx(expected, rel=1e-12)
+    assert first.vehicles.plant.nu_r == pytest.approx(expected, rel=1e-12)
 
 
 def test_disturbance_acts_at_the_time_of_its_instant():

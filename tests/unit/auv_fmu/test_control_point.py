@@ -88,10 +88,10 @@ def test_velocity_is_the_derivative_of_the_position_of_a_vehicle_that_rolls_in_a
     current = (0.3, -0.4, 0.2)
     parameters = Parameters(eta0=(1.0, 2.0, 3.0, 0.9, -0.6, 2.0), nu0=nu, current=current)
     undriven = (0.0,) * 3
-    state, rotation = begin(parameters, undriven)
+    state, rotation = begin(parameters, undriven, current)
 
     def moved_y(dt):
-        moved = steps(parameters, state, rotation, undriven, (0.0,) * 6, dt, 1)
+        moved = steps(parameters, state, rotation, undriven, (0.0,) * 6, current, dt, 1)
         return outputs(*moved, 0.35, True).y
 
     difference = np.subtract(moved_y(h), moved_y(-h)) / (2 * h)

@@ -6,7 +6,7 @@ from pkgutil import walk_packages
 import pytest
 
 import auv_fmu
-from auv_fmu import control_point, euler
+from auv_fmu import control_point, euler, plant
 from auv_fmu.observer import EULER
 from auv_fmu.saturation import TANH
 
@@ -39,7 +39,11 @@ SECTION_4_1 = {
     "Disturbance": {"A_f": 0.5, "A_d": 1.0, "omega_d": 0.1},
     "Gains": {**CONTROLLER, "K2": TEN, "k_d": 50.0, "s": TANH},
     "PdGains": CONTROLLER,
-    "plant.Parameters": {"ell": 0.35, "eta0": (2.0, 6.0, 0.0, 0.0, 0.0, 0.0)},
+    "plant.Parameters": {
+        "ell": 0.35,
+        "eta0": (2.0, 6.0, 0.0, 0.0, 0.0, 0.0),
+        "integrator": plant.EULER,
+    },
     "motion_planner.Parameters": {
         "ell": 0.35,
         "tau_d": (5.0, 1.0, 2.0),

@@ -1,15 +1,18 @@
 """The plant: (1) and (2) with six degrees of freedom."""
 
-from math import cos, exp, sin
+from itertools import pairwise
+from math import cos, exp, expm1, sin
 from random import Random
 
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
 from auv_fmu import plant
 from auv_fmu.attitude import rotation_from_euler, rotation_from_quaternion
-from auv_fmu.plant import Parameters, RollAxis
+from auv_fmu.plant import EULER, RK4, Parameters, RollAxis
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 from support.strategies import angles, forces, pitch_angles, speeds, vectors
 
@@ -95,12 +98,12 @@ def test_coriolis_terms_are_those_of_a_diagonal_mass_matrix(nu, euler):
 
 
 def started(eta0, nu0, parameters=PARAMETERS):
-    return plant.begin(parameters._replace(eta0=eta0, nu0=nu0), UNDRIVEN)[0]
+    return plant.begin(parameters._replace(eta0=eta0, nu0=nu0), UNDRIVEN, parameters.current)[0]
 
 
 def moved(state, tau, tau_w, h, parameters=PARAMETERS, n=1):
     rotation = rotation_from_quaternion(state.quaternion)
-    return plant.steps(parameters, state, rotation, tau, tau_w, h, n)[0]
+    return plant.steps(parameters, state, rotation, tau, tau_w, parameters.current, h, n)[0]
 
 
 def seen(state, parameters=PARAMETERS):
@@ -115,8 +118,8 @@ def test_surge_under_constant_force_follows_the_analytic_solution_of_euler():
     for _ in range(n):
         state = moved(state, (tau_u, 0.0, 0.0), AT_REST, h)
     expected = tau_u / VEHICLE.d11 * (1 - (1 - h * VEHICLE.d11 / VEHICLE.m11) ** n)
-    assert state.nu[0] == pytest.approx(expected, rel=1e-12)
-    assert state.nu[1:] == (0.0,) * 5
+    assert state.nu_r[0] == pytest.approx(expected, rel=1e-12)
+    assert state.nu_r[1:] == (0.0,) * 5
 
 
 def test_vehicle_that_passes_the_vertical_keeps_a_unit_quaternion_and_does_not_jump():
@@ -175,7 +178,7 @@ def test_held_roll_leaves_1_and_2_as_they_are_printed_beyond_the_vertical_too():
         steepest = max(steepest, theta)
         shown = seen(state, HELD)
         np.testing.assert_allclose(state.position, position, atol=1e-9)
-        np.testing.assert_allclose(state.nu, np.insert(nu, 3, 0.0), atol=1e-9)
+        np.testing.assert_allclose(state.nu_r, np.insert(nu, 3, 0.0), atol=1e-9)
         assert shown.euler[0] == 0.0
         np.testing.assert_allclose(np.sin(shown.euler[1:]), np.sin([theta, psi]), atol=1e-9)
         np.testing.assert_allclose(np.cos(shown.euler[1:]), np.cos([theta, psi]), atol=1e-9)
@@ -203,13 +206,13 @@ def test_constant_current_carries_the_whole_motion_along(parameters):
     still = moved(started(eta0, tuple(nu0), parameters), tau, tau_w, H, parameters, n)
     begun = started(eta0, (*(nu0[:3] + drift), *nu0[3:]), carried)
     moving = moved(begun, tau, tau_w, H, carried, n)
-    np.testing.assert_allclose(moving.nu, still.nu, atol=1e-12)
+    np.testing.assert_allclose(moving.nu_r, still.nu_r, atol=1e-12)
     np.testing.assert_allclose(moving.quaternion, still.quaternion, atol=1e-12)
     np.testing.assert_allclose(moving.position, still.position + n * H * current, atol=1e-10)
     without, with_it = seen(still, parameters), seen(moving, carried)
     np.testing.assert_allclose(with_it.dy, without.dy + current, atol=1e-12)
     rotation = np.column_stack(rotation_from_euler(*with_it.euler))
-    over_ground = np.concatenate((still.nu[:3] + rotation.T @ current, still.nu[3:]))
+    over_ground = np.concatenate((still.nu_r[:3] + rotation.T @ current, still.nu_r[3:]))
     np.testing.assert_allclose(with_it.nu, over_ground, atol=1e-12)
 
 
@@ -235,13 +238,13 @@ def test_current_that_changes_leaves_the_velocity_over_ground_as_it_is(parameter
     rotation = rotation_from_quaternion(state.quaternion)
     changed = plant.immersed(state, rotation, after.current)
     np.testing.assert_allclose(seen(changed, after).nu, seen(state, before).nu, atol=1e-15)
-    through_water = np.subtract(changed.nu[:3], state.nu[:3])
+    through_water = np.subtract(changed.nu_r[:3], state.nu_r[:3])
     turned = np.column_stack(rotation_from_euler(*seen(state).euler)).T
     np.testing.assert_allclose(through_water, turned @ (0.6, -0.3, -0.3), atol=1e-14)
     fresh = started((*state.position, *seen(state).euler), seen(state, before).nu, after)
     carried = moved(state, tau, tau_w, H, after, 100)
     other = moved(fresh, tau, tau_w, H, after, 100)
-    np.testing.assert_allclose(carried.nu, other.nu, atol=1e-12)
+    np.testing.assert_allclose(carried.nu_r, other.nu_r, atol=1e-12)
     np.testing.assert_allclose(carried.position, other.position, atol=1e-12)
 
 
@@ -259,7 +262,7 @@ def test_actuators_with_a_lag_follow_a_step_as_their_equation_does():
     """tau_0 + (tau - tau_0) (1 - exp(-t / T)) at every instant; the one without follows at once."""
     tau, T = (40.0, -20.0, 10.0), (0.5, 0.004, 0.0)
     parameters = PARAMETERS._replace(T=T)
-    state, _ = plant.begin(parameters, tau)
+    state, _ = plant.begin(parameters, tau, parameters.current)
     assert state.tau == (0.0, 0.0, 10.0)
     for k in range(1, 50):
         state = moved(state, tau, AT_REST, H, parameters)
@@ -267,7 +270,72 @@ def test_actuators_with_a_lag_follow_a_step_as_their_equation_does():
         np.testing.assert_allclose(state.tau, expected, rtol=1e-12)
 
 
-def test_force_that_a_lag_lets_through_is_the_one_that_accelerates():
-    parameters = PARAMETERS._replace(T=(0.1, 0.0, 0.0))
-    state = moved(started((0.0,) * 6, AT_REST, parameters), (40.0, 0, 0), AT_REST, H, parameters)
-    assert state.nu[0] == pytest.approx(H * 40.0 * (1 - exp(-H / 0.1)) / VEHICLE.m11, rel=1e-12)
+@given(st.sampled_from((1e-3, 5e-3, 0.02, 0.1, 1.0)), st.booleans())
+def test_vehicle_with_a_lag_has_the_impulse_of_its_actuators(T, is_rk4):
+    """Without damping m11 u is the integral of tau (1 - exp(-t / T)): tau (t + T expm1(-t / T))."""
+    tau_u, n = 40.0, 50
+    vehicle = VEHICLE._replace(d11=0.0)
+    parameters = Parameters(vehicle, T=(T, 0.0, 0.0), integrator=RK4 if is_rk4 else EULER)
+    state = started((0.0,) * 6, AT_REST, parameters)
+    for k in range(1, n + 1):
+        state = moved(state, (tau_u, 0.0, 0.0), AT_REST, H, parameters)
+        impulse = tau_u * (k * H + T * expm1(-k * H / T))
+        assert vehicle.m11 * state.nu_r[0] == pytest.approx(impulse, rel=1e-12)
+
+
+# What integrates
+
+
+def ends(parameters, tau, tau_w, n, stop):
+    """Position, attitude and velocity through the water after n steps."""
+    state = started((1.0, 2.0, 3.0, 0.0, 0.3, -0.4), (0.5, 0.1, -0.1, 0.0, 0.2, 0.1), parameters)
+    for _ in range(n):
+        state = moved(state, tau, tau_w, stop / n, parameters)
+    rotation = rotation_from_quaternion(state.quaternion)
+    return np.concatenate((state.position, np.ravel(rotation), state.nu_r))
+
+
+@pytest.mark.parametrize("rolls", [True, False])
+@pytest.mark.parametrize("lag", [0.0, 0.3])
+@pytest.mark.parametrize(("integrator", "order"), [(EULER, 1), (RK4, 4)])
+def test_integrators_have_the_orders_that_they_are_known_for(integrator, order, rolls, lag):
+    """Against (1) and (2) in rotation matrices, by scipy's solve_ivp."""
+    tau, tau_w, current, stop = (
+        (20.0, 3.0, 5.0),
+        (0.5, 0.1, -0.2, 0.0, 0.1, 0.2),
+        (0.3, 0.2, 0.1),
+        2.0,
+    )
+    roll = ROLL._replace(rolls=rolls)
+    parameters = Parameters(VEHICLE, roll, current=current, T=(lag,) * 3, integrator=integrator)
+
+    def motion(t, x):
+        matrix, nu = x[3:12].reshape(3, 3), x[12:]
+        columns = tuple(map(tuple, matrix))
+        acting = np.multiply(tau, -np.expm1(-t / lag) if lag else 1.0)
+        dnu = plant.accelerations_6dof(VEHICLE, roll, tuple(nu), columns, tuple(acting), tau_w)
+        # (1) holds the roll at zero: its axes turn about the vertical at r / cos(theta).
+        p = nu[3] if rolls else nu[5] * columns[0][2] / columns[2][2]
+        dmatrix = [np.cross(matrix.T @ (p, nu[4], nu[5]), axis) for axis in matrix]
+        return np.concatenate((matrix.T @ nu[:3] + current, np.ravel(dmatrix), dnu))
+
+    begun = ends(parameters, tau, tau_w, 0, stop)
+    exact = solve_ivp(motion, (0.0, stop), begun, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    errors = [np.abs(ends(parameters, tau, tau_w, n, stop) - exact).max() for n in (40, 80, 160)]
+    for coarse, fine in pairwise(errors):
+        assert np.log2(coarse / fine) == pytest.approx(order, abs=0.15)
+
+
+def test_body_that_nothing_brakes_keeps_its_energy_with_rk4_and_gains_some_with_euler():
+    """Of M nu^2 / 2, in 20 s at 20 ms; Coriolis forces do no work."""
+    vehicle = VEHICLE._replace(d11=0.0, d22=0.0, d33=0.0, d55=0.0, d66=0.0, righting_pitch=0.0)
+    roll = ROLL._replace(d44=0.0, righting_roll=0.0)
+    gains = {}
+    for integrator in (EULER, RK4):
+        parameters = Parameters(vehicle, roll, integrator=integrator)
+        begun = started((0.0,) * 6, (1.0, 0.2, -0.1, 0.1, 0.3, 0.4), parameters)
+        ended = moved(begun, UNDRIVEN, AT_REST, H, parameters, 1000)
+        energies = [MASSES @ np.square(state.nu_r) for state in (begun, ended)]
+        gains[integrator] = energies[1] / energies[0] - 1.0
+    assert abs(gains[RK4]) < 1e-8
+    assert gains[EULER] > 0.01
