@@ -1,7 +1,8 @@
 """terminalsAndIcons.xml of FMI 3.0: the groups of ports, each as one thing to connect.
 
-A terminal has the name of its group. Components that exchange a group call it the same, and its
-members too, so a tool that joins two terminals of one name joins the right variables.
+A terminal has the name of its group, or of the group that it is made to take. Components call the
+members of a group that they exchange the same, so a tool that joins two terminals of one name joins
+the right variables.
 """
 
 from __future__ import annotations
@@ -17,6 +18,9 @@ from fmus.ports.quantities import member_of
 #: All members of an input have to come from somewhere. Not all of an output's need to go there:
 #: a controller takes the angles of the posture alone. Each terminal's rule is its own.
 _MATCHING_RULE = {"input": "plug", "output": "bus"}
+
+#: Outputs for inputs of other names: friction is against the velocity through the water.
+_TAKES = {"nu": "nu_r"}
 
 #: Corners of the icon, and how many millimetres its units are on a screen.
 _ICON = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
@@ -61,6 +65,7 @@ def _terminals(ports: Sequence[Port]) -> list[Element]:
 
 def _terminal(name: str, members: Sequence[Port], centre: int) -> Element:
     causality = members[0].causality
+    name = _TAKES.get(name, name) if causality == "input" else name
     terminal = Element("Terminal", name=name, matchingRule=_MATCHING_RULE[causality])
     for port in members:
         SubElement(

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from auv_fmu.attitude import rotation_from_euler
-from orchestrator.analysis.body import PAINT, body
+from orchestrator.analysis.body import PAINT, Z_UP, body
 from orchestrator.analysis.figures.layout import Cell
 from orchestrator.analysis.figures.panels import draw_commands, over_time, title
 from orchestrator.analysis.figures.signal import moving_mean
@@ -86,7 +86,9 @@ def check_film(path: Path, fps: int) -> None:
         raise InputError(f"--fps {fps}: write a number from 1 to 50")
 
 
-def animate(text: str, table: Table, path: Path, fps: int = FRAMES_PER_SECOND) -> None:
+def animate(
+    text: str, table: Table, path: Path, fps: int = FRAMES_PER_SECOND, z_up: bool = False
+) -> None:
     """Write a film of a run.
 
     Args:
@@ -94,13 +96,14 @@ def animate(text: str, table: Table, path: Path, fps: int = FRAMES_PER_SECOND) -
         table: with the ports of the plant, and of the planner if there is a reference.
         path: of a .gif, or of an .mp4 where ffmpeg is installed.
         fps: frames per second.
+        z_up: whether z is up and y west, or down and east.
 
     Raises:
         InputError: the file cannot be written.
 
     """
     check_film(path, fps)
-    frames = _frames(text, table, int(_DURATION * fps))
+    frames = _frames(text, table, int(_DURATION * fps), z_up)
     if path.suffix == ".mp4":
         _write_mp4(frames, path, fps)
     else:
@@ -138,7 +141,7 @@ def _write_mp4(frames: Iterator[Image.Image], path: Path, fps: int) -> None:
         raise InputError(f"{path}: ffmpeg could not write it")
 
 
-def _frames(text: str, table: Table, n: int) -> Iterator[Image.Image]:
+def _frames(text: str, table: Table, n: int, z_up: bool) -> Iterator[Image.Image]:
     """Pictures of a run: what does not move is drawn once."""
     run = Drawn("run", table)
     instants = np.linspace(table.time[0], table.time[-1], n)
@@ -148,7 +151,7 @@ def _frames(text: str, table: Table, n: int) -> Iterator[Image.Image]:
         canvas: Any = FigureCanvasAgg(figure)
         figure.suptitle(heading(text))
         grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1))
-        scene = _Scene(figure.add_subplot(grid[0]), table)
+        scene = _Scene(figure.add_subplot(grid[0]), table, z_up)
         series = _draw_series(Cell(figure, grid[1]), run)
         markers = [
             axes.axvline(0.0, color="black", linewidth=1.0, animated=True) for axes in series
@@ -185,14 +188,16 @@ def _draw_series(cell: Cell, run: Drawn) -> list[Any]:
 class _Scene:
     """What a camera sees that follows the vehicle."""
 
-    def __init__(self, axes: Any, table: Table) -> None:
+    def __init__(self, axes: Any, table: Table, z_up: bool) -> None:
         self.axes = axes
+        # All is seen in axes whose z is down.
+        self._turn = Z_UP if z_up else np.ones(3)
         axes.set(xlim=(-0.5, 0.5), ylim=(-0.56, 0.56), aspect="equal", adjustable="box")
         axes.set_axis_off()
         self._time = table.time
-        self._y = true_control_point(table)
+        self._y = true_control_point(table) * self._turn
         self._euler = table.group(*ATTITUDE)
-        self._y_d = None if table.missing(Y_D) else table.group(*Y_D)
+        self._y_d = None if table.missing(Y_D) else table.group(*Y_D) * self._turn
         self._body = body()
         nearest = _NEAREST * parameter(table, ELL)
         middle, width = self._y, np.full(len(self._y), nearest)
@@ -237,8 +242,9 @@ class _Scene:
         below[2] = middle[2] + _GROUND_DEPTH * width
         self._drop.set_segments(camera.line(np.array([self._y[row], below])))
         self._show_body(camera, row, _VEHICLE * width)
-        time, depth = self._time[row], self._y[row, 2]
-        self._caption.set_text(f"t = {time:.1f} s\nz = {depth:.1f} m\ngrid {spacing:g} m")
+        time, z = self._time[row], self._y[row, 2] * self._turn[2]
+        up = "up" if self._turn[2] < 0.0 else "down"
+        self._caption.set_text(f"t = {time:.1f} s\nz = {z:.1f} m (z {up})\ngrid {spacing:g} m")
         return self._all()
 
     def _show_ground(self, camera: _Camera, middle: np.ndarray, width: float) -> float:
@@ -259,6 +265,8 @@ class _Scene:
 
     def _show_body(self, camera: _Camera, row: int, length: float) -> None:
         R = np.array(rotation_from_euler(*self._euler[row].tolist())).T
+        # Of a body whose axes are turned as those of the earth are.
+        R *= np.outer(self._turn, self._turn)
         points = self._y[row] + length * self._body.points @ R.T
         corners = points[self._body.triangles]
         seen, depth = camera.project(corners.reshape(-1, 3))

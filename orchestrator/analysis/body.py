@@ -25,6 +25,9 @@ _SIDES = 12
 _FIN = ((0.74, 0.05), (0.84, 0.22), (0.94, 0.22), (0.94, 0.03))
 
 
+#: Axes of the paper's words, whose z is up, in axes whose z is down; in the earth and in the body.
+Z_UP = np.array([1.0, -1.0, -1.0])
+
 #: Colours of the hull, the upper fin, which shows the roll, and the other fins.
 PAINT = (COLOURS[5], COLOURS[0], REFERENCE)
 

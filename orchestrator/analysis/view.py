@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_fmu.attitude import rotation_from_euler
-from orchestrator.analysis.body import PAINT, body
+from orchestrator.analysis.body import PAINT, Z_UP, body
 from orchestrator.analysis.figures.style import COLOURS, REFERENCE
 from orchestrator.analysis.signals import (
     ACTUATORS,
@@ -64,12 +64,13 @@ class _Lines(NamedTuple):
     limits: Sequence[float] = ()
 
 
-def page(title: str, table: Table) -> str:
+def page(title: str, table: Table, z_up: bool = False) -> str:
     """A page of a run that needs no other file.
 
     Args:
         title: heading.
         table: of the run.
+        z_up: whether z is up and y west, or down and east.
 
     Raises:
         InputError: plotly is not installed, or the run has no vehicle.
@@ -80,7 +81,7 @@ def page(title: str, table: Table) -> str:
     if missing := table.missing(*CONTROL_POINT):
         raise InputError(f"has no vehicle to show: no {missing[0]}")
     panels, notes = _panels(table)
-    data = _frames(table) | {"series": _series(panels)}
+    data = _frames(table, z_up) | {"series": _series(panels)}
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     fields = {
         "title": html.escape(title),
@@ -227,7 +228,7 @@ def extremes(values: np.ndarray, divisions: int) -> np.ndarray:
     return rows
 
 
-def _frames(table: Table) -> dict[str, Any]:
+def _frames(table: Table, z_up: bool) -> dict[str, Any]:
     """The scene, and what moves in it."""
     y, time = true_control_point(table), table.time
     paths = [y]
@@ -253,6 +254,7 @@ def _frames(table: Table) -> dict[str, Any]:
     moving = len(traces)
     traces.append(_line(y[:1], COLOURS[0], 5, "path of the control point"))
     shape = body()
+    points = length * shape.points * (Z_UP if z_up else 1.0)
     parts = []
     for part, (colour, name) in enumerate(
         zip(PAINT, ("vehicle", "upper fin", "other fins"), strict=True)
@@ -260,7 +262,7 @@ def _frames(table: Table) -> dict[str, Any]:
         chosen = shape.triangles[shape.part == part]
         used, triangles = np.unique(chosen, return_inverse=True)
         i, j, k = triangles.reshape(chosen.shape).T.tolist()
-        parts.append([_numbers(point) for point in length * shape.points[used]])
+        parts.append([_numbers(point) for point in points[used]])
         traces.append(
             {"type": "mesh3d", "i": i, "j": j, "k": k, "color": colour, "name": name}
             | {"x": [0.0], "y": [0.0], "z": [0.0], "hoverinfo": "skip", "flatshading": True}
@@ -276,9 +278,9 @@ def _frames(table: Table) -> dict[str, Any]:
         f"{k}axis": {"title": {"text": f"{k} {name} [m]"}, "range": ends, "nticks": 5}
         for k, name, ends in (
             ("x", "north", [low[0], high[0]]),
-            # Both turned around, so that north, east and down are right-handed.
-            ("y", "east", [high[1], low[1]]),
-            ("z", "down", [high[2], low[2]]),
+            # Turned around both or neither: the axes are right-handed.
+            ("y", "west", [low[1], high[1]]) if z_up else ("y", "east", [high[1], low[1]]),
+            ("z", "up", [low[2], high[2]]) if z_up else ("z", "down", [high[2], low[2]]),
         )
     }
     layout = {

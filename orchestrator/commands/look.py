@@ -140,9 +140,10 @@ def _view(options: argparse.Namespace) -> int:
         raise InputError(f"{out}: write a .html")
     _warn(file)
     name, table = read_result(file)
-    title = str(read_record(file).get("title") or name)
+    record = read_record(file)
+    title = str(record.get("title") or name)
     try:
-        text = page(title, table)
+        text = page(title, table, bool(record.get("z_up")))
     except InputError as error:
         raise InputError(f"{options.result}: {error}") from error
     with _written(out, options.force) as unfinished:
@@ -168,7 +169,7 @@ def _animate(options: argparse.Namespace) -> int:
         )
         if missing := seen.missing(*CONTROL_POINT):
             raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
-        animate(title, seen, file, options.fps)
+        animate(title, seen, file, options.fps, scenario.z_up)
     return status(scenario.name, ending)
 
 

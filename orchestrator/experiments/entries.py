@@ -57,6 +57,11 @@ def is_text(value: Any) -> bool:
     return isinstance(value, str)
 
 
+def is_flag(value: Any) -> bool:
+    """Whether it is true or false."""
+    return isinstance(value, bool)
+
+
 def is_number(value: Any) -> bool:
     """Whether it is a number, which a truth value is not."""
     return isinstance(value, (int, float)) and not isinstance(value, bool)

@@ -14,6 +14,7 @@ from orchestrator.experiments.entries import (
     check_entries,
     flattened,
     is_finite,
+    is_flag,
     is_number,
     is_table,
     is_text,
@@ -42,10 +43,6 @@ _MEMBER = (".", "[")
 _CONDITION = re.compile(rf"(\S+)\s*({'|'.join(COMPARISONS)})\s*(\S+)")
 
 
-def _is_flag(value: Any) -> bool:
-    return isinstance(value, bool)
-
-
 def _is_name_or_names(value: Any) -> bool:
     return is_text(value) or are_names(value)
 
@@ -62,7 +59,7 @@ ENTRIES: dict[str, Entry] = {
     ),
     "repeat": Entry(
         "true or false",
-        _is_flag,
+        is_flag,
         "Whether it happens each time that `when` becomes true, or the first time alone.",
         "`false`",
     ),
@@ -103,7 +100,7 @@ ENTRIES: dict[str, Entry] = {
         "Components that begin anew, with their parameters as they are at that time.",
         "",
     ),
-    "stop": Entry("true or false", _is_flag, "`true`: the run ends here, and has not failed.", ""),
+    "stop": Entry("true or false", is_flag, "`true`: the run ends here, and has not failed.", ""),
 }
 
 #: Actions that nothing is left of that could end.

@@ -74,6 +74,7 @@ def write_record(
         "scenario": prepared.scenario.name,
         "title": prepared.scenario.title,
         "label": prepared.scenario.label,
+        "z_up": prepared.scenario.z_up,
         "sha256": prepared.scenario.digest,
         "identity": identity.digest_of(prepared.identity),
         "command": list(command),

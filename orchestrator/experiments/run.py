@@ -321,7 +321,7 @@ def _draw(
     scenario: Scenario, done: Sequence[_Done], folder: Path, interrupts: Interrupts
 ) -> list[str]:
     """Draw all figures or, where one of them cannot be written, none; notes on what is left out."""
-    drawn = [Drawn(run.prepared.scenario.legend, run.seen) for run in done]
+    drawn = [Drawn(run.prepared.scenario.legend, run.seen, scenario.z_up) for run in done]
     try:
         return draw(
             scenario.figure,

@@ -16,6 +16,7 @@ from orchestrator.experiments.entries import (
     are_names,
     check_entries,
     flattened,
+    is_flag,
     is_number,
     is_table,
     is_text,
@@ -54,6 +55,7 @@ class Scenario:
     title: str = ""
     label: str = ""
     figure: str = "tracking"
+    z_up: bool = False
     compare: str = ""
     stop_time: float | None = None
     step: float | None = None
@@ -112,6 +114,12 @@ ENTRIES: dict[str, Entry] = {
         "the name of the file",
     ),
     "figure": Entry("text", is_text, "Which figure to draw.", "`tracking`"),
+    "z_up": Entry(
+        "true or false",
+        is_flag,
+        "Whether z is up and y west where the path is drawn, as in the paper's words (reading 16).",
+        "`false`: z is down and y east",
+    ),
     "compare": Entry(
         "text",
         is_text,

@@ -82,7 +82,7 @@ Another controller in the place of the paper's. It measures the velocity, so it 
 Fig. 4 is drawn with it, from the same start:
 
 ```toml
-title = "PD and output feedback, from 10 m below"
+title = "PD and output feedback, from 10 m away"
 label = "PD"
 figure = "comparison"
 compare = "fig4"

@@ -78,6 +78,12 @@ READINGS: dict[int, tuple[str, str]] = {
         "dy_o of (18) and the state with a hat of (23) and (24) differ by k_d z; the control law "
         "(21) takes the first.",
     ),
+    16: (
+        "The direction of z.",
+        "(1) and (2) are the same with z down and with z up. The words of section 4.1, where a "
+        "helix descends from z = -2 m, have z up: so the paper's figures are drawn. Our ports are "
+        "north, east and down.",
+    ),
 }
 
 #: Mentions outside headings.

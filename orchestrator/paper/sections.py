@@ -113,7 +113,7 @@ def draw_section(section: Section, outcomes: Sequence[Outcome], folder: Path) ->
     if kind not in FIGURES:
         return [f"no figure: there is none of the name {kind!r}{did_you_mean(kind, FIGURES)}"]
     runs = [
-        Drawn(label, outcome.table)
+        Drawn(label, outcome.table, section.scenario.z_up)
         for label, outcome in zip(section.runs, outcomes, strict=True)
         if len(outcome.table)
     ]

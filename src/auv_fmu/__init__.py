@@ -37,7 +37,7 @@ estimate, s_z is s(z). lambda_ is lambda, which Python keeps for itself.
 Arguments come in one order: sets of parameters, states and signals, single parameters such as
 ell and lambda, the step h.
 
-Conventions: SI units; north-east-down earth frame E; body frame B with x forward, y to
+Conventions: SI units; north-east-down earth frame E (reading 16); body frame B with x forward, y to
 starboard, z down; tuples are in the order of the paper's vectors.
 """
 

@@ -1,10 +1,13 @@
 """A reference through waypoints: straight legs at constant velocity, rounded where they meet.
 
-It is not in the paper, whose tracking theorem asks for no more of a reference than that it is twice
-continuously differentiable. A point that runs from waypoint to waypoint at constant velocities v_k
-jumps from one to the next at each corner. The reference is where this point is on the average, over
-the time T around the moment and weighted by a parabola. So a corner at waypoint p_k, passed at t_k,
-becomes a rounding that takes the time T: in it, with a = (t - t_k) / T + 1/2 from 0 to 1,
+It is not in the paper, which asks of a reference that y_d, dy_d and ddy_d are bounded (Assumption
+4), and that it is a motion of (1) and (2) (Definition 1). The first holds here, the second on
+straight legs only: what the vehicle cannot follow in a rounding is refused by :func:`check`.
+
+A point that runs from waypoint to waypoint at constant velocities v_k jumps from one to the next at
+each corner. The reference is where this point is on the average, over the time T around the moment
+and weighted by a parabola. So a corner at waypoint p_k, passed at t_k, becomes a rounding of T: in
+it, with a = (t - t_k) / T + 1/2 from 0 to 1,
 
     y_d = p_k + v_k (t - t_k) + (v_k+1 - v_k) T (a^3 - a^4 / 2)
     dy_d = v_k + (v_k+1 - v_k) (3 a^2 - 2 a^3)
@@ -445,7 +448,8 @@ def _check_rounding(parameters: Parameters, corner: Corner, ahead: Corner) -> No
         t = corner.t + waypoints.rounding * (i * _BETWEEN - 0.5)
         moment = reference(waypoints, corner_ahead(waypoints, ahead, t), t)
         dx, dy, dz = moment.dy_d
-        moves = norm(moment.dy_d) > 0.0
+        # The pitch has been checked: what is vertical here is what rounding has left of a rest.
+        moves = dx * dx + dy * dy > 0.0
         if before[0] * dx + before[1] * dy + before[2] * dz < 0.0 or (
             not moves and norm(moment.ddy_d) > 0.0
         ):

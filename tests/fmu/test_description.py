@@ -20,6 +20,7 @@ from lxml import etree
 from fmus.packaging.discovery import components, package_folder
 from fmus.ports.description_fmi2 import fmi2_description
 from fmus.ports.description_fmi3 import fmi3_build_description, fmi3_description
+from fmus.ports.quantities import group_name
 from fmus.ports.terminals import terminals_and_icons
 
 GUID = "{00000000-0000-0000-0000-000000000000}"
@@ -181,8 +182,10 @@ def test_terminals_are_the_groups_of_inputs_and_outputs(fmi3: Path):
     joined = []
     for name, (_, members) in terminals(description.modelName).items():
         assert len({causality[variable] for variable in members.values()}) == 1
+        # Friction takes the velocity through the water, by its own name for it.
+        group = "nu" if description.modelName == "DisturbanceGenerator" and name == "nu_r" else name
         for member, variable in members.items():
-            assert variable in (f"{name}.{member}", f"{name}[{member}]")
+            assert variable in (f"{group}.{member}", f"{group}[{member}]")
         joined += members.values()
     connectable = [name for name in causality if causality[name] in ("input", "output")]
     assert sorted([*joined, "fault"]) == sorted(connectable)
@@ -194,8 +197,7 @@ def test_connecting_terminals_by_name_wires_the_closed_loop():
     components_of = loop["components"]
     fed = set()
     for sink, source in loop["wires"].items():
-        (component, group), (other, origin) = sink.split("."), source.split(".")
-        assert group == origin
+        (component, _), (other, group) = sink.split("."), source.split(".")
         rule, members = terminals(components_of[component])[group]
         _, offered = terminals(components_of[other])[group]
         # A plug needs all of its members.
@@ -206,5 +208,5 @@ def test_connecting_terminals_by_name_wires_the_closed_loop():
         (component, port.name)
         for component, name in components_of.items()
         for port in declared(name).PORTS
-        if port.causality == "input"
+        if port.causality == "input" and f"{component}.{group_name(port.name)}" not in loop["still"]
     }

@@ -80,17 +80,24 @@ def test_path_that_the_vehicle_cannot_follow_is_refused_in_one_line(request, kin
 
 
 @pytest.mark.parametrize("kind", ["dist", "native"])
-def test_path_through_the_vertical_is_refused_in_one_line(request, kind: str):
-    """Its legs climb at 80 degrees, on opposite courses."""
+@pytest.mark.parametrize(
+    ("places", "why"),
+    [
+        # Legs at 80 degrees on opposite courses, and steeper ones that pass by the vertical.
+        (((0, 0, 0), (10, 0, 56.7), (0, 0, 113.4)), r"near waypoint 2, .* at 90\.0 degrees"),
+        (((0, 0, 0), (1, 0, 5), (0.2, 0.05, 10)), r"near waypoint 2, .* at 88\.\d degrees, 3\.\d"),
+        (((0, 0, 0), (9, 0, 0), (0, 0, 1e-12)), "turns back on the spot at waypoint 2"),
+    ],
+)
+def test_path_through_the_vertical_is_refused_in_one_line(request, kind: str, places, why: str):
     system = closed_loop(request.getfixturevalue(kind), read_scenario("path"))
-    places = {"x": (0, 10, 0), "y": (0, 0, 0), "z": (0, 56.7, 113.4)}
     values = {
         PortName("planner", f"waypoint[{k}].{axis}"): value
-        for axis, column in places.items()
-        for k, value in enumerate(column, start=1)
+        for k, place in enumerate(places, start=1)
+        for axis, value in zip("xyz", place, strict=True)
     }
     steep = system.with_parameters({PortName("planner", "count"): 3, **values})
-    with pytest.raises(InputError, match=r"near waypoint 2, .* dives at 90\.0 degrees") as error:
+    with pytest.raises(InputError, match=why) as error:
         run(steep, 1.0, 0.02)
     assert "\n" not in str(error.value)
 

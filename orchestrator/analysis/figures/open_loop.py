@@ -44,6 +44,9 @@ def _acceleration(name: str, columns: Sequence[str], unit: str) -> Panel:
 def _from_above(cell: Cell, runs: Sequence[Drawn]) -> None:
     axes = cell.axes(xlabel="y east [m]", ylabel="x north [m]")
     axes.set_aspect("equal", adjustable="datalim")
+    if runs[0].z_up:
+        axes.set_xlabel("y west [m]")
+        axes.invert_xaxis()
     for run, colour in having(runs, CONTROL_POINT):
         y = true_control_point(run.result)
         axes.plot(y[:, 1], y[:, 0], color=colour)

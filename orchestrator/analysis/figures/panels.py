@@ -58,7 +58,7 @@ _MANY = 1e6
 
 
 def _path(cell: Cell, runs: Sequence[Drawn]) -> None:
-    """Paths of control points and their reference in three dimensions, depth downwards."""
+    """Paths of control points and their reference in three dimensions."""
     axes = cell.axes(projection="3d")
     paths = []
     for run, _ in list(having(runs, (Y_D, ())))[:1]:
@@ -76,20 +76,24 @@ def _path(cell: Cell, runs: Sequence[Drawn]) -> None:
             *y[0], marker="o", s=20 + 50 * i, edgecolors=colour,
             facecolors="none" if i else colour, label=None if i else "start",
         )  # fmt: skip
-    _frame_path(axes, np.vstack(paths))
+    _frame_path(axes, np.vstack(paths), runs[0].z_up)
     title(axes, "path")
 
 
-def _frame_path(axes: Any, points: np.ndarray) -> None:
+def _frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
     points = points[np.isfinite(points).all(axis=1)]
     lower, upper = np.min(points, axis=0), np.max(points, axis=0)
     extent = np.maximum(upper - lower, _FLATTEST * max(float((upper - lower).max()), 1e-3))
     middle = (lower + upper) / 2
     low, high = (middle - 0.54 * extent).tolist(), (middle + 0.54 * extent).tolist()
     axes.set(
-        xlim=(low[0], high[0]), ylim=(high[1], low[1]), zlim=(high[2], low[2]),
-        xlabel="x north [m]", ylabel="y east [m]", zlabel="z down [m]",
+        xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]),
+        xlabel="x north [m]", ylabel="y west [m]", zlabel="z up [m]",
     )  # fmt: skip
+    if not z_up:
+        axes.set(ylabel="y east [m]", zlabel="z down [m]")
+        axes.invert_yaxis()
+        axes.invert_zaxis()
     box = np.maximum(extent, 0.5 * extent.max())
     flat = float(box.max() / box[2]) - 1.0
     # A tall box would reach into the panel below, a flat one into that beside it.

@@ -71,10 +71,18 @@ _NO_DATE: dict[str, Any] = {
 
 
 class Drawn(NamedTuple):
-    """A run in a figure."""
+    """A run in a figure.
+
+    Attributes:
+        label: that tells it from others.
+        result: its rows.
+        z_up: whether z is up and y west where its path is drawn (reading 16); or down, and east.
+
+    """
 
     label: str
     result: Table
+    z_up: bool = False
 
 
 #: Columns, and parameters, that something needs: what :meth:`Table.missing` takes.

@@ -5,9 +5,11 @@ from math import sin, sqrt
 import numpy as np
 import pytest
 
+from auv_fmu import motion_planner
 from auv_fmu.closed_loop import Setting, closed_loop
 from auv_fmu.disturbance import Disturbance
 from auv_fmu.output_feedback import Gains
+from auv_fmu.pd import PdGains
 from auv_fmu.plant import Localisation, Parameters
 from auv_fmu.saturation import MAXIMUM_SLOPE, SATURATIONS
 
@@ -78,3 +80,33 @@ def test_closed_loop_of_any_saturation_function_converges(name):
     """
     *_, last = closed_loop(3000, Setting(controller=Gains(s=SATURATIONS[name]), plant=QUIET))
     assert np.abs(last.signals.e).max() < 0.1 / MAXIMUM_SLOPE[name]
+
+
+@pytest.mark.parametrize("gains", [Gains(eps_t=10.0), PdGains(eps_t=10.0)])
+def test_loop_is_the_same_in_axes_whose_z_is_up(gains):
+    """Reading 16: y, z and all turns about them change sign, x, surge and roll do not.
+
+    Friction acts on the velocity, whatever the axes are; the waves of (56) do not.
+    """
+    friction = Disturbance(A_f=0.5, A_d=0.0)
+    down = Setting(
+        QUIET._replace(eta0=(2.0, 6.0, 0.0, 0.3, -0.4, 0.5)),
+        gains,
+        friction,
+        motion_planner.Parameters(),
+    )
+    up = Setting(
+        QUIET._replace(eta0=(2.0, -6.0, 0.0, 0.3, 0.4, -0.5)),
+        gains,
+        friction,
+        motion_planner.Parameters(tau_d=(5.0, -1.0, -2.0), eta0=(0.0, 0.0, 2.0, 0.0, 0.0)),
+    )
+    turned = np.array([1.0, -1.0, -1.0])
+    for one, other in zip(closed_loop(300, down), closed_loop(300, up), strict=True):
+        for group in ("y", "dy", "euler"):
+            expected = turned * getattr(one.scene.plant, group)
+            np.testing.assert_allclose(getattr(other.scene.plant, group), expected, atol=1e-9)
+        np.testing.assert_allclose(other.tau, turned * one.tau, atol=1e-9)
+        np.testing.assert_allclose(
+            other.scene.reference.y_d, turned * one.scene.reference.y_d, atol=1e-9
+        )

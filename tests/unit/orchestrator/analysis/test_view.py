@@ -55,6 +55,20 @@ def test_frames_are_those_of_the_run():
         np.testing.assert_allclose(frames["position"][k], nose, rtol=1e-5, atol=1e-5)
 
 
+@pytest.mark.parametrize("z_up", [False, True])
+def test_body_is_upright_whichever_way_z_points(z_up):
+    """In the picture: the upper fin is above the hull, and the axes are right-handed."""
+    data = data_of(page("run", loop_table(), z_up))
+    axes = [data["scene"]["layout"]["scene"][f"{k}axis"] for k in "xyz"]
+    signs = np.sign([axis["range"][1] - axis["range"][0] for axis in axes])
+    assert np.prod(signs) == 1.0
+    assert signs[2] == (1.0 if z_up else -1.0)
+    assert axes[2]["title"]["text"] == ("z up [m]" if z_up else "z down [m]")
+    hull, upper_fin, _ = (signs * np.array(part) for part in data["parts"])
+    assert upper_fin[:, 2].min() > 0.0
+    assert upper_fin[:, 2].max() > hull[:, 2].max()
+
+
 def test_what_is_missing_is_named_on_the_page():
     text = page("run", loop_table(without=THETA_HAT))
     assert "estimated parameters left out: no controller.theta_hat[1]" in text

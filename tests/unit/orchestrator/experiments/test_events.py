@@ -37,7 +37,7 @@ def names(*ports):
 
 
 def test_an_output_means_whoever_it_feeds_and_an_input_itself_alone(system):
-    assert action(system, lose="plant.nu.u") == Alter(
+    assert action(system, lose="plant.nu_r.u") == Alter(
         "override", ((PortName("disturbance", "nu.u"), 0.0),)
     )
     assert action(system, freeze="plant.eta.psi") == Freeze(names("controller.eta.psi"))

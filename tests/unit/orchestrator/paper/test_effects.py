@@ -70,7 +70,9 @@ def test_step(tables):
     """The proposed controller moves by 5 %; tau_q of the PD controller falls from 8 to 5."""
     proposed = [{"l2_effort": (100.0 - 5.0 * (i > 0), 1.0, 2.0)} for i in range(len(STEPS))]
     pd = [{"l2_effort": (9.0, 8.0 - i, 7.0)} for i in range(len(STEPS))]
-    shown = effects.step(*made(tables["effect-step"], *proposed, *pd))
+    exact = {"l2_effort": (9.0, 4.25, 7.0)}
+    shown = effects.step(*made(tables["effect-step"], *proposed, *pd, exact))
+    assert "with plant.integrator = rk4 it is 4.25 at 20 ms" in shown.text
     assert "in tau_q is 8, 7, 6, 5 N·m·√s" in shown.text
     assert "change by 5 % at most" in shown.text
     [line, *_] = shown.figure.axes[0].lines

@@ -48,6 +48,16 @@ def test_lines_hold_the_numbers_of_the_table():
     np.testing.assert_allclose(lines(panel(figure, "error [m]"))[0][1], error, atol=1e-12)
 
 
+@pytest.mark.parametrize("z_up", [False, True])
+def test_axes_of_a_path_say_which_way_they_point(z_up):
+    figure, _ = compose("", FIGURES["tracking"][""], [Drawn("run", loop_table(), z_up)])
+    [axes] = [axes for axes in figure.axes if axes.name == "3d"]
+    assert axes.get_zlabel() == ("z up [m]" if z_up else "z down [m]")
+    assert axes.get_ylabel() == ("y west [m]" if z_up else "y east [m]")
+    # Right-handed: both are turned around, or neither.
+    assert axes.zaxis_inverted() == axes.yaxis_inverted() == (not z_up)
+
+
 def test_panels_end_together():
     table = loop_table()
     figure, _ = compose("", FIGURES["tracking"][""], [Drawn("run", table)])
