@@ -119,7 +119,7 @@ OF_RUNS = (
         "plant",
         (
             Option("Euler's scheme"),
-            Option("Runge and Kutta's", {"plant.integrator": "rk4"}, "4.1: Euler, 20 ms"),
+            Option("Runge-Kutta, fourth order", {"plant.integrator": "rk4"}, "4.1: Euler, 20 ms"),
         ),
     ),
     Choice(

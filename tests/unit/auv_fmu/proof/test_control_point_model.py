@@ -60,7 +60,7 @@ def test_1_and_2_turn_a_body_on_which_nothing_acts():
     """A sphere in (2), at u = 1 m/s, that yaws at 0.6 rad/s with a pitch of 0.6 rad.
 
     (1) holds its roll, which takes p = -r tan(theta); (2) has no p. So its velocity along z goes
-    from -sin(0.6) to sin(0.6) m/s in pi / 0.6 s, by Runge and Kutta's fourth order.
+    from -sin(0.6) to sin(0.6) m/s in pi / 0.6 s, by the Runge-Kutta scheme of fourth order.
     """
     sphere = Vehicle(20.0, 20.0, 20.0, 5.0, 5.0, *(0.0,) * 6)
 
