@@ -46,7 +46,7 @@ ERROR, GAP, TENSION = "Errors", "Gaps of the proof", "Tensions"
 #: What the points of a kind have in common.
 KINDS = {
     ERROR: "What is printed and false.",
-    GAP: "Steps of Theorem 1 that do not follow as printed.",
+    GAP: "Steps of Theorem 1 that do not follow as printed, and what it does not reach.",
     TENSION: "What is true, or nearly, and still pulls apart or is easily misread.",
 }
 
@@ -132,10 +132,11 @@ def errata() -> tuple[Erratum, ...]:
         Erratum(
             "P2.2 and P2.3 exclude each other in (15)",
             "P2.3 makes C_2(x) y symmetric in x and y, so the product C_2(dy) dy of (15) fixes it: "
-            "it is (C_2(x) y + C_2(y) x) / 2. Take a level vehicle, x ahead and y to starboard, of "
-            "1 m/s each. Under x the vehicle does not turn, so M_2 is at rest and P2.2 asks for "
-            f"y^T C_2(x) y = 0; it is -m66 / (2 ell^3) = {-0.5 * vehicle.m66 / ELL**3:.0f} W. C_2 "
-            "as printed has P2.2 and not P2.3 (reading 14). The Christoffel symbols of M_2 have "
+            "it is (C_2(x) y + C_2(y) x) / 2 with the printed C_2. Take a level vehicle, x ahead "
+            "and y to starboard, of 1 m/s each. Under x the vehicle does not turn, so M_2 is at "
+            "rest and P2.2 asks for y^T C_2(x) y = 0; it is -m66 / (2 ell^3) = "
+            f"{-0.5 * vehicle.m66 / ELL**3:.0f} W. C_2 as printed has P2.2 and not P2.3 (reading "
+            "14). Christoffel symbols, with the rate of M_2 under each dy for its derivative, have "
             "both; (15) differs from them by a force that is quadratic in dy and does no work, for "
             "d to take. Or the proof does without P2.3: C_2(dy) dy_r = C_2(r_1) dy_r + "
             "C_2(dy_r) dy_r puts C_2(r_1) dy_r where chi_1 has C_2(dy_r) r_1.",
@@ -150,11 +151,11 @@ def errata() -> tuple[Erratum, ...]:
         Erratum(
             "P2.4: C_2 has a pole at the vertical",
             "(1) turns the axes of J about the vertical at r / cos(theta), so they roll at "
-            "r tan(theta), and |C_2| is at least m55 tan(theta) / ell^3 per m/s: "
+            "-r tan(theta), and |C_2| is at least m55 tan(theta) / ell^3 per m/s: "
             f"{turning * tan(radians(80.0)):,.0f} kg/m at 80 degrees, "
             f"{turning * tan(radians(89.0)):,.0f} at 89. No constant bounds it, so (26) and (29) "
-            "have finite zetas only for pitches that keep off the vertical, and Fig. 5 passes it. "
-            "With the full rotation of reading 3 the rates are the body's own, and "
+            "have finite zetas only for pitches that keep off the vertical, and our Fig. 5 passes "
+            "it. With the full rotation of reading 3 the rates are the body's own, and "
             "|C_2| <= lambda_M2 |omega|: P2.4 then needs a bound on the roll rate beside dy.",
             (
                 f"{_MODEL}::test_p2_4_fails_at_the_vertical",
@@ -165,7 +166,8 @@ def errata() -> tuple[Erratum, ...]:
             "P2.5 holds for a bounded velocity only",
             "d is quadratic in dy. At x_1 = x_2 + h its change has a term |x_2| |h|, which no "
             "d_M1 |h| + d_M2 |h|^2 bounds for all x_2. The proof needs it at x_2 = dy_r alone, "
-            "which (16) and Assumption 4 bound: nothing hangs on it.",
+            "which (16) and Assumption 4 bound: it holds there, with a d_M1 that grows with "
+            "lambda.",
             (
                 f"{_MODEL}::test_p2_5_fails_for_an_unbounded_velocity",
                 f"{_MODEL}::test_p2_5_holds_for_a_bounded_second_velocity",
@@ -174,11 +176,11 @@ def errata() -> tuple[Erratum, ...]:
         Erratum(
             "Lemma 1: a factor, a matrix and a square",
             "(i): the integral of tanh(k_1 r) is ln(cosh(k_1 xi)) / k_1, and ln(cosh(xi)) lies "
-            "within the printed bounds at k_1 = 1 only. (v): a Psi that is positive definite is "
-            "not enough; Psi = [[1, 5], [5, 26]] and x = (10, -1) make x^T Psi Tanh(x) = -13.3. "
-            "It is, if Psi is diagonal as well. (vi): from (i) follows s^2 <= s'_M^2 xi^2, and "
-            "s'_M without the square is too little for 2 tanh(xi). The proof of Theorem 1 has "
-            "k_1 = s'_M = 1 and diagonal matrices: nothing hangs on it.",
+            "within the printed bounds at k_1 = 1 only. (v) is printed for every Psi; positive "
+            "definite is not enough: Psi = [[1, 5], [5, 26]] and x = (10, -1) make "
+            "x^T Psi Tanh(x) = -13.3. It is enough if Psi is diagonal as well. (vi): from (i) "
+            "follows s^2 <= s'_M^2 xi^2, and s'_M without the square is too little for 2 tanh(xi). "
+            "The proof of Theorem 1 has k_1 = s'_M = 1 and diagonal matrices: nothing hangs on it.",
             (
                 f"{_SATURATION}::test_lemma_1_as_printed_fails",
                 f"{_SATURATION}::test_lemma_1_iv_to_vi",
@@ -188,7 +190,7 @@ def errata() -> tuple[Erratum, ...]:
             "(24) contradicts its initial value",
             "At t = 0 (24) is dy_hat_o = dy_r; below it stands dy_hat_o(0) = 0 for z(0) = 0. Both "
             "are true only where dy_r(0) = 0, and Fig. 4 starts 6.6 m away. (51) with the "
-            "printed initial value is meant (reading 4).",
+            "printed initial value is free of that (reading 4).",
             (
                 f"{_OBSERVER}::test_24_starts_from_dy_r",
                 f"{_OBSERVER}::test_state_of_the_observer_is_equation_24",
@@ -211,7 +213,7 @@ def errata() -> tuple[Erratum, ...]:
             "gamma, where (41) has mu_sigma, which is the smallest. With Sigma = diag(0.001, "
             "0.001, 0.001, 0.1), kappa = 1, theta - theta_0 = (0, 0, 0, 1) and theta_tilde half "
             "of that, the last term of (40) is 0.025, and what (41) has for it below 0.0004. With "
-            "equal entries, as in section 4.1, both are one.",
+            "equal entries, as in section 4.1, the two are the same.",
             (
                 f"{_ATTRACTION}::test_41_needs_the_largest_entry_of_sigma",
                 f"{_ATTRACTION}::test_41_holds_with_the_largest_entry_of_sigma",
@@ -220,7 +222,7 @@ def errata() -> tuple[Erratum, ...]:
         Erratum(
             "(45): V may rise inside Omega_p",
             "V falls outside Omega_p; that gives V(t) <= max{V(0), sup of V over Omega_p}, where "
-            "(45) has V(0) only. Start at e = z = r_1 = r_2 = 0 with theta_0 = theta: V(0) = 0, "
+            "(45) has V(0) only. Start at e = z = r_1 = r_2 = 0 with theta_hat = theta: V(0) = 0, "
             "and the first disturbance makes V positive. (46), (47) and (33) inherit it.",
             (f"{_ERRATA}::test_v_rises_from_zero",),
         ),
@@ -248,9 +250,10 @@ def errata() -> tuple[Erratum, ...]:
             "Assumption 1 is about the closed loop",
             "B_w bounds sway and heave for all time and enters the zetas, but (7) drives both with "
             "m11 u r and m11 u q, which the theorem is to bound. It depends on the controller and "
-            "on the start: the largest |(v, w)| at the printed step is 0.41 m/s in Fig. 5, 2.08 "
-            "with PD, and 1.81 from the start of Fig. 4 with 2.5 m/s ahead and 4 rad/s of yaw. The "
-            "zetas, and with them the gains, then depend on the start that they are to cover.",
+            "on the start: the largest |(v, w)| at the printed step is 0.41 m/s in our Fig. 5, "
+            "2.08 with PD, and 1.81 from the start of Fig. 4 with 2.5 m/s ahead and 4 rad/s of "
+            "yaw. The zetas, and with them the gains, then depend on the start that they are to "
+            "cover, and B_w on the gains: the proof does not break that circle.",
             (f"{_ERRATA}::test_sway_and_heave_depend_on_controller_and_start",),
             GAP,
         ),
@@ -309,13 +312,13 @@ def errata() -> tuple[Erratum, ...]:
         ),
         Erratum(
             "(31): no gains meet it with the reference of section 4.1",
-            "Take a level vehicle without sway and heave, z = 0, e = 0, a reference that moves "
+            "Take a vehicle without sway and heave, z = 0, e = 0, a reference that moves "
             "ahead at V, and r_1 to starboard. Then |chi_1| = k V |r_1| with k = m11 m66 / "
             f"(m22 ell^3) = {k:.1f} kg/m, so 0.5 (zeta_1 + zeta_2) >= 0.5 k V, whatever the gains "
             f"and v0; lambda_d2 is {there:g} kg/s, and V must be below {speed:.2f} m/s. The "
             "reference of section 4.1 makes 0.167 m/s. (Without P2.3 the same holds, for a "
-            "reference to starboard.) Even for one at rest, with e astern and r_1 halfway between "
-            "ahead and starboard, 0.5 (zeta_1 + zeta_2) >= 0.25 k sqrt(v0^2 + lambda^2). So lambda "
+            "reference to starboard.) Even for one at rest, with e astern and r_1 between ahead "
+            "and starboard, 0.5 (zeta_1 + zeta_2) >= 0.25 k sqrt(v0^2 + lambda^2). So lambda "
             f"must be below {2.0 * speed:.2f} m/s whatever v0 is, and as printed, at v0 = 1 m/s, "
             f"no gains do: {found.zeta_of_any_gains:.1f} kg/s at lambda = 0, "
             f"{second.least:.1f} at 1 m/s, "
@@ -354,7 +357,7 @@ def errata() -> tuple[Erratum, ...]:
         ),
         Erratum(
             "(44): the ball holds every position error",
-            "c < mu_sigma and gamma >= 3 eps_t. At the best kappa, sqrt(gamma / c) is "
+            "c < mu_sigma and gamma >= 3 eps_t. At the best kappa, sqrt(gamma / c) is at least "
             f"{balls[0]:.1f} even if theta_0 = theta, and {balls[1]:.0f} with |theta - theta_0| = "
             f"lambda_M2 = {of_theta:.0f}, which is theta_4 by P2.1 where theta_0 = 0, in SI "
             f"units; at eps_t = 10, {balls[2]:.0f} and {balls[3]:.0f}. But both Tanh in x "
@@ -383,7 +386,7 @@ def errata() -> tuple[Erratum, ...]:
             f"the reference with a velocity error of {speed:.2f} m/s is not covered, and the "
             "semi-global claim does not follow; and where the reference moves ahead at V, "
             f"zeta_1 >= k V leaves no ball at all above {speed / 2.0:.2f} m/s. The claim may be "
-            "true: runs from 6.6, 30 and 100 m converge.",
+            "true: runs from 6.6, 31 and 100 m converge.",
             (
                 f"{_ATTRACTION}::test_no_gain_makes_alpha_3_larger",
                 f"{_ATTRACTION}::test_no_zetas_reach_further",
@@ -399,8 +402,9 @@ def errata() -> tuple[Erratum, ...]:
             "/ kappa^2)}, and the second has none of them; of the alphas in c_m, alpha_3 and "
             "alpha_4 fall with K_2. (ii): a smaller Sigma is to decrease gamma / c. Where the "
             "second is the smaller, gamma / c >= 3 eps_t / mu_sigma: 300, 3,000 and 30,000 at "
-            "eps_t = 1 and sigma = 0.01, 0.001 and 0.0001. Where c_m is, (ii) follows, and so "
-            "does (i) for k_d. In simulation (ii) holds: `auv-fmu sweep gains`.",
+            "eps_t = 1 and sigma = 0.01, 0.001 and 0.0001. Where c_m is, (ii) follows, and "
+            "(i) for k_d where alpha_4 is the least. In simulation (ii) holds: `auv-fmu sweep "
+            "gains`.",
             (
                 f"{_ATTRACTION}::test_ball_of_44_at_the_best_kappa",
                 f"{_ATTRACTION}::test_alphas_are_those_below_40",
@@ -412,16 +416,17 @@ def errata() -> tuple[Erratum, ...]:
             "(1) holds the roll at zero, for which the body must roll at p = -r tan(theta); (2) "
             "has p = 0. So a body on which no force acts, with m11 = m22 = m33, at 1 m/s with a "
             "pitch of 0.6 rad and a yaw rate of 0.6 rad/s, changes its velocity along z from -0.56 "
-            "to 0.56 m/s within 5.2 s. Without pitch the two agree. The paper takes what roll adds "
-            "as a disturbance and simulates six degrees of freedom (reading 1).",
+            "to 0.56 m/s within 5.2 s. Without pitch the two agree. The paper gives both for low "
+            "speeds and a vehicle with roll actuators, takes what roll adds as a disturbance and "
+            "simulates six degrees of freedom (reading 1).",
             (f"{_MODEL}::test_1_and_2_turn_a_body_on_which_nothing_acts",),
             TENSION,
         ),
         Erratum(
             "(11) is written for a vehicle that does not roll",
             "For (1) and (2) it is right: its columns are R e1, -ell R e3 and ell R e2 at zero "
-            "roll. The vehicle that section 4.1 simulates rolls; beyond a quarter turn the two "
-            "columns of the printed J point backwards, and the loop feeds back with the wrong "
+            "roll. The vehicle that section 4.1 simulates rolls; beyond a quarter turn the last "
+            "two columns of the printed J point backwards, and the loop feeds back with the wrong "
             "sign. With the full R it does not (reading 3).",
             (f"{_SCENARIOS}::test_jacobian_as_printed_saturates_where_the_full_attitude_does_not",),
             TENSION,
@@ -429,8 +434,9 @@ def errata() -> tuple[Erratum, ...]:
         Erratum(
             "Assumption 4: the helix is not bounded",
             "It asks for a bounded y_d; that of section 4.1 moves along z for good, from -2.0 m at "
-            "first to -5.2 after 100 s and -35.1 after 1,000 s. Nothing hangs on it: only dy_d and "
-            "ddy_d are used.",
+            "first to -5.2 after 100 s and -35.1 after 1,000 s. That y and eta are bounded, with "
+            "which the proof ends, hangs on it (and the yaw of a helix is not bounded either); the "
+            "rest needs dy_d and ddy_d only.",
             (f"{_ERRATA}::test_the_helix_is_not_bounded",),
             TENSION,
         ),
@@ -448,9 +454,10 @@ def errata() -> tuple[Erratum, ...]:
             "steeply with lambda: at 2.1, from the start of Fig. 4 and without noise, the "
             "controller commands 651 N where 80 can be had (`auv-fmu run fig4 --set "
             "controller.lambda=2.1 --set plant.noise.std=0`; 556 N in steps of 2 ms), and 59 N at "
-            "the paper's 1. So gains that meet (30) as printed saturate the actuators that the "
-            "controller is made to spare. With speeds counted in a smaller v0 (30) is "
-            "lambda > 2 v0, and the conflict is gone.",
+            "the paper's 1. So with the paper's other gains a lambda that meets (30) as printed "
+            "saturates the actuators that the controller is made to spare. (With `--set "
+            "controller.gamma=0.01` it does not: 46 N, and a larger error.) With speeds "
+            "counted in a smaller v0 (30) is lambda > 2 v0, and the conflict is gone.",
             (
                 f"{_CONDITIONS}::test_condition_30_can_be_met_by_a_larger_lambda",
                 f"{_ERRATA}::test_30_costs_what_is_said",
@@ -461,8 +468,8 @@ def errata() -> tuple[Erratum, ...]:
             "4.1: exponential convergence, within a metre",
             "The tracking errors are said to converge exponentially. Where r_1 = z = 0, (17) is "
             "de/dt = -lambda tanh(e) in each direction, which has sinh(e), not e, fall "
-            "exponentially: beyond a metre e falls at the constant speed lambda, from 6 to 1.1 m "
-            "in 5 s at 1 m/s. Nearer it is exponential.",
+            "exponentially: beyond a metre e falls at nearly the constant speed lambda, from "
+            "6 to 1.1 m in 5 s at 1 m/s. Nearer it is exponential.",
             (f"{_SATURATION}::test_a_saturated_error_falls_at_constant_speed_first",),
             TENSION,
         ),

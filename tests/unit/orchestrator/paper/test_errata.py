@@ -139,9 +139,10 @@ def test_remark_5_in_figure_4():
     assert f"it is {noisy:.0f} % in the median" in text
 
 
-def peak(lambda_, h=PAPER.h):
+def peak(lambda_, h=PAPER.h, gamma=1.0):
     """Largest surge command of Fig. 4 without noise [N]; it comes within the first seconds."""
-    setting = QUIET._replace(controller=Gains(lambda_=lambda_), h=h, h_max=LongestSteps())
+    gains = Gains(lambda_=lambda_, gamma=gamma)
+    setting = QUIET._replace(controller=gains, h=h, h_max=LongestSteps())
     return max(abs(instant.command[0]) for instant in closed_loop(round(4.0 / h), setting))
 
 
@@ -150,6 +151,7 @@ def test_30_costs_what_is_said():
     assert f"{peak(2.1):.0f} N where 80 can be had" in text
     assert f"{peak(2.1, 0.002):.0f} N in steps of 2 ms" in text
     assert f"{peak(1.0):.0f} N at the paper's 1" in text
+    assert f"it does not: {peak(2.1, gamma=0.01):.0f} N" in text
 
 
 def figure_5(controller):
