@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from auv_fmu.control_point import ELL as CONTROL_POINT
 from auv_fmu.output_feedback import Gains
 from auv_fmu.proof.attraction import Theorem, theorem
 from auv_fmu.proof.sampling import observer_rate
 from auv_fmu.saturation import MAXIMUM_SLOPE
+from auv_fmu.vehicle import Vehicle
 from orchestrator.analysis.cautions import gain_of_a_step
 from orchestrator.analysis.signals import ELL, vehicle
 from orchestrator.errors import InputError
@@ -57,8 +59,9 @@ def check(system: System) -> str:
         InputError: a parameter does not exist or cannot be set.
 
     """
-    lines = [*stated(evaluate(system)), "", _NOTE, "", *_sampling(system)]
-    if not system.parameters:
+    found = evaluate(system)
+    lines = [*stated(found), "", _NOTE, "", *_sampling(system)]
+    if found == theorem(Vehicle(), CONTROL_POINT, Gains(), MAXIMUM_SLOPE["tanh"]):
         lines += ["", _PAPER]
     return "\n".join(lines)
 
@@ -82,7 +85,7 @@ def stated(found: Theorem) -> Iterator[str]:
         )
     if found.zeta_of_any_gains >= known.lambda_d2:
         least = f"{known.lambda_d2:.6g} > 0.5 (zeta_1 + zeta_2), at least "
-        yield f"  (31), (53)  by any gains: {least}{found.zeta_of_any_gains:.4g}: violated"
+        yield f"  (31), (53)  with any gains: {least}{found.zeta_of_any_gains:.4g}: violated"
     yield (
         f"  (40)  alpha_1 = {alphas.alpha_1:.4g}, alpha_2 = {alphas.alpha_2:.4g}, "
         f"alpha_3 <= {alphas.alpha_3:.4g}, alpha_4 <= {alphas.alpha_4:.4g}"
@@ -93,8 +96,8 @@ def stated(found: Theorem) -> Iterator[str]:
         else "  (33)  R_A is empty"
     )
     yield (
-        "  (42)  with zetas for a part of the states only: holds for |x| < "
-        f"{found.x_at_most:.3g} at most, with any gains for |x| < {found.x_of_any_gains:.3g}"
+        "  (42)  with (26) asked for on a ball of x only: holds for "
+        f"|x| < {found.x_at_most:.3g} at most, with any gains for |x| < {found.x_of_any_gains:.3g}"
     )
     yield ""
     yield "with any gains, and with speeds in any unit:"

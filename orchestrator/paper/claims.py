@@ -399,7 +399,7 @@ def gradual_degradation_on_the_way(*sevens: Outcome) -> Finding:
     )
 
 
-@claim("Theorem 1: the gains of section 4.1 meet (30) to (32)", "presumed")
+@claim("Theorem 1: the gains of section 4.1 meet (30) to (32)", "not said")
 def gains_meet_the_conditions() -> Finding:
     """With the gains as printed, which needs no run."""
     found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE["tanh"])
@@ -421,8 +421,8 @@ def region_is_arbitrarily_large() -> Finding:
     found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE["tanh"])
     least, there = found.zeta_of_any_gains, found.bounds.lambda_d2
     return Finding(
-        f"as printed, (31) asks for lambda_d2 > {least:.4g} with any gains, which is {there:g}; "
-        f"(42) holds for |x| < {found.x_of_any_gains:.2g} at most",
+        f"as printed, (31) asks with any gains for more than {least:.4g} of lambda_d2, which is "
+        f"{there:g}; (42) holds for |x| < {found.x_of_any_gains:.2g} at most",
         f"{said(least < there)}: no gain enters alpha_3 with a plus "
         "([the proof](#the-region-of-attraction-does-not-grow-with-the-gains))",
     )

@@ -267,12 +267,12 @@ def condition_30(*runs: Outcome) -> Shown:
         axes.legend()
     paper, met = (runs[LAMBDAS.index(value)].metrics for value in (1.0, 2.1))
     return Shown(
-        "With equal entries in K_2, (30) asks for lambda > 2. From the start of Fig. 4, without "
-        f"noise, the peaks are {actuator_values(paper['peak_command'])} at the paper's lambda = 1 "
-        f"and {actuator_values(met['peak_command'])} at 2.1, where "
+        "With equal entries in K_2, (30) as printed asks for lambda > 2 m/s. From the start of "
+        f"Fig. 4, without noise, the peaks are {actuator_values(paper['peak_command'])} at the "
+        f"paper's lambda = 1 and {actuator_values(met['peak_command'])} at 2.1, where "
         f"{100 * max(met['saturated_fraction']):.3g} % of the steps saturate; e_f falls from "
-        f"{numbers(paper['final_error'])} to {numbers(met['final_error'])} m. Gains that meet (30) "
-        "are not gains that spare the actuators.",
+        f"{numbers(paper['final_error'])} to {numbers(met['final_error'])} m. With the "
+        "paper's other gains, a lambda that meets it does not spare the actuators.",
         figure,
     )
 

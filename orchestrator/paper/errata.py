@@ -33,10 +33,10 @@ _CLAIMS = "tests/unit/orchestrator/paper/test_claims.py"
 _INTRODUCTION = """\
 Points at which the paper does not hold as printed: what it says, why that cannot be or does not
 follow, what hangs on it, and the test that shows it. Most of the errors leave the proof as it is,
-or with larger constants. The gaps do not: for the vehicle, the gains and the reference of section
-4.1, Theorem 1 is not proven. Nothing here says that what it claims is false: the loop follows its
-reference in the runs of Figs. 4 to 7. Where the paper is silent or contradicts itself,
-[the readings]({readings}) say how it is read here."""
+or with larger constants. The gaps do not: Theorem 1 does not apply to the vehicle, the gains and
+the reference of section 4.1, and its proof is not complete. Nothing here says that what it claims
+is false: the loop follows its reference in the runs of Figs. 4 to 7. Where the paper is silent or
+contradicts itself, [the readings]({readings}) say how it is read here."""
 
 _NUMBERS = """\
 `auv-fmu gains` says of the vehicle and the gains of section 4.1, and of any others with `--set`:"""
