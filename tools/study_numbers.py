@@ -3,7 +3,8 @@
 `python tools/study_numbers.py results/noise ...` prints those of the ready studies that were made
 in these folders, a line each: a statistic, of a column of runs.parquet, over the runs that a query
 selects. So nothing is read off bins. Columns have the names of docs/studies.md without the
-component and with _ for what is no letter; `peak` is the largest of the three peak commands.
+component and with _ for what is no letter; `peak` is the largest of the three peak commands, and
+`final_error` of the three final errors.
 
 ============  =================================================================================
 `n`           how many runs
@@ -37,10 +38,7 @@ _MADE = {
         # What 80 N and 80 N·m keep up against the damping of 30 kg/s and 20 kg·m²/s.
         "physical": "speed < 80 / 30 and turn < 80 / 20",
     },
-    "distance": {
-        "way": "eta0_z",
-        "final_error": "sqrt(final_error_x**2 + final_error_y**2 + final_error_z**2)",
-    },
+    "distance": {"way": "eta0_z"},
     "noise": {"product": "k_d * noise_std", "gain": "estimate_error / product"},
     "robustness": {
         "ratio_of_fig_7": "omega_d == 0.1 and abs(A_d - 2 * A_f) < 1e-9",
@@ -86,8 +84,10 @@ _LINES = {
         max peak_command_u by step | proposed
         max peak_command_q by step | proposed
         max peak_command_r by step | proposed
-        share saturated | proposed
+        bound saturated | proposed and step == 0.02
+        bound saturated | proposed and step == 0.005
         min peak_command_u by step | PD
+        median peak_command_u by step | PD and way < 11
         median peak_command_u by step | PD and 30 / 1.1 < way < 30 * 1.1
         median peak_command_u by step | PD and 100 / 1.1 < way < 100 * 1.1
         median peak_command_u by step | PD and 1e3 / 1.1 < way < 1e3 * 1.1
@@ -219,7 +219,7 @@ _LINES = {
 def _share(column: pd.Series) -> str:
     hits, n = int(column.sum()), len(column)
     low, high = binomtest(hits, n).proportion_ci()
-    return f"{hits} of {n}, {100 * hits / n:.3g} % ({100 * low:.2g} to {100 * high:.3g})"
+    return f"{hits} of {n}, {100 * hits / n:.3g} % ({100 * low:.3g} to {100 * high:.3g})"
 
 
 def _bound(column: pd.Series) -> str:
@@ -254,6 +254,7 @@ def prepared(study: str, runs: pd.DataFrame) -> pd.DataFrame:
     runs["lost"] = ~(runs.late_error <= 1.0)
     runs["saturated"] = runs.filter(like="saturated_fraction").max(axis=1) > 0.0
     runs["peak"] = runs.filter(like="peak_command").max(axis=1)
+    runs["final_error"] = runs.filter(like="final_error_").max(axis=1)
     for name, made in _MADE.get(study, {}).items():
         runs[name] = runs.eval(made)
     if study == "distance":
