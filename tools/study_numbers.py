@@ -126,10 +126,15 @@ _LINES = {
         median peak_command_u by scenario | 4 / 1.1 < lam < 4 * 1.1
         share saturated | proposed and lam > 2
         min peak | proposed and lam > 2
+        median late_error by tenth_lam | proposed
         median late_error by tenth_eps_t | proposed
+        median total_variation_u by tenth_eps_t | proposed
         median late_error by tenth_sigma | proposed
         median late_error by tenth_gamma | proposed
         median late_error by tenth_k_d | proposed
+        median late_error by tenth_K1_1 | proposed
+        median late_error by tenth_K1_2 | proposed
+        median late_error by tenth_K1_3 | proposed
         median late_error by tenth_K2_1 | proposed
         median late_error by tenth_K2_2 | proposed
         median late_error by tenth_K2_3 | proposed
