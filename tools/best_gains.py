@@ -3,8 +3,8 @@
 `python tools/best_gains.py` searches the ranges of the ready study `gains`, from its start and over
 its time, by differential evolution: for either controller the least `late_error` at which no peak
 command is above 10, 20 and 80 N or N·m. It makes some 136,000 runs by the batch engine, which takes
-six to seven minutes of one core. A search finds good gains, and no proof that there are no better ones:
-with `--seeds 2` each is made twice, and what either found is printed.
+six to seven minutes of one core. A search finds good gains, and no proof that there are no better
+ones: with `--seeds 2` each is made twice, and what either found is printed.
 """
 
 from __future__ import annotations

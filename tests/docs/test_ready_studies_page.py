@@ -26,7 +26,8 @@ def test_every_picture_is_on_the_page_in_all_its_colours_and_small():
     assert named == {file.relative_to(DOCS).as_posix() for file in files}
     assert all(file.stat().st_size < 300_000 for file in files)
     # A palette takes colours out of their scales.
-    assert {Image.open(file).mode for file in files} == {"RGB"}
+    modes = {Image.open(file).mode for file in files}
+    assert modes == {"RGB"}, "run tools/study_pictures.py"
 
 
 @pytest.mark.parametrize("name", ready_studies())
