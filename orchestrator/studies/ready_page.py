@@ -16,10 +16,11 @@ _HEAD = """\
 
 Six studies come with auv-fmu, each 10,000 runs or more of the proposed controller against the PD
 controller, by the compiled equations. `auv-fmu sweep distance` makes the runs and the figures of
-one of them in `results/distance/`; `auv-fmu report --studies` makes all six for the report. What is
-said below a figure was read off it; the number of runs stands in `study.json`. Lines are medians of
-the runs that have a value in common, bands hold the middle 80 % of them; a white or black line is a
-limit. A study of one's own is a file like theirs: [studies](studies.md).
+one of them in `results/distance/`; `auv-fmu report --studies` makes all six for the report. Lines
+are medians of the runs that have a value in common, bands hold the middle 80 % of them; a white or
+black line is a limit. What is said below the figures was read off the runs and not off them:
+`python tools/study_numbers.py results/distance` prints the numbers, and of which runs each is the
+median, the least or the largest. A study of one's own is a file like theirs: [studies](studies.md).
 
 This page is written by `auv-fmu docs`, from the studies' files.
 """

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
-from math import ceil, floor, log2, prod
+from math import ceil, cos, floor, log2, pi, prod, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from orchestrator.studies.study import (
     Range,
     Sample,
     Study,
+    members,
 )
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
@@ -67,10 +68,17 @@ class Space:
             for name, values in study.vary.items()
         }
         self._ranges = study.sample.ranges if study.sample else {}
-        for name, limits in self._ranges.items():
+        self._limits = {
+            name: limits[:2] if key == name else (-max(limits[:2]), max(limits[:2]))
+            for key, limits in self._ranges.items()
+            for name in members(key)
+        }
+        for name, ends in self._limits.items():
             if self.columns[name] not in (float, int):
                 raise InputError(f"{name}: only numbers can be sampled; put it under [vary]")
-            for end in (limits.low, limits.high):
+            if self.columns[name] is int and name not in self._ranges:
+                raise InputError(f"{name}: a whole number is drawn by itself, in no norm")
+            for end in ends:
                 known.typed(name, end)
         samples = study.sample.n if study.sample else 1
         self._n = prod(map(len, self._grid.values())) * samples * len(self._scenarios)
@@ -108,7 +116,7 @@ class Space:
 
     def _ends(self, name: str) -> Sequence[float]:
         """The values of a grid, or the two ends of a range."""
-        return [float(value) for value in self._grid.get(name) or self._ranges[name][:2]]
+        return [float(value) for value in self._grid.get(name) or self._limits[name]]
 
     def __len__(self) -> int:
         """How many runs there are."""
@@ -137,9 +145,10 @@ class Space:
         for name, values in reversed(self._grid.items()):
             combination, i = divmod(combination, len(values))
             point[name] = values[i]
-        shares = self._points[sample].tolist()
-        for (name, limits), share in zip(self._ranges.items(), shares, strict=True):
-            point[name] = between(limits, share, self.columns[name] is int)
+        shares = iter(self._points[sample].tolist())
+        for key, limits in self._ranges.items():
+            size = between(limits, next(shares), self.columns[members(key)[0]] is int)
+            point |= zip(members(key), _directed(key, size, shares), strict=True)
         return self._scenarios[scenario], point
 
     @property
@@ -187,6 +196,16 @@ def between(limits: Range, share: float, whole: bool) -> float | int:
     return min(floor(value), int(high) - 1) if whole else value
 
 
+def _directed(key: str, size: float, shares: Iterator[float]) -> tuple[float, ...]:
+    """The members of a norm, in a direction that the next shares make: each is as likely."""
+    if (n := len(members(key))) == 1:
+        return (size,)
+    angle = 2.0 * pi * next(shares)
+    z = 2.0 * next(shares) - 1.0 if n == 3 else 0.0
+    across = size * sqrt(1.0 - z * z)
+    return (across * cos(angle), across * sin(angle), size * z)[:n]
+
+
 def drawn(sample: Sample) -> np.ndarray:
     """Shares of the ranges, (samples, values); a sample is what seed and method make it.
 
@@ -196,7 +215,7 @@ def drawn(sample: Sample) -> np.ndarray:
     """
     from scipy.stats import qmc  # noqa: PLC0415
 
-    n, width = sample.n, len(sample.ranges)
+    n, width = sample.n, len(sample.names)
     generator = np.random.default_rng(sample.seed)
     try:
         if sample.method == SOBOL:

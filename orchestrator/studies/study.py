@@ -65,7 +65,7 @@ class Sample(NamedTuple):
 
     Attributes:
         n: how many.
-        ranges: of the values, by name.
+        ranges: of the values, by name; of a norm `|a, b, c|` by all its names.
         method: one of :data:`METHODS`.
         seed: that makes the points what they are.
 
@@ -75,6 +75,16 @@ class Sample(NamedTuple):
     ranges: Mapping[str, Range]
     method: str = METHODS[0]
     seed: int = 0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the values, those of a norm one by one."""
+        return tuple(name for key in self.ranges for name in members(key))
+
+
+def members(key: str) -> list[str]:
+    """The names in a norm `|a, b, c|`, or the one name."""
+    return [name.strip() for name in key.strip("|").split(",")] if key.startswith("|") else [key]
 
 
 class StopTime(NamedTuple):
@@ -125,7 +135,7 @@ class Study:
     @property
     def varied(self) -> tuple[str, ...]:
         """The names of all values that vary."""
-        return (*self.vary, *(self.sample.ranges if self.sample else ()))
+        return (*self.vary, *(self.sample.names if self.sample else ()))
 
 
 def _is_text_or_names(value: Any) -> bool:
@@ -193,7 +203,9 @@ ENTRIES: dict[str, Entry] = {
         is_table,
         "Points drawn at random, at every combination of `vary`: `n` of them, by a `method` out "
         f"of {', '.join(METHODS)}, with a `seed`, and under `[sample.range]` "
-        '`component.parameter = [low, high]` or `{ from = 1.0, to = 10.0, spacing = "log" }`.',
+        '`component.parameter = [low, high]` or `{ from = 1.0, to = 10.0, spacing = "log" }`. '
+        '`"|a, b, c|" = [low, high]` draws the norm of two or three numbers, and every direction '
+        "with the same chance.",
         "none",
     ),
     "figures": Entry("table", is_table, "What is drawn: see below.", "what moves what"),
@@ -310,6 +322,10 @@ def _sample(where: str, content: Mapping[str, Any]) -> Sample:
         if _is_range(value):
             _check_whole(f"{where}: {key}", value, _RANGE, ("from", "to"))
         ranges[key] = _range(f"{where}: {key}", value)
+        if key.startswith("|") and (
+            len(members(key)) not in (2, 3) or not key.endswith("|") or min(ranges[key][:2]) < 0.0
+        ):
+            raise InputError(f"{where}: {key}: a norm is of two or three numbers, and not negative")
     if not ranges:
         raise InputError(f"{where}: draws nothing; name values under [sample.range]")
     return Sample(content["n"], ranges, content.get("method", METHODS[0]), content.get("seed", 0))

@@ -203,4 +203,4 @@ def study_page() -> str:
 
 def _rows(entries: Mapping[str, Entry]) -> Iterator[tuple[str, ...]]:
     for name, entry in entries.items():
-        yield f"`{name}`", entry.kind, entry.meaning, entry.default
+        yield f"`{name}`", entry.kind, entry.meaning.replace("|", r"\|"), entry.default

@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 import re
+from runpy import run_path
 
+import pytest
+from PIL import Image
+
+from orchestrator.studies.engine import INDICES
 from orchestrator.studies.ready_page import PICTURES, ready_page
+from orchestrator.studies.study import read_study, ready_studies
 from support.markdown import DOCS
 
 PAGE = DOCS / "ready-studies.md"
@@ -14,8 +20,26 @@ def test_page_is_what_the_files_say():
     assert ready_page() == PAGE.read_text(encoding="utf-8"), "run `auv-fmu docs`"
 
 
-def test_every_picture_is_on_the_page_and_small():
+def test_every_picture_is_on_the_page_in_all_its_colours_and_small():
     named = set(re.findall(r"\((images/[^)]+)\)", PAGE.read_text(encoding="utf-8")))
     files = [*(DOCS / PICTURES).iterdir()]
     assert named == {file.relative_to(DOCS).as_posix() for file in files}
-    assert all(file.stat().st_size < 150_000 for file in files)
+    assert all(file.stat().st_size < 300_000 for file in files)
+    # A palette takes colours out of their scales.
+    modes = {Image.open(file).mode for file in files}
+    assert modes == {"RGB"}, "run tools/study_pictures.py"
+
+
+@pytest.mark.parametrize("name", ready_studies())
+def test_numbers_are_read_off_columns_that_runs_have(name):
+    pandas = pytest.importorskip("pandas", reason="needs the extra `docs`")
+    pytest.importorskip("scipy", reason="needs the extra `studies`")
+    tool = run_path(str(DOCS.parent / "tools" / "study_numbers.py"))
+    study = read_study(name)
+    row = dict.fromkeys((*study.varied, *INDICES), 1.0) | {"scenario": "fig5", "failure": ""}
+    row |= {key: values[0] for key, values in study.vary.items()}
+    runs = tool["prepared"](name, pandas.DataFrame([{"run": 0, **row}]))
+    for statistic, columns, by, where in map(tool["parsed"], tool["lines_of"](name)):
+        assert statistic in tool["STATISTICS"]
+        assert {column.removeprefix("tenth_") for column in (*columns, *by)} <= {*runs}
+        assert not where or runs.query(where) is not None

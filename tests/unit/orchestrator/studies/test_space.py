@@ -91,6 +91,27 @@ def test_samples_are_drawn_at_every_combination():
     assert [runs[i].parameters["plant.ell"] for i in range(6)] == [0.3] * 3 + [0.4] * 3
 
 
+@pytest.mark.parametrize("names", ["uv", "uvw"])
+def test_norm_is_drawn_with_an_even_direction(names):
+    members = [f"plant.nu0.{name}" for name in names]
+    norm = f"|{', '.join(members)}|"
+    size = {"from": 10, "to": 0.1, "spacing": "log"}
+    n = 4096
+    runs = space(sample={"n": n, "seed": 1, "range": {norm: size, "plant.eta0.y": [0.0, 1.0]}})
+    assert runs.columns == dict.fromkeys((*members, "plant.eta0.y"), float)
+    found = np.array([[runs[i].parameters[name] for name in members] for i in range(n)])
+    sizes = np.linalg.norm(found, axis=1)
+    # The logarithm of the size is even: so many below 1, and in each tenth.
+    assert np.histogram(np.log10(sizes), 10, (-1.0, 1.0))[0] == pytest.approx(n / 10, abs=2)
+    # Even directions: mean 0, covariance 1 / k, and (Archimedes) each of three even in [-1, 1].
+    directions = found / sizes[:, np.newaxis]
+    assert directions.mean(axis=0) == pytest.approx(0.0, abs=0.005)
+    assert directions.T @ directions / n == pytest.approx(np.eye(len(names)) / len(names), abs=0.01)
+    if len(names) == 3:
+        for part in directions.T:
+            assert np.histogram(part, 8, (-1.0, 1.0))[0] == pytest.approx(n / 8, rel=0.05)
+
+
 @pytest.mark.parametrize("ends", [[1, 4], {"from": 4, "to": 1}])
 def test_whole_numbers_have_the_same_chance(ends):
     runs = space(
@@ -147,6 +168,10 @@ def test_points_are_told_apart_by_the_digest():
             "only numbers can be sampled",
         ),
         ({"sample": {"n": 1, "range": {"plant.ell": [-1, 1]}}}, "plant.ell = -1: must be at least"),
+        (
+            {"sample": {"n": 1, "range": {"|plant.nu0.u, plant.noise.seed|": [0, 1]}}},
+            "plant.noise.seed: a whole number is drawn by itself",
+        ),
         (
             {"vary": {name: {"from": 1, "to": 2, "n": 40_000} for name in ("plant.ell", "step")}},
             f"1,600,000,000 runs are more than {MOST_RUNS:,}",

@@ -113,6 +113,18 @@ def test_every_entry_has_a_meaning():
             "sample: plant.ell: write [low, high]",
         ),
         ({"sample": {"n": 1, "method": "halton", "range": {}}}, "sample: method = 'halton'"),
+        *(
+            ({"sample": {"n": 1, "range": {norm: ends}}}, "a norm is of two or three numbers")
+            for norm, ends in (
+                ("|plant.nu0.u|", [0, 1]),
+                ("|plant.nu0.u, plant.nu0.v", [0, 1]),
+                ("|plant.nu0.u, plant.nu0.v|", [0, -1]),
+            )
+        ),
+        (
+            {"sample": {"n": 1, "range": {"|plant.ell, a.b|": [1, 2], "plant.ell": [1, 2]}}},
+            "plant.ell is stated twice",
+        ),
         (
             {"stop_time": {"base": 1.0, "per": {"plant.ell": 1.0}}},
             "stop_time: plant.ell does not vary",

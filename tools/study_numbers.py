@@ -1,0 +1,317 @@
+"""The numbers that docs/ready-studies.md says below the figures, read off the runs.
+
+`python tools/study_numbers.py results/noise ...` prints those of the ready studies that were made
+in these folders, a line each: a statistic, of a column of runs.parquet, over the runs that a query
+selects. So nothing is read off bins. Columns have the names of docs/studies.md without the
+component and with _ for what is no letter; `peak` is the largest of the three peak commands, and
+`final_error` of the three final errors.
+
+============  =================================================================================
+`n`           how many runs
+`median`      and `min`, `max`: of the column
+`share`       of the runs of which the column is true [%], and its exact interval of 95 % (Clopper
+              and Pearson), as though the runs were independent
+`bound`       what the share stays below, at 95 %, where of no run the column is true [%]
+`rank`        Spearman's correlation of two columns, and its standard error; it sees no U shapes
+============  =================================================================================
+
+It needs pandas: the extra `docs`.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pandas as pd
+from scipy.stats import binomtest, spearmanr
+
+#: Columns that are made of others, by study, in the language of pandas.
+_MADE = {
+    "attraction": {
+        "speed": "sqrt(nu0_u**2 + nu0_v**2 + nu0_w**2)",
+        "turn": "sqrt(nu0_p**2 + nu0_q**2 + nu0_r**2)",
+        "way": "sqrt(eta0_x**2 + eta0_y**2 + eta0_z**2)",
+        # What 80 N and 80 N·m keep up against the damping of 30 kg/s and 20 kg·m²/s.
+        "physical": "speed < 80 / 30 and turn < 80 / 20",
+    },
+    "distance": {"way": "eta0_z"},
+    "noise": {"product": "k_d * noise_std", "gain": "estimate_error / product"},
+    "robustness": {
+        "ratio_of_fig_7": "omega_d == 0.1 and abs(A_d - 2 * A_f) < 1e-9",
+        "valley": "omega_d == 1 and abs(A_d - A_f) < 1e-9",
+    },
+    "sampling": {"product": "k_d * step"},
+}
+
+#: The lines of each study, in the order of its text.
+_LINES = {
+    "attraction": """
+        n | proposed and h_max == 0.002
+        n | proposed and h_max == 0.002 and physical
+        share failed | h_max == 0.002
+        max late_error by scenario | h_max == 0.002
+        bound lost | proposed and h_max == 0.002
+        bound lost | proposed and h_max == 0.002 and physical
+        n by scenario | h_max == 0.02 and failed
+        min speed | failed
+        min turn | failed
+        max ended | failed
+        max late_error by scenario | h_max == 0.02 and not failed
+        share saturated by scenario | h_max == 0.002 and physical
+        median saturated_fraction_u by scenario | h_max == 0.002 and physical
+        median peak_command_u by scenario | h_max == 0.002 and physical
+        share saturated | proposed and h_max == 0.002 and speed < 1
+        share saturated | proposed and h_max == 0.002 and 6 < speed < 12
+        share saturated | proposed and h_max == 0.002 and speed > 12
+        median peak_command_u | proposed and h_max == 0.002 and speed < 1
+        median peak_command_u | proposed and h_max == 0.002 and 6 < speed < 12
+        median peak_command_u | proposed and h_max == 0.002 and speed > 12
+        median peak_command_u by scenario | h_max == 0.002 and physical and way < 12
+        median peak_command_u by scenario | h_max == 0.002 and physical and 25 < way < 35
+        median peak_command_u by scenario | h_max == 0.002 and physical and way > 70
+        median time_to_reach by scenario | h_max == 0.002 and physical and 45 < way < 55
+        median late_error by scenario | h_max == 0.002 and physical and 45 < way < 55
+    """,
+    "distance": """
+        n by scenario step
+        median peak_command_u by step | proposed
+        median peak_command_q by step | proposed
+        median peak_command_r by step | proposed
+        max peak_command_u by step | proposed
+        max peak_command_q by step | proposed
+        max peak_command_r by step | proposed
+        bound saturated | proposed and step == 0.02
+        bound saturated | proposed and step == 0.005
+        min peak_command_u by step | PD
+        median peak_command_u by step | PD and way < 11
+        median peak_command_u by step | PD and 30 / 1.1 < way < 30 * 1.1
+        median peak_command_u by step | PD and 100 / 1.1 < way < 100 * 1.1
+        median peak_command_u by step | PD and 1e3 / 1.1 < way < 1e3 * 1.1
+        max peak_command_u by step | PD
+        max peak_command_q by step | PD
+        max peak_command_r by step | PD
+        median saturated_fraction_u by step | PD and 50 / 1.1 < way < 50 * 1.1
+        median saturated_fraction_u by step | PD and 100 / 1.1 < way < 100 * 1.1
+        median saturated_fraction_q by step | PD and 100 / 1.1 < way < 100 * 1.1
+        median saturated_fraction_r by step | PD and 100 / 1.1 < way < 100 * 1.1
+        min saturated_fraction_u by step | PD and way > 300
+        min saturated_fraction_q by step | PD and way > 300
+        min saturated_fraction_r by step | PD and way > 300
+        median time_to_reach by scenario step | 100 / 1.1 < way < 100 * 1.1
+        max time_to_reach by scenario step
+        min effort_ratio by step | PD and way > 100
+        max effort_ratio by step | PD and way > 100
+        median final_error by scenario step | 100 / 1.1 < way < 100 * 1.1
+        median final_error by scenario step | 1e3 / 1.1 < way < 1e3 * 1.1
+        median final_error by scenario step | way < 11
+        median final_error by scenario step | way > 9e3
+        median theta_hat_end_1 by scenario step | way < 11
+        median theta_hat_end_1 by scenario step | way > 9e3
+        max theta_hat_end_1 by scenario step
+        median theta_hat_end_1 by scenario step | 1e3 / 1.1 < way < 1e3 * 1.1
+    """,
+    "gains": """
+        n by scenario
+        median late_error by scenario | 0.5 / 1.1 < lam < 0.5 * 1.1
+        median late_error by scenario | 1 / 1.1 < lam < 1.1
+        median late_error by scenario | 2 / 1.1 < lam < 2 * 1.1
+        median late_error by scenario | 4 / 1.1 < lam < 4 * 1.1
+        median peak_command_u by scenario | 0.5 / 1.1 < lam < 0.5 * 1.1
+        median peak_command_u by scenario | 1 / 1.1 < lam < 1.1
+        median peak_command_u by scenario | 2 / 1.1 < lam < 2 * 1.1
+        median peak_command_u by scenario | 4 / 1.1 < lam < 4 * 1.1
+        share saturated | proposed and lam > 2
+        min peak | proposed and lam > 2
+        median late_error by tenth_lam | proposed
+        median late_error by tenth_eps_t | proposed
+        median total_variation_u by tenth_eps_t | proposed
+        median late_error by tenth_sigma | proposed
+        median late_error by tenth_gamma | proposed
+        median late_error by tenth_k_d | proposed
+        median late_error by tenth_K1_1 | proposed
+        median late_error by tenth_K1_2 | proposed
+        median late_error by tenth_K1_3 | proposed
+        median late_error by tenth_K2_1 | proposed
+        median late_error by tenth_K2_2 | proposed
+        median late_error by tenth_K2_3 | proposed
+        rank late_error lam | proposed
+        rank late_error k_d | proposed
+        rank late_error K2_1 | proposed
+        rank late_error K2_2 | proposed
+        rank late_error K2_3 | proposed
+        rank late_error gamma | proposed
+        rank late_error sigma | proposed
+        n by scenario | peak <= 10
+        min late_error by scenario | peak <= 10
+        min late_error by scenario | peak <= 20
+        min late_error by scenario | peak <= 80
+        min l2_effort_u by scenario | not lost
+    """,
+    "noise": """
+        median gain | proposed and noise_std < 0.003
+        min gain | proposed and noise_std < 0.003
+        max gain | proposed and noise_std < 0.003
+        max gain | proposed and noise_std < 0.003 and k_d > 2.5
+        max product | proposed and not saturated
+        min product | proposed and saturated
+        min noise_std | proposed and saturated and 50 / 1.1 < k_d
+        min noise_std | proposed and saturated and 20 / 1.1 < k_d < 20 * 1.1
+        min noise_std | proposed and saturated and 5 / 1.1 < k_d < 5 * 1.1
+        min noise_std | proposed and saturated and k_d < 2 * 1.1
+        max noise_std | PD and not saturated
+        min noise_std | PD and saturated
+        median late_error | proposed and k_d < 5 and noise_std < 0.0002
+        median late_error | proposed and k_d > 20 and noise_std < 0.0002
+        median theta_hat_half_1 by scenario | 0.018 < noise_std < 0.022
+        median theta_hat_end_1 by scenario | 0.018 < noise_std < 0.022
+        median theta_hat_half_1 by scenario | noise_std < 0.0002
+        median theta_hat_end_1 by scenario | noise_std < 0.0002
+        median late_error | proposed and product < 0.003
+        median late_error | proposed and 0.03 < product < 0.037
+        share lost | proposed and k_d > 20 and noise_std < 0.03
+        share lost | proposed and k_d > 20 and 0.06 < noise_std
+        share lost | proposed and k_d < 5 and 0.06 < noise_std
+        median saturated_fraction_u | proposed and k_d > 20 and 0.06 < noise_std
+    """,
+    "robustness": """
+        n
+        share failed
+        max A_f by scenario omega_d | step == 0.02 and A_d == 1 and kept_f
+        max A_f by scenario omega_d | step == 0.005 and A_d == 1 and kept_f
+        max A_d by scenario omega_d | step == 0.02 and A_f == 0.5 and kept_d
+        max A_d by scenario omega_d | step == 0.005 and A_f == 0.5 and kept_d
+        max late_error by A_f step | proposed and ratio_of_fig_7 and A_f < 6
+        min A_f by scenario step | ratio_of_fig_7 and lost
+        max late_error by scenario step | ratio_of_fig_7 and 6.9 < A_f < 7
+        max peak_command_u by scenario step | ratio_of_fig_7 and 6.9 < A_f < 7
+        max A_f by scenario step | valley and not lost
+        min A_f by scenario step | valley and lost
+        max late_error by scenario step
+        min A_d | late_error > 180
+        max total_variation_u by A_f scenario | step == 0.02 and ratio_of_fig_7 and 6 < A_f < 22
+        max total_variation_u by A_f scenario | step == 0.005 and ratio_of_fig_7 and 6 < A_f < 22
+    """,
+    "sampling": """
+        n
+        median estimate_error by observer | proposed and product < 1.9
+        median peak_command_u by observer | proposed and product < 1.9
+        max peak_command_u by observer | proposed and product < 1.9
+        min product | proposed and observer == "euler" and peak_command_u > 45
+        max product | proposed and observer == "euler" and peak_command_u < 45
+        median estimate_error | proposed and observer == "euler" and product > 2
+        median late_error | proposed and observer == "euler" and product > 2
+        median peak_command_u | proposed and observer == "euler" and product > 2
+        median estimate_error | proposed and observer == "exact" and product > 10
+        max product
+        median l2_effort_q by scenario | observer == "exact" and step < 0.0022
+        median l2_effort_q by scenario | observer == "exact" and 0.009 < step < 0.011
+        median l2_effort_q by scenario | observer == "exact" and 0.019 < step < 0.021
+        median l2_effort_q by scenario | observer == "exact" and step > 0.09
+        median l2_effort_u | PD and step < 0.03
+        median l2_effort_u | PD and step > 0.045
+        median late_error | PD and step < 0.03
+        median late_error | PD and step > 0.09
+        min step | PD and total_variation_u > 1e5
+        max step | PD and total_variation_u < 1e5
+    """,
+}
+
+
+def _share(column: pd.Series) -> str:
+    hits, n = int(column.sum()), len(column)
+    low, high = binomtest(hits, n).proportion_ci()
+    return f"{hits} of {n}, {100 * hits / n:.3g} % ({100 * low:.3g} to {100 * high:.3g})"
+
+
+def _bound(column: pd.Series) -> str:
+    # The root of 0.05 = (1 - share)^n: the rule of three.
+    return f"{column.sum()} of {len(column)}, {100 * (1 - 0.05 ** (1 / len(column))):.2g} %"
+
+
+def _rank(one: pd.Series, other: pd.Series) -> str:
+    return f"{spearmanr(one, other).statistic:.3f} ± {(len(one) - 1) ** -0.5:.3f} (n = {len(one)})"
+
+
+#: The numbers that a line may ask for, from the columns that it names.
+STATISTICS: Mapping[str, Callable[..., str]] = {
+    "n": lambda column: str(len(column)),
+    "median": lambda column: f"{column.median():.5g} (n = {len(column)})",
+    "min": lambda column: f"{column.min():.5g}",
+    "max": lambda column: f"{column.max():.5g}",
+    "share": _share,
+    "bound": _bound,
+    "rank": _rank,
+}
+
+
+def prepared(study: str, runs: pd.DataFrame) -> pd.DataFrame:
+    """The runs with short names, and with the columns that are made of others."""
+    runs = runs.rename(columns=lambda name: re.sub(r"^(plant|controller|disturbance)\.", "", name))
+    runs = runs.rename(columns=lambda name: re.sub(r"\W+", "_", name).strip("_"))
+    runs = runs.rename(columns={"lambda": "lam"})
+    runs["proposed"], runs["PD"] = runs.scenario == "fig5", runs.scenario == "fig5-pd"
+    runs["failed"] = runs.failure.fillna("") != ""
+    runs["ended"] = runs.failure.str.extract(r" t = (\S+) s", expand=False).astype(float)
+    runs["lost"] = ~(runs.late_error <= 1.0)
+    runs["saturated"] = runs.filter(like="saturated_fraction").max(axis=1) > 0.0
+    runs["peak"] = runs.filter(like="peak_command").max(axis=1)
+    runs["final_error"] = runs.filter(like="final_error_").max(axis=1)
+    for name, made in _MADE.get(study, {}).items():
+        runs[name] = runs.eval(made)
+    if study == "distance":
+        # The proposed controller's run of a point comes first.
+        proposed = runs.groupby(["step", "way"]).l2_effort_u.transform("first")
+        runs["effort_ratio"] = runs.l2_effort_u / proposed
+    for amplitude, other in (("A_f", "A_d"), ("A_d", "A_f")) if study == "robustness" else ():
+        # Whether it is kept with this disturbance, and with all weaker ones on the line.
+        line = runs.sort_values(amplitude).groupby(["scenario", "step", "omega_d", other])
+        runs[f"kept_{amplitude[-1]}"] = ~line.lost.cummax()
+    return runs
+
+
+def lines_of(study: str) -> list[str]:
+    """What is said of a study: `STATISTIC COLUMNS by COLUMNS | QUERY`."""
+    return [line.strip() for line in _LINES[study].strip().splitlines()]
+
+
+def parsed(line: str) -> tuple[str, list[str], list[str], str]:
+    """The statistic of a line, its columns, what tells groups apart, and the query."""
+    what, _, where = line.partition(" | ")
+    names, by = (part.split() for part in what.partition(" by ")[::2])
+    return names[0], names[1:] or ["run"], by, where
+
+
+def said(line: str, runs: pd.DataFrame) -> str:
+    """The numbers of a line."""
+    statistic, columns, by, where = parsed(line)
+    part = runs.query(where) if where else runs
+    for tenth in (name for name in by if name.startswith("tenth_")):
+        part = part.assign(**{tenth: pd.qcut(part[tenth.removeprefix("tenth_")], 10, labels=False)})
+    groups = part.groupby(by) if by else [((), part)]
+    found = []
+    for key, group in groups:
+        number = STATISTICS[statistic](*(group[name] for name in columns))
+        found.append(" ".join((*map(_short, key), number)))
+    return ", ".join(found)
+
+
+def _short(value: object) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def main() -> None:
+    """Print the numbers of the studies in some folders."""
+    for folder in map(Path, sys.argv[1:]):
+        study = json.loads((folder / "study.json").read_text(encoding="utf-8"))["study"]
+        runs = prepared(study, pd.read_parquet(folder / "runs.parquet"))
+        print(f"\n{study}")
+        for line in lines_of(study):
+            print(f"  {line}: {said(line, runs)}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,47 @@
+"""The pictures of docs/ready-studies.md: `python tools/study_pictures.py results/noise ...`.
+
+Draws the figures of the ready studies that were made in these folders once more, smaller and in all
+their colours: a palette would take colours out of their scales.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from PIL import Image
+
+from orchestrator.analysis.figures.style import SETTINGS
+from orchestrator.experiments.preparation import loaded
+from orchestrator.studies.figures import draw_figures, read_figures
+from orchestrator.studies.ready_page import PICTURES
+from orchestrator.studies.space import Space
+from orchestrator.studies.store import StudyResult
+from orchestrator.studies.study import read_study
+
+_DOCS = Path(__file__).parents[1] / "docs"
+
+#: Pictures are 1,000 pixels wide.
+_DPI = 140
+
+
+def main() -> None:
+    """Write the pictures of the studies in some folders."""
+    SETTINGS["savefig.dpi"] = _DPI
+    for folder in map(Path, sys.argv[1:]):
+        name = json.loads((folder / "study.json").read_text(encoding="utf-8"))["study"]
+        study = read_study(name)
+        space = Space(study, {scenario: loaded(scenario) for scenario in study.scenario})
+        plans = read_figures(name, study.figures, space.columns, space.has_scenarios)
+        with TemporaryDirectory() as drawn:
+            list(draw_figures(plans, study.title, StudyResult(folder), Path(drawn)))
+            for picture in sorted(Path(drawn).glob("*.png")):
+                file = _DOCS / PICTURES / f"{name}-{picture.name}"
+                Image.open(picture).convert("RGB").save(file, optimize=True)
+                print(f"{file.name}: {file.stat().st_size / 1000:.0f} kB")
+
+
+if __name__ == "__main__":
+    main()
