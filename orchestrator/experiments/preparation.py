@@ -19,7 +19,7 @@ from orchestrator.experiments.bundle import FMI, PYTHON, current_fmus
 from orchestrator.experiments.events import check_events, read_events, shared_events
 from orchestrator.experiments.inputs import Inputs, read_inputs
 from orchestrator.experiments.scenario import Scenario, names, read_scenario
-from orchestrator.experiments.wiring import closed_loop, left_open, read_wiring
+from orchestrator.experiments.wiring import closed_loop, read_wiring
 from orchestrator.findings import Findings
 from orchestrator.master.attendant import Attendant
 from orchestrator.master.events import Alter, Event, Events, Set
@@ -112,7 +112,7 @@ class Prepared:
         given = {*(self.course.targets if self.course else ())}
         given |= {port for one in actions if isinstance(one, Alter) for port, _ in one.values}
         given |= {port for one in actions if isinstance(one, Set) for port, _ in one.inputs}
-        return _doubts(self.scenario, self.system, given)
+        return _doubts(self.system, given)
 
     @property
     def identity(self) -> Identity:
@@ -151,7 +151,7 @@ def load(
     with warned(strict) as findings:
         scenario, system = loaded(str(name), kind, variant=variant, findings=findings)
         left = left_behind(scenario)
-        for note in [left] if left else _doubts(scenario, system):
+        for note in [left] if left else _doubts(system):
             findings.note(note)
         findings.refuse()
     return replace(
@@ -428,13 +428,11 @@ def _beside(
     return replace(companion, parameters=values), replace(new.with_parameters(values), steps=steps)
 
 
-def _doubts(scenario: Scenario, system: System, given: Collection[PortName] = ()) -> list[str]:
+def _doubts(system: System, given: Collection[PortName] = ()) -> list[str]:
     if len(system.components) == 1:
         # No other one could feed it.
         return []
-    # A file of the closed loop says which of its wires are not to be.
-    on_purpose = left_open(scenario, system) if scenario.digest else ()
-    found = open_inputs(system, {*given, *on_purpose}), differing_vehicle(system)
+    found = open_inputs(system, given), differing_vehicle(system)
     return [text for text in found if text is not None]
 
 

@@ -56,8 +56,7 @@ $wires
 
 Inputs that nothing feeds, and that neither parameters, a table nor an event sets, are named in a
 warning, with the wire that they seem to want; `--strict` refuses them. Those whose wires a file
-removes with `only` or `false` are open on purpose, and `plant.water` is zero unless a file says
-otherwise.
+removes with `only` or `false` are open on purpose, and so are `plant.water.*`, which are zero.
 
 ## Figures
 
@@ -159,7 +158,7 @@ def scenario_page() -> str:
     components = (
         (f"`{name}`", f"[{fmu}](components/{fmu}.md)") for name, fmu in wiring["components"].items()
     )
-    wires = ((f"`{target}`", f"`{source}`") for target, source in wiring["wires"].items())
+    wires = ((f"`{target}`", f"`{source}`") for target, source in wiring["wires"].items() if source)
     drawn: dict[str, list[str]] = {kind: [] for kind in FIGURES}
     for name in names():
         drawn[read_scenario(name).figure].append(f"`{name}`")

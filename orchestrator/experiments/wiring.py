@@ -51,21 +51,21 @@ def closed_loop(
     findings.refuse()
     connections: list[Connection] = []
     for target, source in wires.items():
-        with findings.collecting():
-            connections += _wire(components, target, source)
-    fed = {connection.target for connection in connections}
-    still = {
-        PortName(name, variable.name): value
-        for group, value in wiring["still"].items()
+        if source is not False:
+            with findings.collecting():
+                connections += _wire(components, target, source)
+    groups = {**wiring["wires"], **(scenario.wires if scenario else {})}
+    left_open = {
+        PortName(name, variable.name)
         for name, component in components.items()
         for variable in component.having("input")
-        if f"{name}.{variable.name}".startswith(f"{group}.")
+        if any(f"{name}.{variable.name}".startswith(f"{group}.") for group in groups)
     }
     system = System(
         name=wiring["name"],
         components=components,
         connections=tuple(connections),
-        parameters={port: value for port, value in still.items() if port not in fed},
+        left_open=left_open - {connection.target for connection in connections},
         stop_time=wiring["experiment"]["stop_time"],
         step=wiring["experiment"]["step"],
     )
@@ -76,17 +76,6 @@ def closed_loop(
         system = replace(system, steps=scenario.steps)
     findings.refuse()
     return system
-
-
-def left_open(scenario: Scenario, system: System) -> set[PortName]:
-    """Inputs whose wires a scenario has removed, or left out with a component."""
-    groups = {**read_wiring()["wires"], **scenario.wires}
-    return {
-        PortName(name, variable.name)
-        for name, component in system.components.items()
-        for variable in component.having("input")
-        if any(f"{name}.{variable.name}".startswith(f"{group}.") for group in groups)
-    }
 
 
 def _changed(

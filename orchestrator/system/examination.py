@@ -67,13 +67,14 @@ def open_inputs(system: System, settled: Collection[PortName] = ()) -> str | Non
 
     Args:
         system: that is looked at.
-        settled: inputs that are set during a run, or open on purpose.
+        settled: inputs that are set during a run.
 
     Returns:
         One line; None: there is no such input.
 
     """
-    taken = {c.target for c in system.connections} | system.parameters.keys() | {*settled}
+    fed = {connection.target for connection in system.connections}
+    taken = {*fed, *system.parameters, *system.left_open, *settled}
     labels: list[str] = []
     wires: list[str] = []
     for name, component in system.components.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -47,6 +47,7 @@ class System:
         start_time, stop_time, step: the experiment that the system asks for [s]; None: it names
             none.
         steps: of components that ask for one of their own [s].
+        left_open: inputs that are meant to have no source.
 
     """
 
@@ -58,6 +59,7 @@ class System:
     step: float | None = None
     start_time: float | None = None
     steps: Mapping[str, float] = field(default_factory=dict)
+    left_open: Collection[PortName] = frozenset()
 
     def __repr__(self) -> str:
         """One line: a system's descriptions are long."""

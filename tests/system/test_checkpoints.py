@@ -140,7 +140,7 @@ set = { "plant.current.y" = 0.3 }
 [[events]]
 at = 1.0
 for = 0.7
-drop = "plant.nu"
+drop = "plant.nu_r"
 
 [[events]]
 at = 1.1

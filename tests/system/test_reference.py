@@ -68,9 +68,9 @@ def test_table_of_another_tool_is_understood(system: System, tmp_path: Path):
     lines += [f"{t!r}, {x!r},False,tanh" for t, x in ((float(t), float(x)) for t, x in rows)]
     path.write_text("\n".join(lines))
     said = verify(path, system, 1e-9)
-    assert "2 of 64 outputs agree to 1e-09 in 20 rows from t = 0.1 to 2 s, in jacobi order" in said
+    assert "2 of 70 outputs agree to 1e-09 in 20 rows from t = 0.1 to 2 s, in jacobi order" in said
     assert "no outputs: controller.saturation" in said
-    assert "not in the table: 62, such as plant.eta.y, " in said
+    assert "not in the table: 68, such as plant.eta.y, " in said
 
 
 def test_first_port_that_differs_is_named(system: System, tmp_path: Path):
@@ -150,7 +150,7 @@ def test_table_of_a_tool_with_an_order_of_its_own_is_certified(
     tool.write(path, tool.rows([[name] for name in order]))
     said = verify(path, system, 1e-12, order, at_start=initial == "full")
     compared, *_ = said.splitlines()
-    assert compared.startswith("60 of 64 outputs agree to 1e-12 in 200 rows from t = 0.02 to 4 s")
+    assert compared.startswith("66 of 70 outputs agree to 1e-12 in 200 rows from t = 0.02 to 4 s")
     assert f"in the order {','.join(order)}, each with the latest outputs" in compared
     assert compared.endswith("outputs") == (initial == "full")
     others = ({}, {"order": order, "at_start": initial != "full"}, {"order": OTHER_ORDER})
@@ -201,7 +201,7 @@ def test_first_row_of_a_time_counts_and_systems_may_stand_before_a_name(
     path = tmp_path / "table.csv"
     path.write_text("\n".join(map(",".join, lines)))
     compared, passed_over, *_ = verify(path, system, 1e-9).splitlines()
-    assert compared.startswith("64 of 64 outputs agree to 1e-09 in 200 rows from t = 0.02 to 4 s")
+    assert compared.startswith("70 of 70 outputs agree to 1e-09 in 200 rows from t = 0.02 to 4 s")
     assert passed_over == "passed over: 202 rows that have the time of the row before"
 
 
@@ -232,16 +232,16 @@ def test_what_was_not_compared_is_named(system: System, tmp_path: Path):
     path.write_text("\n".join(",".join(f'"{cell}"' for cell in row) for row in rows))
     short = verify(path, system, 1e-9).splitlines()
     assert short[4] == (
-        "not in the table: 62, such as plant.eta.y, plant.eta.z, plant.eta.phi, plant.eta.theta, "
+        "not in the table: 68, such as plant.eta.y, plant.eta.z, plant.eta.phi, plant.eta.theta, "
         "plant.eta.psi (--verbose names all)"
     )
     compared, *others = verify(path, system, 1e-9, verbose=True).splitlines()
-    assert compared.startswith("2 of 64 outputs agree to 1e-09 in 100 rows from t = 0.02 to 2 s")
+    assert compared.startswith("2 of 70 outputs agree to 1e-09 in 100 rows from t = 0.02 to 2 s")
     assert "row at t = 0" in others[0]
     assert "stop time of 100 s" in others[1]
     assert others[2].endswith("no outputs: plant.tau.u, plant.eta.X, comment")
     absent = others[3].removeprefix("not in the table: ").split(", ")
-    assert len(absent) == 62
+    assert len(absent) == 68
     assert not {"plant.eta.x", "plant.y.z"} & set(absent)
 
 

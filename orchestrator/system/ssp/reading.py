@@ -76,6 +76,13 @@ def _read(archive: Archive, root: Element) -> System:
         stop_time=times.stop_time,
         step=times.step,
         steps={name: step for name, step in steps.items() if step is not None},
+        left_open={
+            PortName(leaf.component.name, variable.name)
+            for leaf in leaves.values()
+            if leaf.component is not None and leaf.connectors
+            for variable in leaf.component.having("input")
+            if variable.name not in leaf.connectors
+        },
     )
     if not leaves:
         archive.problem("holds no component: there is nothing to run")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from io import BytesIO
 from pathlib import Path
 from xml.etree import ElementTree
 from zipfile import ZipFile, ZipInfo
 
 from orchestrator.system.component import Component
-from orchestrator.system.names import file_name, plain
+from orchestrator.system.names import PortName, file_name, plain
 from orchestrator.system.ssp import OMS, OSP, SSC, SSD, SSV, STRUCTURE
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.transformation import Linear, Mapped
@@ -109,7 +110,9 @@ def structure_xml(system: System) -> bytes:
     elements = ElementTree.SubElement(structure, _ssd("Elements"))
     sources, parameter_sources = _sources(system), _parameter_sources(system)
     for position, component in enumerate(system.components.values()):
-        element = _add_component(elements, component, position, sources[component.fmu])
+        element = _add_component(
+            elements, component, position, sources[component.fmu], system.left_open
+        )
         if component.name in parameter_sources:
             bindings = ElementTree.SubElement(element, _ssd("ParameterBindings"))
             ElementTree.SubElement(
@@ -202,7 +205,11 @@ def _ssc(tag: str) -> str:
 
 
 def _add_component(
-    elements: ElementTree.Element, component: Component, position: int, source: str
+    elements: ElementTree.Element,
+    component: Component,
+    position: int,
+    source: str,
+    left_open: Collection[PortName],
 ) -> ElementTree.Element:
     element = ElementTree.SubElement(
         elements,
@@ -213,9 +220,11 @@ def _add_component(
     )
     connectors = ElementTree.SubElement(element, _ssd("Connectors"))
     for variable in component.description.modelVariables:
-        # OMSimulator knows no connectors of texts; parameter sets reach variables without one.
+        # OMSimulator knows no connectors of texts, and fmpy feeds an input that no connection ends
+        # at from another's source. Parameter sets reach variables without a connector.
         is_text = variable.causality == "parameter" and variable.type == "String"
-        if variable.causality in ("input", "output", "parameter") and not is_text:
+        left_out = is_text or PortName(component.name, variable.name) in left_open
+        if variable.causality in ("input", "output", "parameter") and not left_out:
             connector = ElementTree.SubElement(
                 connectors, _ssd("Connector"), name=variable.name, kind=variable.causality
             )
