@@ -96,7 +96,7 @@ def errata() -> tuple[Erratum, ...]:
     return (
         Erratum(
             "(7) prints w where v belongs",
-            "(8) has three columns and w two entries. With v = (u, q, r) behind it the product is "
+            "(8) has three columns and w two entries. With v = (u, q, r) after it the product is "
             "(m11 u r, -m11 u q), which is what (2) has. The lines below (14) have it right.",
             (f"{_MODEL}::test_equations_6_and_7_are_equation_2",),
         ),
@@ -116,7 +116,7 @@ def errata() -> tuple[Erratum, ...]:
             ),
         ),
         Erratum(
-            "(15): C_2 is no function of dy alone",
+            "(15): C_2 depends on more than dy",
             "The rate of J follows (u, q, r) = J^-1 (dy - J_delta), so (15) and P2.2 hold with C_2 "
             "at the velocity dy - J_delta; that does not vanish with dy, against P2.4. As "
             "C_2(eta, dy), which is how the proof and this code use it, it leaves "
@@ -165,7 +165,7 @@ def errata() -> tuple[Erratum, ...]:
         Erratum(
             "P2.5 holds for a bounded velocity only",
             "d is quadratic in dy. At x_1 = x_2 + h its change has a term |x_2| |h|, which no "
-            "d_M1 |h| + d_M2 |h|^2 bounds for all x_2. The proof needs it at x_2 = dy_r alone, "
+            "d_M1 |h| + d_M2 |h|^2 bounds for all x_2. The proof needs it only at x_2 = dy_r, "
             "which (16) and Assumption 4 bound: it holds there, with a d_M1 that grows with "
             "lambda.",
             (

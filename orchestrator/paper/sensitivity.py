@@ -255,7 +255,7 @@ class Sensitivity:
 
 
 class Found(NamedTuple):
-    """All variants, and those of them whose numbers are printed.
+    """All variants, and the ones whose numbers are printed.
 
     Attributes:
         six: all with six degrees of freedom.

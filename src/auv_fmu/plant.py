@@ -3,8 +3,8 @@
 The controller is derived on five degrees of freedom; the paper simulates six and takes "the
 roll interaction as an external disturbance". The plant does that to the letter: the terms that
 roll adds to (2) enter through tau_w, so (2) stands once and is met exactly when p = 0
-(reading 1). Not in the paper, and off by default: roll that is held at zero, which leaves (1) and
-(2) alone, water that moves, actuators with dynamics, and an integrator of fourth order.
+(reading 1). Not in the paper, and off by default: roll that is held at zero, which leaves only
+(1) and (2), water that moves, actuators with dynamics, and an integrator of fourth order.
 """
 
 from __future__ import annotations
