@@ -37,7 +37,7 @@ def times_of(archive: Archive, root: Element) -> Times:
         archive.number(element, attribute, None)
         for name, attribute in _STEPS
         for place in (experiment, root.find("System"), root)
-        for element in _annotated(place, name)
+        for element in annotated(place, name)
     )
     return Times(
         archive.number(experiment, "startTime", None),
@@ -49,12 +49,12 @@ def times_of(archive: Archive, root: Element) -> Times:
 def step_of(archive: Archive, leaf: Leaf) -> float | None:
     """The step that a component asks for [s]; None, as zero does: it has no wish."""
     name, attribute = _STEP_OF_A_COMPONENT
-    for element in _annotated(leaf.content, name):
+    for element in annotated(leaf.content, name):
         return archive.number(element, attribute, None) or None
     return None
 
 
-def _annotated(element: Element | None, name: str) -> Iterator[Element]:
+def annotated(element: Element | None, name: str) -> Iterator[Element]:
     """Elements of a name in the annotations of an element itself."""
     if element is not None:
         for annotations in element.findall("Annotations"):

@@ -11,11 +11,12 @@ from orchestrator.errors import InputError, shortened
 from orchestrator.findings import Findings
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
+from orchestrator.system.ssp import LEFT_OPEN
 from orchestrator.system.ssp.archive import Archive, listed
 from orchestrator.system.ssp.bindings import Bindings, Values
 from orchestrator.system.ssp.building import Builder
 from orchestrator.system.ssp.definitions import definitions_of
-from orchestrator.system.ssp.experiment import step_of, times_of
+from orchestrator.system.ssp.experiment import annotated, step_of, times_of
 from orchestrator.system.ssp.hierarchy import Leaf, Node, Way
 from orchestrator.system.ssp.wires import Course, Wires
 from orchestrator.system.structure import Connection, System
@@ -77,11 +78,10 @@ def _read(archive: Archive, root: Element) -> System:
         step=times.step,
         steps={name: step for name, step in steps.items() if step is not None},
         left_open={
-            PortName(leaf.component.name, variable.name)
-            for leaf in leaves.values()
-            if leaf.component is not None and leaf.connectors
-            for variable in leaf.component.having("input")
-            if variable.name not in leaf.connectors
+            PortName(".".join(way), element.get("name", ""))
+            for way, leaf in leaves.items()
+            for left_open in annotated(leaf.content, LEFT_OPEN)
+            for element in left_open
         },
     )
     if not leaves:

@@ -10,7 +10,7 @@ from zipfile import ZipFile, ZipInfo
 
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, file_name, plain
-from orchestrator.system.ssp import OMS, OSP, SSC, SSD, SSV, STRUCTURE
+from orchestrator.system.ssp import LEFT_OPEN, OMS, OSP, SSC, SSD, SSV, STRUCTURE
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.transformation import Linear, Mapped
 from orchestrator.system.units import BASES
@@ -21,6 +21,9 @@ PARAMETER_SET = "scenario"
 
 #: Whose annotations libcosim and ecos look for.
 _LIBCOSIM = "com.opensimulationplatform"
+
+#: What marks annotations of this master.
+_OURS = "auv-fmu"
 
 #: Where tools draw the components: size of a box, and the distance to the next.
 _BOX, _GAP = (40.0, 60.0), 30.0
@@ -121,6 +124,11 @@ def structure_xml(system: System) -> bytes:
                 source=parameter_sources[component.name],
                 type="application/x-ssp-parameter-set",
             )
+        names = [port.port for port in system.left_open if port.component == component.name]
+        if names:
+            left_open = ElementTree.SubElement(_annotation(element, _OURS), LEFT_OPEN)
+            for name in sorted(names):
+                ElementTree.SubElement(left_open, "Input", name=name)
         if component.name in system.steps:
             hint = {"value": str(system.steps[component.name])}
             ElementTree.SubElement(_annotation(element, _LIBCOSIM), f"{{{OSP}}}StepSizeHint", hint)
@@ -187,7 +195,9 @@ def _add_master(structure: ElementTree.Element, step: float) -> None:
 
 def _annotation(element: ElementTree.Element, of: str) -> ElementTree.Element:
     """An annotation of an element, of some tool's."""
-    annotations = ElementTree.SubElement(element, _ssd("Annotations"))
+    annotations = element.find(_ssd("Annotations"))
+    if annotations is None:
+        annotations = ElementTree.SubElement(element, _ssd("Annotations"))
     return ElementTree.SubElement(annotations, _ssc("Annotation"), type=of)
 
 

@@ -14,7 +14,8 @@ from orchestrator.errors import InputError
 from orchestrator.findings import Findings
 from orchestrator.system.component import read_component
 from orchestrator.system.container import write_container
-from orchestrator.system.names import plain
+from orchestrator.system.examination import open_inputs
+from orchestrator.system.names import PortName, plain
 from orchestrator.system.osp import write_osp
 from orchestrator.system.ssp import OMS
 from orchestrator.system.ssp.reading import read_ssp
@@ -97,6 +98,23 @@ def test_what_is_written_is_valid(found: System, tmp_path: Path, step: float | N
     assert len(sets) == 2
     for name in sets:
         read_ssv(str(path), name)
+
+
+def test_inputs_that_are_open_on_purpose_have_no_connector_and_stay_so(
+    found: System, tmp_path: Path
+):
+    """fmpy takes for a connector without a connection the source of the one before."""
+    left_open = {PortName("inner.a b", "c")}
+    system = replace(found, left_open=left_open)
+    [path] = write_ssp(system, tmp_path)
+    components = {part.name: part for part in read_ssd(str(path)).system.elements}
+    named = {part: {c.name for c in components[part].connectors} for part in components}
+    assert "c" in named["a"] and "c" not in named["inner.a b"]
+    again = read_ssp(path)
+    assert again.left_open == left_open
+    assert again.steps == found.steps
+    assert "inner.a b.c" in str(open_inputs(found))
+    assert "inner.a b.c" not in str(open_inputs(again))
 
 
 @pytest.mark.parametrize("step", [0.02, 0.0125])
