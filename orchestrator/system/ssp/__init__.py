@@ -30,7 +30,7 @@ SSB = f"{_SSP}SignalDictionary"
 OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
 OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
 
-#: The annotation of ours that names the inputs of a component that are open on purpose.
+#: The annotation of ours that names the inputs that are open on purpose.
 LEFT_OPEN = "LeftOpen"
 
 #: Those of the standard's own elements.

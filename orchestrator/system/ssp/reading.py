@@ -78,9 +78,8 @@ def _read(archive: Archive, root: Element) -> System:
         step=times.step,
         steps={name: step for name, step in steps.items() if step is not None},
         left_open={
-            PortName(".".join(way), element.get("name", ""))
-            for way, leaf in leaves.items()
-            for left_open in annotated(leaf.content, LEFT_OPEN)
+            PortName(element.get("component", ""), element.get("name", ""))
+            for left_open in annotated(root.find("DefaultExperiment"), LEFT_OPEN)
             for element in left_open
         },
     )

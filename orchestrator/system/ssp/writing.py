@@ -124,11 +124,6 @@ def structure_xml(system: System) -> bytes:
                 source=parameter_sources[component.name],
                 type="application/x-ssp-parameter-set",
             )
-        names = [port.port for port in system.left_open if port.component == component.name]
-        if names:
-            left_open = ElementTree.SubElement(_annotation(element, _OURS), LEFT_OPEN)
-            for name in sorted(names):
-                ElementTree.SubElement(left_open, "Input", name=name)
         if component.name in system.steps:
             hint = {"value": str(system.steps[component.name])}
             ElementTree.SubElement(_annotation(element, _LIBCOSIM), f"{{{OSP}}}StepSizeHint", hint)
@@ -297,3 +292,8 @@ def _add_experiment(root: ElementTree.Element, system: System) -> None:
         ElementTree.SubElement(
             algorithm, f"{{{OSP}}}FixedStepAlgorithm", baseStepSize=str(system.step)
         )
+    if system.left_open:
+        # Not beside the components: OMSimulator ends at an annotation there that it does not know.
+        left_open = ElementTree.SubElement(_annotation(experiment, _OURS), LEFT_OPEN)
+        for component, name in sorted((port.component, port.port) for port in system.left_open):
+            ElementTree.SubElement(left_open, "Input", component=component, name=name)
