@@ -8,13 +8,17 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from random import Random
+from shutil import copytree
 from typing import Any
 
 import numpy as np
 import pytest
 
 from orchestrator.errors import InputError
+from orchestrator.experiments.bundle import current_fmus
 from orchestrator.experiments.preparation import load, loaded
+from orchestrator.experiments.scenario import read_scenario
+from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.simulation import simulate
 from orchestrator.master.table import Table
@@ -250,3 +254,13 @@ def test_another_process_finds_the_kernel_compiled():
         [sys.executable, "-c", text], input=pickle.dumps(batch), capture_output=True, check=True
     )
     assert said.stdout.split() == [b"1", b"0"]
+
+
+def test_fmus_that_lie_in_another_folder_are_the_same(tmp_path):
+    """As where two processes have built them at the same moment."""
+    copies = copytree(current_fmus(KIND), tmp_path / "copies")
+    system = closed_loop(copies, read_scenario("fig5-pd"))
+    run = Run(0, "fig5-pd", {}, 0.2, 0.02)
+    [one] = BatchEngine({"fig5-pd": system}, KIND).outcomes([run])
+    [other] = engines("fig5-pd")[0].outcomes([run])
+    assert one == other

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from orchestrator.analysis.signals import AXES
 from orchestrator.experiments.wiring import closed_loop
+from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 
@@ -26,12 +27,12 @@ def difference(system: System, fmus: Path) -> str:
 
     """
     standard = closed_loop(fmus)
-    wanted = {name: {part.fmu} for name, part in standard.components.items()}
-    wanted["controller"].add(fmus / f"{_TOLD}.fmu")
+    wanted = {name: {_contents(part)} for name, part in standard.components.items()}
+    wanted["controller"].add(_contents(read_component("controller", fmus / f"{_TOLD}.fmu")))
     for name, choices in wanted.items():
         if name not in system.components:
             return f"it has no {name}"
-        if system.components[name].fmu not in choices:
+        if _contents(system.components[name]) not in choices:
             return f"its {name} is {system.components[name].fmu}"
     for name in system.components.keys() - wanted:
         return f"it has {name} besides"
@@ -44,6 +45,11 @@ def difference(system: System, fmus: Path) -> str:
         return f"it has no wire {one}"
     later = [f"it starts at {system.start_time:g} s"] if system.start_time else []
     return next(iter([*(f"its {name} has a step of its own" for name in system.steps), *later]), "")
+
+
+def _contents(part: Component) -> tuple[str, str]:
+    """Name and digest of an FMU: the same one may lie in several folders."""
+    return part.fmu.name, part.digest
 
 
 def _shown(connection: Connection) -> str:
