@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from auv_fmu import closed_loop, motion_planner
-from auv_fmu.attitude import normalised, quaternion_rates, rotation_from_quaternion
-from auv_fmu.closed_loop import LAWS, Scene, Setting, Splits, Vehicles
-from auv_fmu.plant import applied
+from auv_fmu import closed_loop, motion_planner, plant
+from auv_fmu.attitude import normalised, rotation_from_quaternion
+from auv_fmu.closed_loop import LAWS, Scene, Setting, Vehicles
 from orchestrator import load, simulate
 from orchestrator.analysis.signals import Y_D, true_control_point
 from orchestrator.master.table import Table
 from orchestrator.paper.measures import total_variation_until
+from orchestrator.studies.batch.flat import flat
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Run
 
@@ -187,7 +187,7 @@ def free_body() -> None:
 def continuous(setting: Setting, stop: float) -> np.ndarray:
     """The path of the loop whose controller is not sampled, every 20 ms [m].
 
-    All blocks but the attitude go on by Euler's scheme, whose step over its length is the rate.
+    Planner and controller go on by Euler's scheme, whose step over its length is the rate.
     """
     law, h = LAWS[type(setting.controller)], 2.0**-10
     begun = closed_loop.begin(setting)
@@ -196,27 +196,24 @@ def continuous(setting: Setting, stop: float) -> np.ndarray:
     start = begun.plant, begun.planner, control
 
     def unpacked(t: float, x: np.ndarray) -> tuple[Vehicles, Any, Scene]:
-        plant, planner, control = like(start, iter(x.tolist()))
-        rotation = rotation_from_quaternion(normalised(plant.quaternion))
+        state, planner, control = like(start, iter(x.tolist()))
+        rotation = rotation_from_quaternion(normalised(state.quaternion))
         settings = setting.planner
         moving = motion_planner.motion(settings.vehicle, planner, settings.tau_d)
-        vehicles = Vehicles(plant, rotation, planner, moving)
+        vehicles = Vehicles(state, rotation, planner, moving)
         return vehicles, control, closed_loop.scene(setting, vehicles, t, (0.0, 0.0, 0.0))
 
     def rates(t: float, x: np.ndarray) -> np.ndarray:
         vehicles, control, seen = unpacked(t, x)
         measured = law.measurement(seen)
         control, signals = law.command(setting.controller, control, measured)
-        tau = applied(setting.plant, signals.tau)
-        later = closed_loop.move(setting, vehicles, tau, seen.tau_w, h, Splits(1, 1, 1))
+        tau = plant.applied(setting.plant, signals.tau)
+        vehicle, roll, state, rotation = *setting.plant[:2], vehicles.plant, vehicles.rotation
+        moving = plant.rates(vehicle, roll, state, rotation, tau, seen.tau_w)
+        planned = motion_planner.step(vehicles.planner, vehicles.moving, h)
         control_later = law.steps(setting.controller, control, signals, measured, h, 1)
-        plant = vehicles.plant
-        (a, b, c, d), (_, _, _, p, q, r) = plant.quaternion, plant.nu_r
-        da, db, dc, dd = quaternion_rates(plant.quaternion, (p, q, r))
-        turned = a + h * da, b + h * db, c + h * dc, d + h * dd
-        moved = later.plant._replace(quaternion=turned, tau=plant.tau)
-        after = np.array(flat((moved, later.planner, control_later)))
-        return (after - flat((plant, vehicles.planner, control))) / h
+        rest = np.subtract(flat((planned, control_later)), flat((vehicles.planner, control))) / h
+        return np.array([*flat(moving), *(0.0 for _ in flat((state.tau, state.water))), *rest])
 
     times = STEP * np.arange(round(stop / STEP) + 1)
     found = solve_ivp(
@@ -224,11 +221,6 @@ def continuous(setting: Setting, stop: float) -> np.ndarray:
     )
     states = zip(found.t, found.y.T, strict=True)
     return np.array([unpacked(t, x)[2].plant.y for t, x in states])
-
-
-def flat(state: Any) -> list[float]:
-    """The numbers of a state."""
-    return [state] if isinstance(state, float) else [x for part in state for x in flat(part)]
 
 
 def like(state: Any, numbers: Iterator[float]) -> Any:
