@@ -14,14 +14,15 @@ from platformdirs import user_cache_path
 
 from orchestrator.experiments import bundle
 
-# A slow machine is no error, and what CI checks does not change from run to run.
-settings.register_profile("patient", deadline=None, derandomize="CI" in os.environ)
+# A slow machine is no error, and the same tree gives the same result every time.
+settings.register_profile("patient", deadline=None, derandomize=True)
 settings.load_profile("patient")
-# For mutmut: the same examples every time, and no smaller ones once a mutant is dead.
+# New examples every time, and many.
+settings.register_profile("search", deadline=None, max_examples=2000)
+# For mutmut: no smaller examples once a mutant is dead.
 settings.register_profile(
     "mutants",
     settings.get_profile("patient"),
-    derandomize=True,
     phases=[Phase.explicit, Phase.generate],
 )
 # For tests/fuzz/test_keeping.py: thousands of folders, and of files with a changed bit.

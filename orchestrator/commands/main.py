@@ -19,7 +19,13 @@ from orchestrator.system.imports import imported_apart
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point; returns the exit status."""
+    """Entry point; returns the exit status.
+
+    Args:
+        arguments: of a command within a process that goes on; None: those of the process, which
+            ends after it.
+
+    """
     # No matrix here is worth a thread, and where one cannot be had numpy's library ends in Ctrl-C.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Where it can keep no fonts it says so at length, and draws all the same.
@@ -27,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     streams.fill()
     status = 0
     try:
-        with orderly_end(), warnings.catch_warnings():
+        with orderly_end(arguments is None), warnings.catch_warnings():
             warnings.showwarning = partial(_warn, warnings.showwarning)
             # What is in the current folder may be of somebody else.
             imported_apart("matplotlib", "matplotlibrc")

@@ -140,8 +140,8 @@ def _run(options: argparse.Namespace) -> int:
         options.resume,
         options.force,
     )
-    # Until all is said: who stops a run several times wants to know, too, where its rows are.
-    with held_interrupts(_answer):
+    # Somebody who stops a run several times wants to know, too, how it ended and where its rows are.
+    with held_interrupts(_answer, is_last=True):
         finished = run_into(folder, runs, files, options.command, say)
         for run in finished:
             _print_summary(run.metrics)
@@ -150,7 +150,7 @@ def _run(options: argparse.Namespace) -> int:
         show(f"written to {finished[0].folder}{os.sep}")
         if finished[0].folder != folder:
             say(f"{folder} keeps the whole result that was there before")
-        return max(status(run.name, run.ending) for run in finished)
+    return max(status(run.name, run.ending) for run in finished)
 
 
 def _answer(interrupts: Interrupts) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import atexit
 import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
@@ -119,27 +118,29 @@ class Interrupts:
 
 
 @contextmanager
-def orderly_end() -> Iterator[None]:
+def orderly_end(of_process: bool) -> Iterator[None]:
     """As long as the context lasts, leave by SIGTERM and SIGHUP as by any other exit.
 
-    What is temporary then goes, and child processes end. What comes once the process is on its way
-    out anyway changes nothing.
+    What is temporary then goes, and child processes end.
+
+    Args:
+        of_process: whether the process ends after the context: signals to stop then change nothing
+            any more. Otherwise they are handled as before.
+
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    with _handled([n for n in _STOPS if signal.getsignal(n) is signal.SIG_DFL], _leave):
-        try:
-            yield
-        finally:
-            # Before what was registered earlier.
-            atexit.unregister(_ignore_stops)
-            atexit.register(_ignore_stops)
-
-
-def _ignore_stops() -> None:
-    for number in _STOPS:
-        signal.signal(number, signal.SIG_IGN)
+    before = {number: signal.getsignal(number) for number in _STOPS}
+    before = {number: handler for number, handler in before.items() if handler is not None}
+    for number, handler in before.items():
+        if handler is signal.SIG_DFL:
+            signal.signal(number, _leave)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_IGN if of_process else handler)
 
 
 def _leave(number: int, _frame: Any) -> None:
@@ -149,18 +150,8 @@ def _leave(number: int, _frame: Any) -> None:
 
 
 @contextmanager
-def _handled(numbers: Sequence[int], handler: Callable[[int, Any], None]) -> Iterator[None]:
-    before = {number: signal.signal(number, handler) for number in numbers}
-    try:
-        yield
-    finally:
-        for number, previous in before.items():
-            signal.signal(number, previous)
-
-
-@contextmanager
 def held_interrupts(
-    announce: Callable[[Interrupts], None] | None = None,
+    announce: Callable[[Interrupts], None] | None = None, *, is_last: bool = False
 ) -> Iterator[Interrupts]:
     """Collect signals to stop as long as the context lasts.
 
@@ -169,6 +160,8 @@ def held_interrupts(
 
     Args:
         announce: called at once when a signal comes.
+        is_last: whether they change nothing after it, until the context of :func:`orderly_end` is
+            left; otherwise they are handled as before.
 
     """
     if threading.current_thread() is not threading.main_thread():
@@ -182,8 +175,12 @@ def held_interrupts(
     # What is ignored stays so: nohup, or a shell's background.
     heeded = [n for n in _STOPS if signal.getsignal(n) not in (signal.SIG_IGN, None)]
     heeded += [n for n in _ENDS if signal.getsignal(n) is signal.SIG_DFL]
-    with _handled(heeded, interrupts.take):
+    before = {number: signal.signal(number, interrupts.take) for number in heeded}
+    try:
         yield interrupts
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_IGN if is_last and number in _STOPS else handler)
 
 
 @contextmanager

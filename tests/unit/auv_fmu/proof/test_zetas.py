@@ -54,20 +54,23 @@ def test_chi_1_is_the_coupling_times_a_reference_ahead(vehicle, ell, speed, size
     C_2(dy_r) r_1: it is as large with the two directions exchanged.
     """
     at, ahead = (vehicle, 0.0, YAW, STILL), turned((speed, 0.0, 0.0))
+    k = coupling(vehicle, ell)
+    # Of the products that chi_1 adds up.
+    rounding = 1e-13 * k * (speed + size) * size
     for sign in (1.0, -1.0):
         found, work = [], []
         for r_1 in (turned((0.0, size, 0.0)), turned((0.0, 0.0, size))):
             chi = chi_1(*at, sign * ahead, r_1, ell)
             found.append(np.linalg.norm(chi))
             work.append(sign * chi @ r_1)
-        assert max(found) == pytest.approx(coupling(vehicle, ell) * speed * size, abs=1e-9)
-        assert max(work) <= 1e-9
+        assert max(found) == pytest.approx(k * speed * size, abs=rounding)
+        assert max(work) <= rounding * size
     found = []
     for dy_r in (turned((0.0, speed, 0.0)), turned((0.0, 0.0, speed))):
         r_1 = turned((size, 0.0, 0.0))
         crossed = C_2(*at[:3], dy_r, ell) @ r_1 - C_2(*at[:3], r_1, ell) @ dy_r
         found.append(np.linalg.norm(chi_1(*at, dy_r, r_1, ell) + crossed))
-    assert max(found) == pytest.approx(coupling(vehicle, ell) * speed * size, abs=1e-9)
+    assert max(found) == pytest.approx(k * speed * size, abs=rounding)
 
 
 @given(vehicle=vehicles, ell=distances, lambda_=lambdas, v0=units)

@@ -6,7 +6,9 @@ import os
 import signal
 import threading
 
-from orchestrator.master.interrupts import Interrupts, held_interrupts
+import pytest
+
+from orchestrator.master.interrupts import Interrupts, held_interrupts, orderly_end
 
 
 def test_signals_are_collected_and_announced_at_once():
@@ -82,3 +84,22 @@ def test_signals_before_and_after_are_no_insistence():
         for _ in range(3):
             os.kill(os.getpid(), signal.SIGINT)
     assert given_up == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("of_process", [False, True])
+def test_signals_after_the_last_context_change_nothing(number, of_process):
+    before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    try:
+        with orderly_end(of_process):
+            with held_interrupts(is_last=True) as interrupts:
+                os.kill(os.getpid(), number)
+            os.kill(os.getpid(), number)
+        if of_process:
+            os.kill(os.getpid(), number)
+        else:
+            assert {n: signal.getsignal(n) for n in before} == before
+    finally:
+        for n, handler in before.items():
+            signal.signal(n, handler)
+    assert interrupts.signals == [number]
