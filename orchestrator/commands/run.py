@@ -140,7 +140,7 @@ def _run(options: argparse.Namespace) -> int:
         options.resume,
         options.force,
     )
-    # Somebody who stops a run several times wants to know, too, how it ended and where its rows are.
+    # Until all is written: a user who stops a run several times wants to know where its rows are.
     with held_interrupts(_answer, is_last=True):
         finished = run_into(folder, runs, files, options.command, say)
         for run in finished:
