@@ -26,7 +26,7 @@ settings.register_profile(
     phases=[Phase.explicit, Phase.generate],
 )
 # For tests/fuzz/test_keeping.py: thousands of folders, and of files with a changed bit.
-settings.register_profile("attack", settings.get_profile("patient"), max_examples=7150)
+settings.register_profile("attack", settings.get_profile("search"), max_examples=7150)
 
 # Where a shell has started the tests in the background, or nohup has, they ignore signals, and so
 # does all that they start.

@@ -16,9 +16,11 @@ from scipy.integrate import solve_ivp
 from auv_fmu import closed_loop, motion_planner, plant
 from auv_fmu.attitude import normalised, rotation_from_quaternion
 from auv_fmu.closed_loop import LAWS, Scene, Setting, Vehicles
+from auv_fmu.euler import STEP
 from orchestrator import load, simulate
 from orchestrator.analysis.signals import Y_D, true_control_point
 from orchestrator.master.table import Table
+from orchestrator.paper.formatting import table
 from orchestrator.paper.measures import total_variation_until
 from orchestrator.studies.batch.flat import flat
 from orchestrator.studies.batch_engine import BatchEngine
@@ -35,8 +37,8 @@ SCENARIOS = {
 #: Its path depends on the last bits of its start: of numbers there are bands.
 CHAOTIC = "fig6-pd"
 
-#: The paper's step, smaller ones, and one that stands for their limit [s].
-STEP, SMALLER, LIMIT = 0.02, (0.01, 0.005, 0.002), 0.0002
+#: Smaller steps than the paper's, and one that stands for their limit [s].
+SMALLER, LIMIT = (0.01, 0.005, 0.002), 0.0002
 
 EULER: Values = {}
 RK4: Values = {"plant.integrator": "rk4"}
@@ -262,9 +264,7 @@ def band(values: Sequence[float]) -> str:
 
 def show(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Print a table in Markdown."""
-    print()
-    for row in (head, ["---"] * len(head), *rows):
-        print(f"| {' | '.join(row)} |")
+    print(f"\n{table(head, rows)}")
 
 
 if __name__ == "__main__":

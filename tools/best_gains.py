@@ -16,6 +16,7 @@ from time import process_time
 
 from scipy.optimize import differential_evolution
 
+from auv_fmu.euler import STEP
 from orchestrator.analysis.signals import ACTUATORS
 from orchestrator.experiments.preparation import load
 from orchestrator.studies.batch_engine import BatchEngine
@@ -31,8 +32,6 @@ _GENERATIONS, _VEHICLES = 250, 10
 #: Above the logarithm of any error: gains whose commands are too large are worse than all others.
 _TOO_LARGE = 10.0
 
-_STEP = 0.02
-
 
 class Search:
     """The gains of one controller, and what comes of them."""
@@ -42,7 +41,7 @@ class Search:
         assert study.sample and study.stop_time, study.name
         system = load(scenario)
         self._engine = BatchEngine({scenario: system})
-        self._run = Run(0, scenario, study.parameters, study.stop_time.base, _STEP)
+        self._run = Run(0, scenario, study.parameters, study.stop_time.base, STEP)
         has = system.components["controller"].variables
         ranges = study.sample.ranges
         self.gains = [name for name in ranges if name.partition(".")[2] in has]

@@ -14,7 +14,7 @@ import numpy as np
 
 from auv_fmu.attitude import rotation_from_euler
 from orchestrator.analysis.body import PAINT, Z_UP, body
-from orchestrator.analysis.figures.style import COLOURS, REFERENCE
+from orchestrator.analysis.figures.style import COLOURS, REFERENCE, earth_axes
 from orchestrator.analysis.signals import (
     ACTUATORS,
     ATTITUDE,
@@ -274,15 +274,11 @@ def _frames(table: Table, z_up: bool) -> dict[str, Any]:
         )
     low, high = lower - length, upper + length
     ratio = (high - low) / float((high - low).max())
-    axes = {
-        f"{k}axis": {"title": {"text": f"{k} {name} [m]"}, "range": ends, "nticks": 5}
-        for k, name, ends in (
-            ("x", "north", [low[0], high[0]]),
-            # Turned around both or neither: the axes are right-handed.
-            ("y", "west", [low[1], high[1]]) if z_up else ("y", "east", [high[1], low[1]]),
-            ("z", "up", [low[2], high[2]]) if z_up else ("z", "down", [high[2], low[2]]),
-        )
-    }
+    axes = {}
+    for i, text in enumerate(earth_axes(z_up)):
+        # y and z are turned around both or neither: the axes are right-handed.
+        ends = [low[i], high[i]] if i == 0 or z_up else [high[i], low[i]]
+        axes[f"{text[0]}axis"] = {"title": {"text": text}, "range": ends, "nticks": 5}
     layout = {
         "scene": {
             **axes,

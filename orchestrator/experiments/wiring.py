@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -38,11 +37,9 @@ def closed_loop(
         Refused: a component or group of ports that the scenario names does not exist.
 
     """
-    findings = Findings()
-    wiring = read_wiring()
-    chosen, wires = wiring["components"], wiring["wires"]
-    if scenario is not None:
-        chosen, wires = _changed(scenario, chosen, wires, findings)
+    findings, wiring = Findings(), read_wiring()
+    scenario = scenario or Scenario(wiring["name"])
+    chosen, wires = _changed(scenario, wiring["components"], wiring["wires"], findings)
     components = {}
     for name, fmu in chosen.items():
         with findings.collecting():
@@ -51,10 +48,9 @@ def closed_loop(
     findings.refuse()
     connections: list[Connection] = []
     for target, source in wires.items():
-        if source is not False:
-            with findings.collecting():
-                connections += _wire(components, target, source)
-    groups = {**wiring["wires"], **(scenario.wires if scenario else {})}
+        with findings.collecting():
+            connections += _wire(components, target, source)
+    groups = {**wiring["wires"], **scenario.wires}
     left_open = {
         PortName(name, variable.name)
         for name, component in components.items()
@@ -68,12 +64,11 @@ def closed_loop(
         left_open=left_open - {connection.target for connection in connections},
         stop_time=wiring["experiment"]["stop_time"],
         step=wiring["experiment"]["step"],
+        steps=scenario.steps,
     )
-    if scenario is not None:
-        for name, value in scenario.parameters.items():
-            with findings.collecting():
-                system = system.with_parameters({name: value})
-        system = replace(system, steps=scenario.steps)
+    for port, value in scenario.parameters.items():
+        with findings.collecting():
+            system = system.with_parameters({port: value})
     findings.refuse()
     return system
 
@@ -81,7 +76,7 @@ def closed_loop(
 def _changed(
     scenario: Scenario,
     chosen: Mapping[str, str],
-    wires: Mapping[str, str],
+    wires: Mapping[str, str | bool],
     findings: Findings,
 ) -> tuple[dict[str, str], dict[str, str]]:
     """The components and wires of a scenario."""

@@ -131,8 +131,7 @@ def orderly_end(of_process: bool) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.getsignal(number) for number in _STOPS}
-    before = {number: handler for number, handler in before.items() if handler is not None}
+    before = {n: handler for n in _STOPS if (handler := signal.getsignal(n)) is not None}
     for number, handler in before.items():
         if handler is signal.SIG_DFL:
             signal.signal(number, _leave)

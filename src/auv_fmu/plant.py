@@ -88,7 +88,7 @@ class PlantState(NamedTuple):
     quaternion: Vector4  #: attitude, body to earth, scalar first
     nu_r: Vector6  #: (u, v, w, p, q, r) through the water [m/s, rad/s], body frame
     tau: Vector3  #: (tau_u, tau_q, tau_r) that acts [N, N.m]
-    water: Vector3  #: velocity of the water that nu is through [m/s], earth frame
+    water: Vector3  #: velocity of the water that nu_r is through [m/s], earth frame
 
 
 class PlantOutputs(NamedTuple):

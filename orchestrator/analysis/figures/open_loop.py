@@ -8,7 +8,7 @@ import numpy as np
 
 from orchestrator.analysis.figures.layout import Cell, Panel, Rows
 from orchestrator.analysis.figures.panels import PATH, over_time, title
-from orchestrator.analysis.figures.style import Drawn, having
+from orchestrator.analysis.figures.style import Drawn, earth_axes, having
 from orchestrator.analysis.figures.tracking import draw_lines
 from orchestrator.analysis.signals import CONTROL_POINT, NU, true_control_point
 
@@ -42,15 +42,15 @@ def _acceleration(name: str, columns: Sequence[str], unit: str) -> Panel:
 
 
 def _from_above(cell: Cell, runs: Sequence[Drawn]) -> None:
-    axes = cell.axes(xlabel="y east [m]", ylabel="x north [m]")
+    x, y, _ = earth_axes(runs[0].z_up)
+    axes = cell.axes(xlabel=y, ylabel=x)
     axes.set_aspect("equal", adjustable="datalim")
     if runs[0].z_up:
-        axes.set_xlabel("y west [m]")
         axes.invert_xaxis()
     for run, colour in having(runs, CONTROL_POINT):
-        y = true_control_point(run.result)
-        axes.plot(y[:, 1], y[:, 0], color=colour)
-        axes.plot(y[0, 1], y[0, 0], "o", color=colour)
+        path = true_control_point(run.result)
+        axes.plot(path[:, 1], path[:, 0], color=colour)
+        axes.plot(path[0, 1], path[0, 0], "o", color=colour)
     title(axes, "path from above")
 
 

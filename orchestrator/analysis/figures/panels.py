@@ -13,7 +13,7 @@ from matplotlib.transforms import Transform
 
 from orchestrator.analysis.figures.layout import Cell, Panel
 from orchestrator.analysis.figures.signal import draw_signal, mean_window
-from orchestrator.analysis.figures.style import REFERENCE, Drawn, having, plain
+from orchestrator.analysis.figures.style import REFERENCE, Drawn, earth_axes, having, plain
 from orchestrator.analysis.signals import (
     ACTUATORS,
     AXES,
@@ -86,12 +86,12 @@ def _frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
     extent = np.maximum(upper - lower, _FLATTEST * max(float((upper - lower).max()), 1e-3))
     middle = (lower + upper) / 2
     low, high = (middle - 0.54 * extent).tolist(), (middle + 0.54 * extent).tolist()
+    x, y, z = earth_axes(z_up)
     axes.set(
         xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]),
-        xlabel="x north [m]", ylabel="y west [m]", zlabel="z up [m]",
+        xlabel=x, ylabel=y, zlabel=z,
     )  # fmt: skip
     if not z_up:
-        axes.set(ylabel="y east [m]", zlabel="z down [m]")
         axes.invert_yaxis()
         axes.invert_zaxis()
     box = np.maximum(extent, 0.5 * extent.max())

@@ -85,6 +85,13 @@ class Drawn(NamedTuple):
     z_up: bool = False
 
 
+def earth_axes(z_up: bool) -> tuple[str, str, str]:
+    """Titles of the axes x, y and z of a path."""
+    if z_up:
+        return "x north [m]", "y west [m]", "z up [m]"
+    return "x north [m]", "y east [m]", "z down [m]"
+
+
 #: Columns, and parameters, that something needs: what :meth:`Table.missing` takes.
 Needs = tuple[Sequence[str], Sequence[str]]
 
