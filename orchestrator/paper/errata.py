@@ -433,7 +433,7 @@ def errata() -> tuple[Erratum, ...]:
         ),
         Erratum(
             "Assumption 4: the helix is not bounded",
-            "It asks for a bounded y_d; that of section 4.1 moves along z for good, from -2.0 m at "
+            "It asks for a bounded y_d; section 4.1's moves along z for good, from -2.0 m at "
             "first to -5.2 after 100 s and -35.1 after 1,000 s. That y and eta are bounded, with "
             "which the proof ends, hangs on it (and the yaw of a helix is not bounded either); the "
             "rest needs dy_d and ddy_d only.",

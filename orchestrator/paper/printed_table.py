@@ -151,9 +151,9 @@ def _starts(variants: Sequence[Variant]) -> str:
         low, _, high = (100 * quantile for quantile in QUANTILES)
         text += (
             f" The numbers of {_and(told)} depend on that, so they are medians, with the band from "
-            f"{low:.0f} to {high:.0f} % of the starts, and the score is that of the medians: with "
-            "five degrees of freedom the run passes the vertical, where (1) has a pole, and the "
-            "last bits decide what comes after."
+            f"{low:.0f} to {high:.0f} % of the starts, and the score is computed from the medians: "
+            "with five degrees of freedom the run passes the vertical, where (1) has a pole, and "
+            "the last bits decide what comes after."
         )
     if still:
         text += f" The numbers of {_and(still)} stay within {100 * SAME:g} %."
