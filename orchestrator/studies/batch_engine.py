@@ -11,9 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_fmu.closed_loop import Setting, splits
+from auv_fmu.closed_loop import Moment, Setting, splits
 from auv_fmu.euler import MOST_INTERNAL_STEPS
 from auv_fmu.output_feedback import Gains
+from fmus.auv_plant.behaviour import check
+from fmus.ports.port import Refusal
 from orchestrator.analysis.metrics import LAST_SECONDS
 from orchestrator.analysis.signals import ACTUATORS, AXES, DY_HAT
 from orchestrator.errors import InputError
@@ -21,20 +23,14 @@ from orchestrator.experiments.bundle import PYTHON, current_fmus
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import digest_of
 from orchestrator.master.observer import Ending, Header
-from orchestrator.master.schedule import stages
 from orchestrator.master.table import Table
 from orchestrator.studies.batch import tally
 from orchestrator.studies.batch.columns import COLUMNS
-from orchestrator.studies.batch.kernel import Moment, Plan
+from orchestrator.studies.batch.failure import start_failure, step_failure
+from orchestrator.studies.batch.kernel import Plan
 from orchestrator.studies.batch.library import compiled, digest
 from orchestrator.studies.batch.parameters import setting_of
 from orchestrator.studies.batch.standard import difference
-from orchestrator.studies.batch.verdict import (
-    misfit,
-    refused,
-    refused_at_once,
-    refused_at_start,
-)
 from orchestrator.studies.engine import Outcome, Run
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
@@ -161,13 +157,15 @@ def _job(system: System, run: Run) -> _Job:
         raise InputError(f"the batch engine has the orders {' and '.join(ORDERS)}; {_OTHER}")
     fmus = {name: part.description.modelName for name, part in system.components.items()}
     setting = setting_of(fmus, system.parameters, experiment.step)
-    if misfit(setting):
-        raise InputError(refused_at_start(setting))
+    try:
+        check(setting.plant)
+    except Refusal as refusal:
+        raise InputError(f"initialisation refused: {refusal}") from None
     full, stop = experiment.full_steps, experiment.stop_time
     parts = splits(setting, experiment.step)
     if max(parts) > MOST_INTERNAL_STEPS:
-        failure = refused_at_once(setting, parts, _order(system, experiment))
-        raise InputError(refused_at_start(setting) or failure)
+        why = f"step {setting.h:g} s needs {max(parts)} internal steps; raise h_max"
+        raise InputError(f"stopped at t = 0 s: {why}")
     # Where there is none it has no length, and is no step.
     last_parts = (
         splits(setting, stop - full * experiment.step) if experiment.has_short_step else parts
@@ -186,11 +184,6 @@ def _job(system: System, run: Run) -> _Job:
 
 def _is_parameter(system: System, name: PortName) -> bool:
     return bool(system.component(name.component).variable(name.port).causality == "parameter")
-
-
-def _order(system: System, experiment: Experiment) -> list[str]:
-    """The components in the order in which they are stepped."""
-    return [name for names in stages(system, experiment.order) for name in names]
 
 
 def _parameters(system: System) -> dict[PortName, object]:
@@ -236,13 +229,13 @@ def _made(
         _run(job, job.plan, ends, tallies, rows, progress)
     made = int(progress[0])
     if made < 0:
-        raise InputError(refused_at_start(job.setting))
+        raise InputError(start_failure(job.setting, job.plan))
     if made == job.plan.steps:
         return made, None
     # What the step that is refused begins with is what a shorter run ends with.
     shorter = job.plan._replace(steps=made)
     moment = _run(job, shorter, ends[:0], tallies[:0], _NO_ROWS, progress)
-    return made, refused(job.setting, job.plan, made, moment, _order(job.system, job.experiment))
+    return made, step_failure(job.setting, job.plan, made, moment)
 
 
 def _run(

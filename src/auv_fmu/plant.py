@@ -25,7 +25,7 @@ from auv_fmu.attitude import (
 )
 from auv_fmu.control_point import ELL, control_point, control_point_velocity
 from auv_fmu.types import Rotation, Vector3, Vector4, Vector6
-from auv_fmu.vectors import difference
+from auv_fmu.vectors import difference, plus_scaled, total
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 
 #: Initial posture of section 4.1: x, y, z [m], phi, theta, psi [rad]; it does not give phi.
@@ -213,7 +213,7 @@ def rates(
     velocity = rotate(rotation, (u, v, w))
     c_x, c_y, c_z = water
     if c_x or c_y or c_z:
-        velocity = velocity[0] + c_x, velocity[1] + c_y, velocity[2] + c_z
+        velocity = total(velocity, water)
     dnu = accelerations_6dof(vehicle, roll, nu_r, rotation, tau, tau_w)
     if roll.rolls:
         return Rates(velocity, quaternion_rates(quaternion, (p, q, r)), dnu)
@@ -345,8 +345,7 @@ def begin(parameters: Parameters, tau: Vector3, water: Vector3) -> tuple[PlantSt
 
 def flow(parameters: Parameters, water: Vector3) -> Vector3:
     """Velocity of the water: the parameter `current` and what is told beside it [m/s]."""
-    c_x, c_y, c_z = parameters.current
-    return c_x + water[0], c_y + water[1], c_z + water[2]
+    return total(parameters.current, water)
 
 
 def applied(parameters: Parameters, tau: Vector3) -> Vector3:
@@ -437,4 +436,4 @@ def measure(y: Vector3, n: Vector3, std: float) -> Vector3:
         std: standard deviation of each axis [m]; not in the paper (reading 7).
 
     """
-    return y[0] + std * n[0], y[1] + std * n[1], y[2] + std * n[2]
+    return plus_scaled(y, std, n)

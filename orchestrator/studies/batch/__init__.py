@@ -3,7 +3,7 @@
 ========================  ============================================================
 module                    what it holds
 ========================  ============================================================
-:mod:`.parameters`        which port sets which field of the equations' parameters
+:mod:`.parameters`        the setting of the loop that parameters of components make
 :mod:`.standard`          the system that the equations make
 :mod:`.kernel`            one run: the loop, its noise, its rows
 :mod:`.columns`           which columns these rows have
@@ -11,6 +11,6 @@ module                    what it holds
 :mod:`.equations`         equations as numba compiles them
 :mod:`.flat`              all numbers of nested tuples, and sums over them
 :mod:`.library`           the kernel, compiled once and kept in the user's cache folder
-:mod:`.verdict`           why a run ends early, in the words of the FMUs
+:mod:`.failure`           why a run ends early: what fails taken again, in plain Python
 ========================  ============================================================
 """

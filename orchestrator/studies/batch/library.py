@@ -12,10 +12,9 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from auv_fmu.closed_loop import LAWS, Law
+from auv_fmu.closed_loop import LAWS, Law, Moment
 from orchestrator.master.identity import code_of
 from orchestrator.studies.batch import kernel
-from orchestrator.studies.batch.kernel import Moment
 from orchestrator.system.cache import keep, kept
 from orchestrator.system.imports import imported_apart
 

@@ -1,51 +1,20 @@
-"""The table of parameters, held against the ports that the components declare."""
+"""What the parameters of components make of the setting of the loop."""
 
 from __future__ import annotations
-
-from importlib import import_module
 
 import pytest
 
 from auv_fmu.closed_loop import PAPER
-from fmus.packaging.discovery import components
 from orchestrator.errors import InputError
-from orchestrator.studies.batch.parameters import CHOICES, DEFAULTS, PATHS, setting_of
+from orchestrator.studies.batch.parameters import setting_of
 from orchestrator.system.names import port_name
 
-#: Of all components but those that the batch engine refuses: it runs the paper's loop alone.
-PORTS = {
-    name: import_module(module.replace(".slave", ".ports"))
-    for name, module in components().items()
-    if name != "PathPlanner"
-}
 FMUS = {
     "plant": "AuvPlant",
     "controller": "ObserverController",
     "disturbance": "DisturbanceGenerator",
     "planner": "MotionPlanner",
 }
-
-
-@pytest.mark.parametrize("name", PORTS)
-def test_parameters_lie_where_the_ports_say(name):
-    declared = PORTS[name].PARAMETERS
-    assert dict(PATHS[name]) == declared.paths
-    starts = {port.name: port.start for port in declared.ports}
-    assert DEFAULTS[name] == declared.of(starts)
-
-
-def test_every_component_is_there():
-    assert PATHS.keys() == DEFAULTS.keys() == PORTS.keys()
-
-
-def test_texts_stand_for_what_the_ports_say():
-    choices = {
-        port.name: dict(port.choices)
-        for module in PORTS.values()
-        for port in module.PARAMETERS.ports
-        if port.kind == "String"
-    }
-    assert choices == {name: dict(meant) for name, meant in CHOICES.items()}
 
 
 def test_no_parameter_gives_section_4_1():
