@@ -22,7 +22,7 @@ from orchestrator.analysis.signals import Y_D, true_control_point
 from orchestrator.master.table import Table
 from orchestrator.paper.formatting import table
 from orchestrator.paper.measures import total_variation_until
-from orchestrator.studies.batch.flat import flat
+from orchestrator.studies.batch.numbers import flat
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Run
 

@@ -24,13 +24,13 @@ from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import digest_of
 from orchestrator.master.observer import Ending, Header
 from orchestrator.master.table import Table
-from orchestrator.studies.batch import tally
+from orchestrator.studies.batch import accumulator
 from orchestrator.studies.batch.columns import COLUMNS
 from orchestrator.studies.batch.failure import start_failure, step_failure
-from orchestrator.studies.batch.kernel import Plan
-from orchestrator.studies.batch.library import compiled, digest
+from orchestrator.studies.batch.kernel import RunSteps
+from orchestrator.studies.batch.kernels import compiled, digest
 from orchestrator.studies.batch.parameters import setting_of
-from orchestrator.studies.batch.standard import difference
+from orchestrator.studies.batch.support import difference
 from orchestrator.studies.engine import Outcome, Run
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
@@ -87,16 +87,16 @@ class BatchEngine:
         """
         try:
             job = _job(self._systems[run.scenario], run)
-            ends = np.array([_end(job, stop_time) for stop_time in stop_times], tally.END)
-            tallies = tally.new(len(ends))
-            made, failure = _made(job, ends, tallies, _NO_ROWS)
+            ends = np.array([_end(job, stop_time) for stop_time in stop_times], accumulator.END)
+            accumulators = accumulator.new(len(ends))
+            made, failure = _made(job, ends, accumulators, _NO_ROWS)
         except InputError as error:
             return [Outcome(run.number, {}, str(error)) for _ in stop_times]
         return [
             Outcome(run.number, {}, failure)
             if end["steps"] > made
             else Outcome(run.number, _indices(job, end, found))
-            for end, found in zip(ends, tallies, strict=True)
+            for end, found in zip(ends, accumulators, strict=True)
         ]
 
     def setting(self, run: Run) -> Setting:
@@ -117,7 +117,7 @@ class BatchEngine:
         """
         job = _job(self._systems[run.scenario], run)
         rows = np.empty((job.experiment.rows, 1 + len(COLUMNS)))
-        made, failure = _made(job, np.empty(0, tally.END), tally.new(0), rows)
+        made, failure = _made(job, np.empty(0, accumulator.END), accumulator.new(0), rows)
         kept = [
             0,
             *(i for i, name in enumerate(COLUMNS, 1) if job.has_estimate or name not in DY_HAT),
@@ -133,7 +133,7 @@ class _Job(NamedTuple):
     system: System
     experiment: Experiment
     setting: Setting
-    plan: Plan
+    plan: RunSteps
 
     @property
     def has_estimate(self) -> bool:
@@ -170,7 +170,7 @@ def _job(system: System, run: Run) -> _Job:
     last_parts = (
         splits(setting, stop - full * experiment.step) if experiment.has_short_step else parts
     )
-    plan = Plan(
+    plan = RunSteps(
         experiment.rows - 1,
         full,
         experiment.step,
@@ -196,7 +196,7 @@ def _parameters(system: System) -> dict[PortName, object]:
 
 
 def _end(job: _Job, stop_time: float) -> tuple[int, float, float]:
-    """Where the tally of a stop time ends, as :data:`.tally.END` has it.
+    """Where the accumulator of a stop time ends, as :data:`.accumulator.END` has it.
 
     Raises:
         InputError: the run has no row there.
@@ -215,7 +215,7 @@ def _end(job: _Job, stop_time: float) -> tuple[int, float, float]:
 
 
 def _made(
-    job: _Job, ends: np.ndarray, tallies: np.ndarray, rows: np.ndarray
+    job: _Job, ends: np.ndarray, accumulators: np.ndarray, rows: np.ndarray
 ) -> tuple[int, str | None]:
     """Make a run: how many steps were taken, and why there were no more.
 
@@ -226,7 +226,7 @@ def _made(
     progress = np.empty(1, int)
     # Where an equation raises, the compiled text says no more than that.
     with suppress(ArithmeticError):
-        _run(job, job.plan, ends, tallies, rows, progress)
+        _run(job, job.plan, ends, accumulators, rows, progress)
     made = int(progress[0])
     if made < 0:
         raise InputError(start_failure(job.setting, job.plan))
@@ -234,22 +234,22 @@ def _made(
         return made, None
     # What the step that is refused begins with is what a shorter run ends with.
     shorter = job.plan._replace(steps=made)
-    moment = _run(job, shorter, ends[:0], tallies[:0], _NO_ROWS, progress)
+    moment = _run(job, shorter, ends[:0], accumulators[:0], _NO_ROWS, progress)
     return made, step_failure(job.setting, job.plan, made, moment)
 
 
 def _run(
     job: _Job,
-    plan: Plan,
+    plan: RunSteps,
     ends: np.ndarray,
-    tallies: np.ndarray,
+    accumulators: np.ndarray,
     rows: np.ndarray,
     progress: np.ndarray,
 ) -> Moment:
     """Call the kernel."""
     run = compiled(type(job.setting.controller))  # type: ignore[arg-type]
     uniform = _NOISE.uniform(job.setting.plant.noise.seed)
-    return run(job.setting, plan, uniform, ends, tallies, rows, progress)
+    return run(job.setting, plan, uniform, ends, accumulators, rows, progress)
 
 
 class _Noise(local):
@@ -269,7 +269,7 @@ _NOISE = _Noise()
 
 
 def _indices(job: _Job, end: np.void, found: np.void) -> dict[str, float]:
-    """The indices of a tally by their names."""
+    """The indices of an accumulator by their names."""
     steps, t = int(end["steps"]), job.experiment.time(int(end["steps"]))
     single = {
         "late_error": found["late"],

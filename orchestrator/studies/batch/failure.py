@@ -10,10 +10,10 @@ from collections.abc import Callable
 from auv_fmu import closed_loop
 from auv_fmu.closed_loop import LAWS, Moment, Setting
 from auv_fmu.euler import LARGEST_STATE
-from orchestrator.studies.batch.kernel import Plan, is_bounded, part_of
+from orchestrator.studies.batch.kernel import RunSteps, is_bounded, part_of
 
 
-def start_failure(setting: Setting, plan: Plan) -> str:
+def start_failure(setting: Setting, plan: RunSteps) -> str:
     """Why a run has no start."""
     law = LAWS[type(setting.controller)]
 
@@ -26,7 +26,7 @@ def start_failure(setting: Setting, plan: Plan) -> str:
     return f"initialisation refused: {_why(start)}"
 
 
-def step_failure(setting: Setting, plan: Plan, k: int, moment: Moment) -> str:
+def step_failure(setting: Setting, plan: RunSteps, k: int, moment: Moment) -> str:
     """Why step k of a run, from 0, cannot be taken from a moment."""
     law = LAWS[type(setting.controller)]
     h, parts, end = part_of(plan, k)

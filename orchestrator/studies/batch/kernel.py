@@ -19,14 +19,14 @@ from auv_fmu.euler import LARGEST_STATE
 from auv_fmu.output_feedback import Gains
 from auv_fmu.types import Vector3, Vector6
 from auv_fmu.vectors import difference
-from orchestrator.studies.batch.flat import flat, nought, square
-from orchestrator.studies.batch.tally import Row, Step, take_row, take_step
+from orchestrator.studies.batch.accumulator import RowSignals, StepSignals, take_row, take_step
+from orchestrator.studies.batch.numbers import flat, nought, square
 
 #: The controller's part of the loop: whoever compiles this module for another one puts it here.
 law: Law = LAWS[Gains]
 
 
-class Plan(NamedTuple):
+class RunSteps(NamedTuple):
     """The steps of a run."""
 
     steps: int  #: how many
@@ -51,10 +51,10 @@ class Done(NamedTuple):
 
 def run(
     setting: Setting,
-    plan: Plan,
+    plan: RunSteps,
     generator: np.random.Generator,
     ends: np.ndarray,
-    tallies: np.ndarray,
+    accumulators: np.ndarray,
     rows: np.ndarray,
     progress: np.ndarray,
 ) -> Moment:
@@ -64,8 +64,8 @@ def run(
         setting: of the loop.
         plan: its steps.
         generator: of uniform numbers.
-        ends: of the tallies, as :data:`.tally.END` says.
-        tallies: to be filled.
+        ends: of the accumulators, as :data:`.accumulator.END` says.
+        accumulators: to be filled.
         rows: to be filled, one more than steps; or none.
         progress: of which the first element becomes the number of steps taken. The next one is
             refused if there are fewer than planned; -1: already the start is.
@@ -87,9 +87,9 @@ def run(
     while True:
         # Here, where the controller is about to need the sines of the same attitude.
         row = row_of(setting, moment, done)
-        for j in range(len(tallies)):
+        for j in range(len(accumulators)):
             if k <= ends[j].steps:
-                take_row(tallies[j], row, ends[j])
+                take_row(accumulators[j], row, ends[j])
         if len(rows):
             fill(rows[k], moment, done)
         progress[0] = k
@@ -104,15 +104,15 @@ def run(
         if not is_sound(moment):
             break
         miss = difference(done.velocity, begun.scene.plant.dy)
-        one = Step(begun.t, end, done.told, done.tau, before, miss, k == 0)
-        for j in range(len(tallies)):
+        one = StepSignals(begun.t, end, done.told, done.tau, before, miss, k == 0)
+        for j in range(len(accumulators)):
             if k < ends[j].steps:
-                take_step(tallies[j], one, setting.plant.limits, ends[j])
+                take_step(accumulators[j], one, setting.plant.limits, ends[j])
         k += 1
     return moment
 
 
-def part_of(plan: Plan, k: int) -> tuple[float, Splits, float]:
+def part_of(plan: RunSteps, k: int) -> tuple[float, Splits, float]:
     """Length of step k of a run [s], what it is split into, and when it ends [s]."""
     if k < plan.full:
         return plan.h, plan.parts, (k + 1) * plan.h
@@ -172,14 +172,14 @@ def gauss(
     return cos(angle) * radius, (True, sin(angle) * radius)
 
 
-def row_of(setting: Setting, moment: Moment, done: Done) -> Row:
+def row_of(setting: Setting, moment: Moment, done: Done) -> RowSignals:
     """What the indices need of a row, as it follows from the ports."""
     seen = moment.scene.plant
     phi, theta, psi = seen.euler
     rotation = rotation_from_euler(phi, theta, psi)
     y = control_point(moment.vehicles.plant.position, rotation, setting.plant.ell)
     _, v, w, _, _, _ = seen.nu
-    return Row(
+    return RowSignals(
         moment.t,
         difference(y, moment.scene.reference.y_d),
         seen.dy,

@@ -16,7 +16,7 @@ from auv_fmu.types import Vector3, Vector4
 from auv_fmu.vectors import norm
 from orchestrator.studies.engine import REACHED
 
-#: Up to where a tally goes.
+#: Up to where an accumulator goes.
 END = np.dtype(
     [
         ("steps", int),
@@ -26,7 +26,7 @@ END = np.dtype(
 )
 
 #: What is kept of a run until then.
-TALLY = np.dtype(
+ACCUMULATOR = np.dtype(
     [
         ("square", float, 3),  # integral of the square of the applied signal
         ("variation", float, 3),
@@ -45,7 +45,7 @@ TALLY = np.dtype(
 )
 
 
-class Row(NamedTuple):
+class RowSignals(NamedTuple):
     """What of a row of the table the indices follow from."""
 
     t: float  #: [s]
@@ -55,7 +55,7 @@ class Row(NamedTuple):
     theta_hat: Vector4
 
 
-class Step(NamedTuple):
+class StepSignals(NamedTuple):
     """What of a step the indices follow from."""
 
     begun: float  #: [s]
@@ -68,42 +68,42 @@ class Step(NamedTuple):
 
 
 def new(n: int) -> np.ndarray:
-    """Tallies of nothing yet."""
-    tallies = np.zeros(n, TALLY)
-    tallies["reached"] = tallies["half"] = nan
-    return tallies
+    """Accumulators of nothing yet."""
+    accumulators = np.zeros(n, ACCUMULATOR)
+    accumulators["reached"] = accumulators["half"] = nan
+    return accumulators
 
 
-def take_row(tally: Any, row: Row, end: Any) -> None:
+def take_row(accumulator: Any, row: RowSignals, end: Any) -> None:
     """Take a row into account."""
     error = norm(row.e)
-    if isnan(tally.reached) and error <= REACHED:
-        tally.reached = row.t
-    tally.speed = max(tally.speed, norm(row.dy))
-    tally.drift = max(tally.drift, row.drift)
+    if isnan(accumulator.reached) and error <= REACHED:
+        accumulator.reached = row.t
+    accumulator.speed = max(accumulator.speed, norm(row.dy))
+    accumulator.drift = max(accumulator.drift, row.drift)
     for i in range(4):
-        tally.end[i] = row.theta_hat[i]
+        accumulator.end[i] = row.theta_hat[i]
     if row.t >= end.late:
-        tally.late = max(tally.late, error)
-        if isnan(tally.half[0]):
+        accumulator.late = max(accumulator.late, error)
+        if isnan(accumulator.half[0]):
             for i in range(4):
-                tally.half[i] = row.theta_hat[i]
+                accumulator.half[i] = row.theta_hat[i]
     if row.t >= end.last:
         for i in range(3):
-            tally.final[i] = max(tally.final[i], abs(row.e[i]))
+            accumulator.final[i] = max(accumulator.final[i], abs(row.e[i]))
 
 
-def take_step(tally: Any, step: Step, limits: Limits, end: Any) -> None:
+def take_step(accumulator: Any, step: StepSignals, limits: Limits, end: Any) -> None:
     """Take a step into account."""
     h = step.ended - step.begun
     for i in range(3):
-        tally.square[i] += step.tau[i] * step.tau[i] * h
+        accumulator.square[i] += step.tau[i] * step.tau[i] * h
         if not step.is_first:
-            tally.variation[i] += abs(step.tau[i] - step.before[i])
-        tally.peak[i] = max(tally.peak[i], abs(step.command[i]))
+            accumulator.variation[i] += abs(step.tau[i] - step.before[i])
+        accumulator.peak[i] = max(accumulator.peak[i], abs(step.command[i]))
         if not limits.tau_min[i] <= step.command[i] <= limits.tau_max[i]:
-            tally.outside[i] += 1
+            accumulator.outside[i] += 1
     if step.begun >= end.late:
-        tally.instants += 1
+        accumulator.instants += 1
         for i in range(3):
-            tally.miss[i] += step.miss[i] * step.miss[i]
+            accumulator.miss[i] += step.miss[i] * step.miss[i]
