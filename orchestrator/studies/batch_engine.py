@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib.metadata import version
 from math import isnan, sqrt
@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_fmu.closed_loop import Moment, Setting, splits
-from auv_fmu.euler import MOST_INTERNAL_STEPS
+from auv_fmu import closed_loop
+from auv_fmu.closed_loop import LAWS, Moment, Setting, splits
+from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS
 from auv_fmu.output_feedback import Gains
 from fmus.auv_plant.behaviour import check
 from fmus.ports.port import Refusal
@@ -25,12 +26,9 @@ from orchestrator.master.identity import digest_of
 from orchestrator.master.observer import Ending, Header
 from orchestrator.master.table import Table
 from orchestrator.studies.batch import accumulator
-from orchestrator.studies.batch.columns import COLUMNS
-from orchestrator.studies.batch.failure import start_failure, step_failure
-from orchestrator.studies.batch.kernel import RunSteps
+from orchestrator.studies.batch.kernel import COLUMNS, RunSteps, is_bounded, part_of
 from orchestrator.studies.batch.kernels import compiled, digest
-from orchestrator.studies.batch.parameters import setting_of
-from orchestrator.studies.batch.support import difference
+from orchestrator.studies.batch.support import setting_of, unsupported
 from orchestrator.studies.engine import Outcome, Run
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
@@ -61,7 +59,7 @@ class BatchEngine:
 
         """
         for name, system in systems.items():
-            if why := difference(system, current_fmus(kind)):
+            if why := unsupported(system, current_fmus(kind)):
                 raise InputError(f"{name}: {why}, which the batch engine cannot make; {_OTHER}")
             system.check()
         self._systems = dict(systems)
@@ -109,7 +107,7 @@ class BatchEngine:
         return _job(self._systems[run.scenario], run).setting
 
     def table(self, run: Run) -> Table:
-        """A run with its rows, those of the columns :data:`.columns.COLUMNS` that it has.
+        """A run with its rows, those of the columns :data:`.kernel.COLUMNS` that it has.
 
         Raises:
             InputError: it has no start.
@@ -229,13 +227,55 @@ def _made(
         _run(job, job.plan, ends, accumulators, rows, progress)
     made = int(progress[0])
     if made < 0:
-        raise InputError(start_failure(job.setting, job.plan))
+        raise InputError(_start_failure(job.setting, job.plan))
     if made == job.plan.steps:
         return made, None
     # What the step that is refused begins with is what a shorter run ends with.
     shorter = job.plan._replace(steps=made)
     moment = _run(job, shorter, ends[:0], accumulators[:0], _NO_ROWS, progress)
-    return made, step_failure(job.setting, job.plan, made, moment)
+    return made, _step_failure(job.setting, job.plan, made, moment)
+
+
+def _start_failure(setting: Setting, plan: RunSteps) -> str:
+    """Why a run has no start."""
+    law = LAWS[type(setting.controller)]
+
+    def start() -> Moment:
+        # Noise is too small to make a difference.
+        moment = closed_loop.begin(setting, law, (0.0, 0.0, 0.0))
+        closed_loop.act(setting, law, moment, plan.h, plan.parts, plan.delayed)
+        return moment
+
+    return f"initialisation refused: {_why(start)}"
+
+
+def _step_failure(setting: Setting, plan: RunSteps, k: int, moment: Moment) -> str:
+    """Why step k of a run, from 0, cannot be taken from a moment."""
+    law = LAWS[type(setting.controller)]
+    h, parts, end = part_of(plan, k)
+
+    def step() -> Moment:
+        instant = closed_loop.act(setting, law, moment, h, parts, plan.delayed)
+        return closed_loop.step(setting, law, instant, h, parts, end, (0.0, 0.0, 0.0))
+
+    return f"stopped at t = {moment.t:.12g} s: {_why(step)}"
+
+
+def _why(take: Callable[[], Moment]) -> str:
+    """What an equation raises on the way to a moment, or else what is wrong with the moment."""
+    try:
+        moment = take()
+    except (ArithmeticError, ValueError) as error:
+        return f"{type(error).__name__}: {error}"
+    states = {
+        "plant": moment.vehicles.plant,
+        "planner": moment.vehicles.planner,
+        "controller": moment.controller_state,
+    }
+    for name, state in states.items():
+        if not is_bounded(state):
+            return f"{name}: the state is not finite, or beyond {LARGEST_STATE:g}"
+    return "an output is not finite"
 
 
 def _run(

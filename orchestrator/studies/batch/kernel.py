@@ -19,11 +19,43 @@ from auv_fmu.euler import LARGEST_STATE
 from auv_fmu.output_feedback import Gains
 from auv_fmu.types import Vector3, Vector6
 from auv_fmu.vectors import difference
+from orchestrator.analysis.signals import (
+    APPLIED,
+    AXES,
+    COMMANDED,
+    DIRECTIONS,
+    DY,
+    DY_D,
+    DY_HAT,
+    NU,
+    POSTURE,
+    TAU,
+    THETA_HAT,
+    Y_D,
+)
 from orchestrator.studies.batch.accumulator import RowSignals, StepSignals, take_row, take_step
 from orchestrator.studies.batch.numbers import flat, nought, square
 
 #: The controller's part of the loop: whoever compiles this module for another one puts it here.
 law: Law = LAWS[Gains]
+
+
+#: Of the rows, after the time: the names of their columns.
+COLUMNS: tuple[str, ...] = (
+    *POSTURE,
+    *NU,
+    *(f"plant.y.{axis}" for axis in AXES),
+    *DY,
+    *Y_D,
+    *DY_D,
+    *(f"planner.ddy_d.{axis}" for axis in AXES),
+    *DY_HAT,
+    *THETA_HAT,
+    *TAU,
+    *COMMANDED,
+    *APPLIED,
+    *(f"plant.tau_w.{direction}" for direction in DIRECTIONS),
+)
 
 
 class RunSteps(NamedTuple):
@@ -189,7 +221,7 @@ def row_of(setting: Setting, moment: Moment, done: Done) -> RowSignals:
 
 
 def fill(row: np.ndarray, moment: Moment, done: Done) -> None:
-    """Fill a row with the time and the values of :data:`.columns.COLUMNS`."""
+    """Fill a row with the time and the values of :data:`COLUMNS`."""
     scene, seen = moment.scene, moment.scene.plant
     shown = moment.vehicles.plant.position, seen.euler, seen.nu, scene.y, seen.dy
     values = flat((moment.t, shown, scene.reference, done))

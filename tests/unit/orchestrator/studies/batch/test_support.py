@@ -6,7 +6,7 @@ import pytest
 
 from auv_fmu.closed_loop import PAPER
 from orchestrator.errors import InputError
-from orchestrator.studies.batch.parameters import setting_of
+from orchestrator.studies.batch.support import setting_of
 from orchestrator.system.names import port_name
 
 FMUS = {
