@@ -17,14 +17,12 @@ from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS
 from auv_fmu.output_feedback import Gains
 from fmus.auv_plant.behaviour import check
 from fmus.ports.port import Refusal
-from orchestrator.analysis.metrics import LAST_SECONDS
-from orchestrator.analysis.signals import ACTUATORS, AXES, DY_HAT
-from orchestrator.errors import InputError
-from orchestrator.experiments.bundle import PYTHON, current_fmus
+from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import digest_of
-from orchestrator.master.observer import Ending, Header
-from orchestrator.master.table import Table
+from orchestrator.master.observers.observer import Ending, Header
+from orchestrator.master.observers.table import Table
+from orchestrator.runs.bundle import PYTHON, current_fmus
 from orchestrator.studies.batch import accumulator
 from orchestrator.studies.batch.kernel import COLUMNS, RunSteps, is_bounded, part_of
 from orchestrator.studies.batch.kernels import compiled, digest
@@ -32,6 +30,8 @@ from orchestrator.studies.batch.support import setting_of, unsupported
 from orchestrator.studies.engine import Outcome, Run
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
+from orchestrator.vehicle.metrics import LAST_SECONDS
+from orchestrator.vehicle.signals import ACTUATORS, AXES, DY_HAT
 
 #: What makes every system.
 _OTHER = "use --engine fmu"

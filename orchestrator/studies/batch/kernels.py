@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from auv_fmu.closed_loop import LAWS, Law, Moment
+from orchestrator.machine.cache import keep, kept
+from orchestrator.machine.imports import imported_apart
 from orchestrator.master.identity import code_of
 from orchestrator.studies.batch import kernel
-from orchestrator.system.cache import keep, kept
-from orchestrator.system.imports import imported_apart
 
 #: What it is in the user's cache folder.
 _KIND = "batch"

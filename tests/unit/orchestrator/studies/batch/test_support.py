@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from auv_fmu.closed_loop import PAPER
-from orchestrator.errors import InputError
+from orchestrator.machine.errors import InputError
 from orchestrator.studies.batch.support import setting_of
 from orchestrator.system.names import port_name
 
