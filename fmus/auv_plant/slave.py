@@ -14,7 +14,7 @@ from fmus.auv_plant.behaviour import Inputs, Outputs
 from fmus.auv_plant.ports import DESCRIPTION, PARAMETERS, PORTS
 from fmus.ports.groups import slices
 from fmus.ports.port import Refusal
-from fmus.slave.component import Component
+from fmus.python.component import Component
 
 _Y = slices([port for port in PORTS if port.causality == "output"])["y"]
 

@@ -7,7 +7,7 @@ from fmus.disturbance_generator import behaviour
 from fmus.disturbance_generator.behaviour import Inputs, Outputs
 from fmus.disturbance_generator.ports import DESCRIPTION, PARAMETERS, PORTS
 from fmus.ports.groups import Nothing
-from fmus.slave.component import Component
+from fmus.python.component import Component
 
 
 class DisturbanceGenerator(Component[Nothing, Inputs, Outputs, Disturbance]):

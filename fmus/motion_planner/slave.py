@@ -7,7 +7,7 @@ from fmus.motion_planner import behaviour
 from fmus.motion_planner.behaviour import Outputs
 from fmus.motion_planner.ports import DESCRIPTION, PARAMETERS, PORTS
 from fmus.ports.groups import Nothing
-from fmus.slave.component import Component
+from fmus.python.component import Component
 
 
 class MotionPlanner(Component[PlannerState, Nothing, Outputs, Parameters]):

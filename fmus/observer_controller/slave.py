@@ -9,7 +9,7 @@ from fmus.observer_controller import behaviour
 from fmus.observer_controller.behaviour import RESTARTED, Outputs
 from fmus.observer_controller.ports import DESCRIPTION, PARAMETERS, PORTS
 from fmus.ports.controllers import GROUP_OF
-from fmus.slave.component import Component
+from fmus.python.component import Component
 
 
 class ObserverController(Component[ControllerState, Measurement, Outputs, Gains]):

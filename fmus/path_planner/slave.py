@@ -7,7 +7,7 @@ from fmus.path_planner import behaviour
 from fmus.path_planner.behaviour import Outputs
 from fmus.path_planner.ports import DESCRIPTION, PARAMETERS, PORTS
 from fmus.ports.groups import Nothing
-from fmus.slave.component import Component
+from fmus.python.component import Component
 
 
 class PathPlanner(Component[PathState, Nothing, Outputs, Parameters]):

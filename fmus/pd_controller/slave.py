@@ -7,7 +7,7 @@ from fmus.pd_controller import behaviour
 from fmus.pd_controller.behaviour import Outputs, PdState
 from fmus.pd_controller.ports import DESCRIPTION, PARAMETERS, PORTS
 from fmus.ports.controllers import GROUP_OF
-from fmus.slave.component import Component
+from fmus.python.component import Component
 
 
 class PdController(Component[PdState, PdMeasurement, Outputs, PdGains]):

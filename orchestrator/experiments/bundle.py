@@ -87,7 +87,7 @@ def build(
         options = ["--kind", kind, "--fmi", fmi]
         options += ["--loader", loader] if loader is not None else []
         options += ["--platforms", platforms] if platforms is not None else []
-        run_fmus("packaging.build", unfinished, *options)
+        run_fmus("build", unfinished, *options)
         archive = unfinished / ARCHIVE
         archive.write_bytes(ssp_bytes(closed_loop(unfinished, versions=WRITABLE)))
         files = [*sorted(unfinished.glob("*.fmu")), archive]
@@ -165,7 +165,7 @@ def _kept(key: str) -> Path | None:
 def _built(key: str, *options: str) -> Path:
     """Build FMUs, and keep them."""
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
-        run_fmus("packaging.build", Path(temporary), *options)
+        run_fmus("build", Path(temporary), *options)
         files = {path.name: path.read_bytes() for path in sorted(Path(temporary).iterdir())}
     return keep(_KIND, key, files)[0].parent
 

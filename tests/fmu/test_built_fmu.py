@@ -242,7 +242,7 @@ def test_process_with_an_instance_ends_in_peace(dist: Path, tmp_path: Path):
 def build(folder: Path, packages: Path) -> None:
     """Build all FMUs from the sources in a folder, in a process of its own."""
     subprocess.run(
-        [sys.executable, "-m", "fmus.packaging.build", "--out", str(folder)],
+        [sys.executable, "-m", "fmus.build", "--out", str(folder)],
         env={"PYTHONPATH": str(packages), "PYTHONHASHSEED": "random", "PATH": os.environ["PATH"]},
         check=True,
         capture_output=True,

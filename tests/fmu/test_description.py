@@ -17,7 +17,7 @@ from fmpy.model_description import ModelDescription
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-from fmus.packaging.discovery import components, package_folder
+from fmus.discovery import components, package_folder
 from fmus.ports.description_fmi2 import fmi2_description
 from fmus.ports.description_fmi3 import fmi3_build_description, fmi3_description
 from fmus.ports.quantities import group_name

@@ -11,8 +11,8 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.packaging.loader import FLAGS, FOLDER, compiler
-from fmus.packaging.own import build_own
+from fmus.python.loader import FLAGS, FOLDER, compiler
+from fmus.python.own import build_own
 from orchestrator.experiments import bundle
 from support.instances import NAMES
 

@@ -15,8 +15,8 @@ import fmpy
 import numpy as np
 import pytest
 
-from fmus.packaging.compilers import FLAGS
-from fmus.packaging.platforms import TARGETS
+from fmus.compilers import FLAGS
+from fmus.platforms import TARGETS
 from orchestrator.exchange import c_host
 from orchestrator.exchange.verify import verify
 from orchestrator.experiments import bundle

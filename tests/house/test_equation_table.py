@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import auv_fmu
-from fmus.packaging.discovery import components
+from fmus.discovery import components
 
 TESTS = Path(__file__).parents[1]
 PAGE = (TESTS.parent / "docs" / "equations.md").read_text(encoding="utf-8")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.packaging.discovery import components
+from fmus.discovery import components
 
 ROOT = Path(__file__).parents[2]
 
@@ -22,7 +22,10 @@ FLOORS = {
         "errors", "findings", "reading", "system", "master", "analysis", "experiments", "exchange",
         "studies", "paper", "commands",
     ),
-    "fmus": ("ports", "slave", "native", "components", "packaging"),
+    "fmus": (
+        "ports", "kinds", "discovery", "documentation", "platforms", "universal", "python",
+        "compilers", "native", "components", "build",
+    ),
 }  # fmt: skip
 
 #: What a package may import besides itself and the standard library.

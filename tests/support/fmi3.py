@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 import fmpy
 
-from fmus.packaging.kinds import NATIVE
+from fmus.kinds import NATIVE
 from support.cells import Company, check
 from support.raw import Description, Host, Library, Status, Variable, instance
 from support.raw_fmi import MODEL_EXCHANGE

@@ -13,9 +13,9 @@ import fmpy
 from fmpy.fmi2 import FMU2Slave
 from pythonfmu.enums import Fmi2Status
 
-from fmus.packaging.discovery import components
-from fmus.slave.callbacks import ANSWER
-from fmus.slave.component import Component
+from fmus.discovery import components
+from fmus.python.callbacks import ANSWER
+from fmus.python.component import Component
 
 #: Names of all components, and of those with inputs.
 NAMES = [*components()]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fmus.packaging.kinds import NATIVE, PYTHON
+from fmus.kinds import NATIVE, PYTHON
 from orchestrator.errors import InputError
 from orchestrator.experiments.scenario import read_scenario
 from orchestrator.experiments.wiring import closed_loop

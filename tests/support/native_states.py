@@ -9,7 +9,7 @@ from functools import cache
 from importlib import import_module
 from typing import Any, NamedTuple
 
-from fmus.packaging.discovery import components
+from fmus.discovery import components
 from fmus.ports.port import Port
 from support.status_table import MODES
 

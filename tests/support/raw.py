@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from fmus.packaging.kinds import NATIVE, PYTHON
+from fmus.kinds import NATIVE, PYTHON
 from support.raw_fmi import CO_SIMULATION, Callbacks, Logger
 
 

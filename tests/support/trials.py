@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from fmus.packaging.kinds import PYTHON
+from fmus.kinds import PYTHON
 from support.calls import MANY, MODEL_EXCHANGE_FUNCTIONS
 from support.cells import Company, check
 from support.raw import Host, Library, Status, instance

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
-from fmus.packaging.discovery import components
-from fmus.slave.callbacks import explained
+from fmus.discovery import components
+from fmus.python.callbacks import explained
 from support.equations import WHY, bits, equations, filled, flat, structure
 
 PACKAGES = [module.removesuffix(".slave") for module in components().values()]

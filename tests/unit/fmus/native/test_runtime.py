@@ -15,8 +15,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from fmus.discovery import components
 from fmus.native import VERSIONS, sources
-from fmus.packaging.discovery import components
 
 COMPILERS = [command for command in ("gcc", "clang") if shutil.which(command)]
 

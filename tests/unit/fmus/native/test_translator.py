@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from fmus.discovery import components
 from fmus.native.shapes import plain
 from fmus.native.translator import translated
-from fmus.packaging.discovery import components
 from support.equations import FLAGS, ROOT, RUNTIME
 
 PACKAGES = [module.removesuffix(".slave") for module in components().values()]

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pythonfmu.enums import Fmi2Status
 
-from fmus.slave.state import Snapshot, nearly_equal
+from fmus.python.state import Snapshot, nearly_equal
 from support.instances import NAMES, WITH_INPUTS, ClassInstance
 
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from fmus.packaging.loader import machines_compiler, run_compiler
-from fmus.packaging.platforms import TARGETS, Platform, this_machine
-from fmus.packaging.universal import universal
+from fmus.platforms import TARGETS, Platform, this_machine
+from fmus.python.loader import machines_compiler, run_compiler
+from fmus.universal import universal
 
 #: How sources are compiled. Contracted or reordered operations would change numbers.
 FLAGS = (

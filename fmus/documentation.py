@@ -1,6 +1,6 @@
 """Pages of the components, from their `page.md` and their declared ports.
 
-`python -m fmus.packaging.documentation --out DIR` writes them as Markdown for the repository; the
+`python -m fmus.documentation --out DIR` writes them as Markdown for the repository; the
 build puts the same text as HTML into each FMU.
 """
 
@@ -16,8 +16,8 @@ from string import Template
 
 from markdown_it import MarkdownIt
 
-from fmus.packaging.discovery import components, folder_of
-from fmus.packaging.kinds import NATIVE, PYTHON
+from fmus.discovery import components, folder_of
+from fmus.kinds import NATIVE, PYTHON
 from fmus.ports.description_fmi3 import KINDS
 from fmus.ports.port import FAULT, Port
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.packaging.documentation import page
+from fmus.documentation import page
 from support.instances import NAMES
 
 PAGES = Path(__file__).parents[4] / "docs" / "components"

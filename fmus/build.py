@@ -1,4 +1,4 @@
-"""Build the FMU of every component folder: `python -m fmus.packaging.build --out DIR`.
+"""Build the FMU of every component folder: `python -m fmus.build --out DIR`.
 
 Runs in a process of its own, because PythonFMU imports what it builds. Writes a file only if
 the sources have changed since it was written.
@@ -15,13 +15,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from fmus.packaging import documentation
-from fmus.packaging.compilers import compiler_for
-from fmus.packaging.discovery import components, package_folder
-from fmus.packaging.kinds import KINDS, PYTHON, Kind
-from fmus.packaging.native import NativeKind
-from fmus.packaging.platforms import VERSIONS, platforms
-from fmus.packaging.python import LOADERS, PythonKind, best_loader
+from fmus import documentation
+from fmus.compilers import compiler_for
+from fmus.discovery import components, package_folder
+from fmus.kinds import KINDS, PYTHON, Kind
+from fmus.native.packaging import NativeKind
+from fmus.platforms import VERSIONS, platforms
+from fmus.python.packaging import LOADERS, PythonKind, best_loader
 
 #: What a folder of built FMUs was built from, and what was built.
 MANIFEST = "build.json"
@@ -94,7 +94,7 @@ def chosen_loader(destination: Path, wanted: str | None) -> str:
 
 def main() -> int:
     """Command line of the module."""
-    parser = argparse.ArgumentParser(prog="python -m fmus.packaging.build", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m fmus.build", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("fmus", "dist"), help="folder to write")
     parser.add_argument("--kind", choices=KINDS, default=KINDS[0])
     parser.add_argument("--loader", choices=LOADERS, help="default: native if it can")

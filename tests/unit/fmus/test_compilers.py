@@ -7,9 +7,10 @@ from importlib.util import find_spec
 
 import pytest
 
-from fmus.packaging import compilers, loader
-from fmus.packaging.compilers import compiler_for, library
-from fmus.packaging.platforms import platforms
+from fmus import compilers
+from fmus.compilers import compiler_for, library
+from fmus.platforms import platforms
+from fmus.python import loader
 from orchestrator.master.library import COMPILERS, machines_compiler
 
 OWN = "/usr/bin/own-cc"

@@ -10,9 +10,9 @@ from math import isclose
 from typing import Any, TypedDict
 
 from fmus.ports.port import Refusal, Value
-from fmus.slave.callbacks import INSTANTIATED, MODES, STEPPING
-from fmus.slave.shape import frozen, restored
-from fmus.slave.store import Store
+from fmus.python.callbacks import INSTANTIATED, MODES, STEPPING
+from fmus.python.shape import frozen, restored
+from fmus.python.store import Store
 
 
 class Snapshot(TypedDict):

@@ -9,7 +9,7 @@ from typing import NamedTuple, Union
 import pytest
 
 from fmus.ports.port import Refusal
-from fmus.slave.shape import measuring, restored
+from fmus.python.shape import measuring, restored
 
 
 class Pair(NamedTuple):

@@ -10,7 +10,7 @@ import pytest
 
 import auv_fmu
 import fmus
-from fmus.packaging import build
+from fmus import build
 from support.instances import NAMES
 
 

@@ -9,15 +9,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
-from fmus import native
-from fmus.packaging import documentation
-from fmus.packaging.compilers import Compiler, library
-from fmus.packaging.kinds import NATIVE
-from fmus.packaging.platforms import Platform
-from fmus.packaging.sealing import digest_of, guid_of, write_archive
+from fmus import documentation, native
+from fmus.compilers import Compiler, library
+from fmus.kinds import NATIVE
+from fmus.platforms import Platform
 from fmus.ports import description_fmi2, description_fmi3
 from fmus.ports.port import Port
 from fmus.ports.terminals import terminals_and_icons
+from fmus.python.sealing import digest_of, guid_of, write_archive
 
 Ports = Sequence[Port]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.packaging.loader.preflight import refusal
+from fmus.python.loader.preflight import refusal
 
 SCRIPT = "preflighted"
 SLAVE = "class Fmi2Slave: pass\nclass Slave(Fmi2Slave): pass\n"

@@ -17,9 +17,9 @@ from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
 from fmus.ports.port import Port, Refusal, Value
-from fmus.slave.loading import ANSWER, has_loader
-from fmus.slave.scripts import place
-from fmus.slave.store import MISSING, Store
+from fmus.python.loading import ANSWER, has_loader
+from fmus.python.scripts import place
+from fmus.python.store import MISSING, Store
 
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = MODES = (
     "instantiated",
@@ -36,7 +36,7 @@ LONGEST_MESSAGE = 500
 
 
 class Callbacks(Fmi2Slave):  # type: ignore[misc]
-    """A slave whose values lie in a :class:`~fmus.slave.store.Store`."""
+    """A slave whose values lie in a :class:`~fmus.python.store.Store`."""
 
     #: Ports without `fault`, inputs first, then outputs, then parameters.
     ports: ClassVar[tuple[Port, ...]]

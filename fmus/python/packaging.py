@@ -11,16 +11,16 @@ from pathlib import Path
 
 import pythonfmu
 
-from fmus.packaging import documentation
-from fmus.packaging.discovery import package_folder
-from fmus.packaging.kinds import PYTHON
-from fmus.packaging.loader import compiler, with_loader
-from fmus.packaging.sealing import seal
+from fmus import documentation
+from fmus.discovery import package_folder
+from fmus.kinds import PYTHON
+from fmus.python.loader import compiler, with_loader
+from fmus.python.sealing import seal
 
 _FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
 
 _SCRIPT = """\
-from fmus.slave.loading import settle
+from fmus.python.loading import settle
 from {module} import {component}
 
 settle({component}, globals(), locals())
@@ -28,8 +28,8 @@ settle({component}, globals(), locals())
 
 #: The same for a user's slave, which may raise.
 _OWN_SCRIPT = """\
-from fmus.slave.loading import settle
-from fmus.slave.scripts import caught
+from fmus.python.loading import settle
+from fmus.python.scripts import caught
 from {module} import {component}
 
 settle(caught({component}), globals(), locals())

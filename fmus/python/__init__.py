@@ -1,4 +1,4 @@
-"""The Python kind of component: what PythonFMU leaves to a slave, done once.
+"""The Python kind of FMU: what PythonFMU leaves to a slave, done once, and its packaging.
 
 ==================== ===============================================================
 module               what it states
@@ -10,5 +10,9 @@ module               what it states
 :mod:`.shape`        the shape of a component's own state, as its type says it
 :mod:`.loading`      making up for what PythonFMU does to a process
 :mod:`.scripts`      mistakes in a user's script: told with their line, kept from PythonFMU
+:mod:`.packaging`    an FMU that holds Python sources and has PythonFMU run them
+:mod:`.sealing`      reproducible archives that are alone in their process
+:mod:`.own`          the FMU of a script of the user's own
+:mod:`.loader`       the library that lets an FMU run where there is no Python
 ==================== ===============================================================
 """

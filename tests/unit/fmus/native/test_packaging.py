@@ -7,11 +7,11 @@ from xml.etree import ElementTree
 import pytest
 
 from fmus import native
-from fmus.packaging import native as packaging
-from fmus.packaging.compilers import Compiler
-from fmus.packaging.discovery import components
-from fmus.packaging.native import fmu_entries
-from fmus.packaging.platforms import platforms
+from fmus.compilers import Compiler
+from fmus.discovery import components
+from fmus.native import packaging
+from fmus.native.packaging import fmu_entries
+from fmus.platforms import platforms
 from support.instances import NAMES
 
 ANY = Compiler("any", ["any"], targets={})

@@ -24,7 +24,7 @@ from fmus.ports.description import ABOUT, EXPERIMENT
 from fmus.ports.description_fmi2 import complete
 from fmus.ports.groups import ParameterSet, packing, slices, unpacking
 from fmus.ports.port import H_MAX, Refusal, Value
-from fmus.slave.callbacks import (
+from fmus.python.callbacks import (
     INITIALISING,
     INSTANTIATED,
     STEPPING,
@@ -32,8 +32,8 @@ from fmus.slave.callbacks import (
     Callbacks,
     explained,
 )
-from fmus.slave.shape import measuring
-from fmus.slave.state import Snapshot, checked, from_bytes, nearly_equal, to_bytes, unusable
+from fmus.python.shape import measuring
+from fmus.python.state import Snapshot, checked, from_bytes, nearly_equal, to_bytes, unusable
 
 #: Longest step of a component that has no internal steps [s].
 _NO_LIMIT = 1e300

@@ -1,4 +1,4 @@
-"""A component of the user's own as an FMU: `python -m fmus.packaging.own SCRIPT --out DIR`.
+"""A component of the user's own as an FMU: `python -m fmus.python.own SCRIPT --out DIR`.
 
 The script holds a slave of PythonFMU, plain or on the base of this package. Its FMU is sealed like
 those of the bundle: built again after a change, it runs the changed code in the same process, and
@@ -14,8 +14,8 @@ from pathlib import Path
 
 from pythonfmu.builder import get_model_class
 
-from fmus.packaging.python import LOADERS, best_loader, fmu_entries
-from fmus.packaging.sealing import seal
+from fmus.python.packaging import LOADERS, best_loader, fmu_entries
+from fmus.python.sealing import seal
 
 
 def build_own(script: Path, destination: Path, loader: str | None = None) -> Path:
@@ -41,7 +41,7 @@ def build_own(script: Path, destination: Path, loader: str | None = None) -> Pat
 
 def main() -> int:
     """Command line of the module."""
-    parser = argparse.ArgumentParser(prog="python -m fmus.packaging.own", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m fmus.python.own", description=__doc__)
     parser.add_argument("script", type=Path)
     parser.add_argument("--out", type=Path, required=True, help="folder to write into")
     parser.add_argument("--loader", choices=LOADERS, help="default: native if it can")

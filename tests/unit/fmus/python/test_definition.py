@@ -10,8 +10,8 @@ from pythonfmu.enums import Fmi2Status
 
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, Port, Refusal, inputs, outputs, parameter
-from fmus.slave import callbacks, component
-from fmus.slave.component import Component
+from fmus.python import callbacks, component
+from fmus.python.component import Component
 from support.instances import answers_of, messages_of
 
 GAIN = parameter("gain", 1.0, "1", "Gain", 0.0, tunable=True)

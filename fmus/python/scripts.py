@@ -14,8 +14,8 @@ from typing import Any, Callable, TypeVar
 
 from pythonfmu.enums import Fmi2Status
 
-from fmus.slave.loading import ANSWER, has_loader
-from fmus.slave.store import MISSING
+from fmus.python.loading import ANSWER, has_loader
+from fmus.python.store import MISSING
 
 Slave = TypeVar("Slave", bound=type)
 
