@@ -57,10 +57,10 @@ def build(destination: Path, kind: Kind) -> list[Path]:
     current = {key: before.get(key) for key in made_from} == made_from
     digests = before["sha256"] if current else {}
     written = []
-    for component, module in components().items():
+    for component, package in components().items():
         path = destination / f"{component}.fmu"
         if not path.is_file() or digests.get(path.name) != _digest(path):
-            kind.write(component, module, path)
+            kind.write(component, package, path)
             digests[path.name] = _digest(path)
             written.append(path)
     if written:

@@ -1,9 +1,12 @@
-"""Which components there are: every folder with a slave."""
+"""Which components there are: every folder that declares ports."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
+
+from fmus.ports.port import Port
 
 
 def package_folder(package: str) -> Path:
@@ -13,15 +16,16 @@ def package_folder(package: str) -> Path:
 
 
 def components() -> dict[str, str]:
-    """Class name of every component and the module of its slave: one a folder."""
+    """The name of every component, and the package that its folder is."""
     return {
-        "".join(word.capitalize() for word in slave.parent.name.split("_")): (
-            f"fmus.{slave.parent.name}.slave"
+        "".join(word.capitalize() for word in ports.parent.name.split("_")): (
+            f"fmus.{ports.parent.name}"
         )
-        for slave in sorted(package_folder("fmus").glob("*/slave.py"))
+        for ports in sorted(package_folder("fmus").glob("*/ports.py"))
     }
 
 
-def folder_of(module: str) -> Path:
-    """The folder of a component, from the module of its slave."""
-    return package_folder("fmus") / module.split(".")[1]
+def ports_of(name: str) -> Sequence[Port]:
+    """The ports of a component, all but `fault`."""
+    ports: Sequence[Port] = import_module(f"{components()[name]}.ports").PORTS
+    return ports

@@ -9,14 +9,13 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from importlib import import_module
 from importlib.metadata import distribution
 from pathlib import Path
 from string import Template
 
 from markdown_it import MarkdownIt
 
-from fmus.discovery import components, folder_of
+from fmus.discovery import components, package_folder, ports_of
 from fmus.kinds import NATIVE, PYTHON
 from fmus.ports.description_fmi3 import KINDS
 from fmus.ports.port import FAULT, Port
@@ -72,9 +71,8 @@ A step longer than `h_max`, where there is such a parameter, is split evenly wit
 
 def page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
     """The page of a component in Markdown: what it is, its ports, what it refuses, an example."""
-    module = components()[name]
-    text = (folder_of(module) / "page.md").read_text(encoding="utf-8").strip()
-    ports: Sequence[Port] = (*import_module(module.replace(".slave", ".ports")).PORTS, FAULT)
+    text = (package_folder(components()[name]) / "page.md").read_text(encoding="utf-8").strip()
+    ports = (*ports_of(name), FAULT)
     refusals = _REFUSALS
     if fmi == "3":
         refusals = refusals.replace("fmi2GetReal", "fmi3GetFloat64").replace("fmi2", "fmi3")

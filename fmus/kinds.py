@@ -21,8 +21,8 @@ class Kind(Protocol):
     def settings(self) -> Mapping[str, str]:
         """What they depend on besides their sources."""
 
-    def write(self, component: str, module: str, path: Path) -> None:
-        """Write the FMU of a component.
+    def write(self, component: str, package: str, path: Path) -> None:
+        """Write the FMU of a component, whose folder is a package.
 
         Raises:
             OSError: it cannot be built or written.

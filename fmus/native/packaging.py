@@ -70,7 +70,7 @@ _IDENTITY = """\
 
 
 def fmu_entries(
-    component: str, module: str, fmi: str, platforms: Sequence[Platform], compiler: Compiler
+    component: str, package: str, fmi: str, platforms: Sequence[Platform], compiler: Compiler
 ) -> dict[str, bytes]:
     """The contents of an FMU.
 
@@ -78,7 +78,7 @@ def fmu_entries(
 
     Args:
         component: its name, and that of its libraries.
-        module: of its slave, in the same folder as its ports.
+        package: that its folder is.
         fmi: version.
         platforms: that it has libraries for.
         compiler: that makes them.
@@ -87,7 +87,6 @@ def fmu_entries(
         OSError: the compiler fails.
 
     """
-    package = module.rpartition(".")[0]
     declared = import_module(f"{package}.ports")
     version = _VERSIONS[fmi]
     written = native.sources(package, int(fmi))
@@ -134,12 +133,12 @@ class NativeKind:
             "compiler": self.compiler.name,
         }
 
-    def write(self, component: str, module: str, path: Path) -> None:
-        """Write the FMU of a component.
+    def write(self, component: str, package: str, path: Path) -> None:
+        """Write the FMU of a component, whose folder is a package.
 
         Raises:
             OSError: the compiler fails, or the file cannot be written.
 
         """
-        entries = fmu_entries(component, module, self.fmi, self.platforms, self.compiler)
+        entries = fmu_entries(component, package, self.fmi, self.platforms, self.compiler)
         write_archive(path, entries, zipfile.ZIP_DEFLATED)

@@ -4,6 +4,7 @@
 module               what it states
 ==================== ===============================================================
 :mod:`.component`    the base of all components: what one implements, and its steps
+:mod:`.slave`        the slave of a component, made from its ports and its behaviour
 :mod:`.callbacks`    values, faults and messages, as PythonFMU passes them
 :mod:`.store`        the values of one instance, by value reference
 :mod:`.state`        the state of an FMU, complete, exact and checked

@@ -44,6 +44,11 @@ Outputs = TypeVar("Outputs")
 Parameters = TypeVar("Parameters")
 
 
+def _class_of(base: Any) -> Any:
+    """The class that a base is, with types in brackets or without."""
+    return get_origin(base) or base
+
+
 class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
     """Base of all components.
 
@@ -110,8 +115,10 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
     def __init_subclass__(cls, **kwargs: Any) -> None:
         """Hold the types of the component against its ports."""
         super().__init_subclass__(**kwargs)
-        [types] = [get_args(b) for b in cls.__orig_bases__ if get_origin(b) is Component]
+        [types] = [get_args(b) for b in cls.__orig_bases__ if issubclass(_class_of(b), Component)]
         cls._state_type, inputs, outputs, _ = types
+        if isinstance(inputs, TypeVar):
+            return  # a base of components, which has no ports yet
         ports = {
             causality: [port for port in cls.ports if port.causality == causality]
             for causality in ("input", "output", "parameter")

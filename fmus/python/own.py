@@ -17,6 +17,15 @@ from pythonfmu.builder import get_model_class
 from fmus.python.packaging import LOADERS, best_loader, fmu_entries
 from fmus.python.sealing import seal
 
+#: The script of the FMU, with a slave that may raise.
+_SCRIPT = """\
+from fmus.python.loading import settle
+from fmus.python.scripts import caught
+from {module} import {component}
+
+settle(caught({component}), globals(), locals())
+"""
+
 
 def build_own(script: Path, destination: Path, loader: str | None = None) -> Path:
     """Build the FMU of a script.
@@ -33,7 +42,8 @@ def build_own(script: Path, destination: Path, loader: str | None = None) -> Pat
     own = script.resolve().parent
     sys.path.insert(0, str(own))
     component = get_model_class(script).__name__
-    entries = fmu_entries(component, script.stem, loader or best_loader(), f"{component}_fmu", own)
+    text = _SCRIPT.format(module=script.stem, component=component)
+    entries = fmu_entries(f"{component}_fmu", text, loader or best_loader(), own)
     path = destination / f"{component}.fmu"
     seal(entries, path)
     return path

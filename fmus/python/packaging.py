@@ -19,31 +19,24 @@ from fmus.python.sealing import seal
 
 _FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
 
+#: The script of a component.
 _SCRIPT = """\
+from {package} import behaviour, ports
 from fmus.python.loading import settle
-from {module} import {component}
+from fmus.python.slave import slave_of
 
+{component} = slave_of("{component}", ports, behaviour)
 settle({component}, globals(), locals())
-"""
-
-#: The same for a user's slave, which may raise.
-_OWN_SCRIPT = """\
-from fmus.python.loading import settle
-from fmus.python.scripts import caught
-from {module} import {component}
-
-settle(caught({component}), globals(), locals())
 """
 
 #: How FMUs are loaded: by a library of our own, or by PythonFMU's.
 LOADERS = ("native", "plain")
 
 
-def _stage(component: str, module: str, stage: Path, script: str, own: Path | None) -> Path:
+def _stage(text: str, stage: Path, script: str, own: Path | None) -> Path:
     """Lay out a script and the modules it needs the way PythonFMU wants them."""
     path = stage / f"{script}.py"
-    text = _SCRIPT if own is None else _OWN_SCRIPT
-    path.write_text(text.format(module=module, component=component), encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
     roots = [folder.parent for folder in _FOLDERS.values()]
     finder = ModuleFinder(path=[str(root) for root in (*roots, *([own] if own else []))])
     finder.run_script(str(path))
@@ -66,16 +59,13 @@ def _lies_in(folder: Path, source: Path, top: str) -> bool:
     return folder in source.parents and source.relative_to(folder).parts[0] in (top, f"{top}.py")
 
 
-def fmu_entries(
-    component: str, module: str, loader: str, script: str, own: Path | None = None
-) -> dict[str, bytes]:
+def fmu_entries(script: str, text: str, loader: str, own: Path | None = None) -> dict[str, bytes]:
     """The contents of an FMU, before it is sealed.
 
     Args:
-        component: class of its slave.
-        module: that the class is imported from.
+        script: name of the FMU's script.
+        text: of the script, which settles a slave (:mod:`fmus.python.loading`).
         loader: `native` or `plain`.
-        script: name of the FMU's own script.
         own: folder of modules that go into the FMU beside those of this package; None: none.
 
     Raises:
@@ -85,7 +75,7 @@ def fmu_entries(
     with tempfile.TemporaryDirectory(prefix="auv_fmu_build_") as temporary:
         stage, built = Path(temporary, "stage"), Path(temporary, "built")
         stage.mkdir()
-        path = _stage(component, module, stage, script, own)
+        path = _stage(text, stage, script, own)
         raw = pythonfmu.FmuBuilder.build_FMU(
             path, dest=built, project_files=set(stage.iterdir()) - {path}
         )
@@ -113,14 +103,15 @@ class PythonKind:
         """What the FMUs depend on besides their sources."""
         return {"kind": PYTHON, "loader": self.loader}
 
-    def write(self, component: str, module: str, path: Path) -> None:
-        """Write the FMU of a component.
+    def write(self, component: str, package: str, path: Path) -> None:
+        """Write the FMU of a component, whose folder is a package.
 
         Raises:
             OSError: the loader cannot be compiled, or the file cannot be written.
 
         """
-        entries = fmu_entries(component, module, self.loader, script=component)
+        text = _SCRIPT.format(package=package, component=component)
+        entries = fmu_entries(component, text, self.loader)
         page = documentation.html(component, PYTHON)
         entries["documentation/index.html"] = page.encode()
         seal(entries, path)

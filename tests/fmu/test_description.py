@@ -41,7 +41,7 @@ ITS_OWN = {"instantiationToken", "generationTool", "buildConfigurations"}
 
 def declared(name: str) -> ModuleType:
     """The ports of a component, and what it is."""
-    return import_module(components()[name].replace(".slave", ".ports"))
+    return import_module(f"{components()[name]}.ports")
 
 
 def everything(description: ModelDescription) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.discovery import components
+from fmus.discovery import components, ports_of
 
 ROOT = Path(__file__).parents[2]
 
@@ -109,11 +109,7 @@ def test_the_general_half_does_not_import_the_mathematics():
 
 def ports() -> set[str]:
     """Names of all ports and of their groups."""
-    found = {
-        port.name
-        for module in components().values()
-        for port in import_module(module.replace(".slave", ".ports")).PORTS
-    }
+    found = {port.name for component in components() for port in ports_of(component)}
     return found | {re.split(r"[.\[]", name)[0] for name in found}
 
 

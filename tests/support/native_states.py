@@ -6,10 +6,9 @@ import struct
 from binascii import crc32
 from collections.abc import Sequence
 from functools import cache
-from importlib import import_module
 from typing import Any, NamedTuple
 
-from fmus.discovery import components
+from fmus.discovery import ports_of
 from fmus.ports.port import Port
 from support.status_table import MODES
 
@@ -52,7 +51,7 @@ class _Layout(NamedTuple):
 
 @cache
 def _layout(name: str) -> _Layout:
-    ports: Sequence[Port] = import_module(f"{components()[name].rpartition('.')[0]}.ports").PORTS
+    ports: Sequence[Port] = ports_of(name)
     of = {
         causality: [port for port in ports if port.causality == causality]
         for causality in ("input", "output", "parameter")

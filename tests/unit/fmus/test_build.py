@@ -43,7 +43,7 @@ def test_fmu_contains_what_runs_in_it_and_no_more(dist: Path, name: str):
         if part[0] == "resources" and len(part) > 2 and not part[1].startswith("pythonfmu_")
     }
     components = {folder for package, folder in ours if package == "fmus"}
-    assert len(components - {"__init__.py", "ports", "slave"}) == 1
+    assert len(components - {"__init__.py", "ports", "python"}) == 1
     assert {package for package, _ in ours} == {"auv_fmu", "fmus"}
     assert ("auv_fmu", "proof") not in ours
 

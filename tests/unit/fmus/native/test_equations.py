@@ -15,7 +15,7 @@ from fmus.discovery import components
 from fmus.python.callbacks import explained
 from support.equations import WHY, bits, equations, filled, flat, structure
 
-PACKAGES = [module.removesuffix(".slave") for module in components().values()]
+PACKAGES = [*components().values()]
 
 #: Where equations live, and where they overflow.
 MAGNITUDES = (1e-3, 1.0, 1.0, 1.0, 10.0, 1e9, 1e100, 1e160, 1e308)

@@ -22,7 +22,7 @@ COMPILERS = [command for command in ("gcc", "clang") if shutil.which(command)]
 
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
 
-PACKAGES = {name: module.rpartition(".")[0] for name, module in components().items()}
+PACKAGES = components()
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-ffp-contract=off")
 

@@ -67,7 +67,7 @@ REASONS = {
     "state refused: the bytes are not those of a state": from_bytes(b"[1]"),
     "state refused: the bytes are not those of a state ": from_bytes(b"\xff"),
     "state refused: the bytes were changed since they were written": from_bytes(b"{}"),
-    "state refused: not a state of fmus.disturbance_generator.slave.DisturbanceGenerator": (
+    "state refused: not a state of fmus.disturbance_generator.DisturbanceGenerator": (
         from_json(identity="another")
     ),
     "state refused: it has other parts": from_json(more=1),

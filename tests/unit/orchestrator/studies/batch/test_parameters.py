@@ -14,7 +14,7 @@ from orchestrator.system.names import port_name
 
 #: Of all components but those that the batch engine refuses: it runs the paper's loop alone.
 PORTS = {
-    name: import_module(module.replace(".slave", ".ports"))
+    name: import_module(f"{module}.ports")
     for name, module in components().items()
     if name != "PathPlanner"
 }
