@@ -29,9 +29,9 @@ from typing import Any
 
 import fmpy
 
+from fmus.kinds import NATIVE
 from orchestrator.errors import InputError
 from orchestrator.experiments import bundle
-from orchestrator.experiments.bundle import NATIVE
 from orchestrator.experiments.preparation import Request, prepare
 from orchestrator.experiments.scenario import Scenario
 from orchestrator.master.loop import chosen

@@ -21,11 +21,11 @@ from typing import Any
 from memory import resident
 
 from auv_fmu.euler import STEP
+from fmus.kinds import KINDS, NATIVE
 from orchestrator import load
 from orchestrator.analysis.certificates import CertificatesFile
 from orchestrator.analysis.metrics import Metrics
 from orchestrator.analysis.visible import VisibleRows
-from orchestrator.experiments.bundle import KINDS, NATIVE
 from orchestrator.master.attendant import NEVER, Attendant, Run
 from orchestrator.master.checkpoint import Checkpoints
 from orchestrator.master.experiment import Experiment

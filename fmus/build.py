@@ -10,34 +10,38 @@ import argparse
 import hashlib
 import json
 import sys
-from collections.abc import Sequence
-from importlib.metadata import version
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from fmus import documentation
 from fmus.compilers import compiler_for
-from fmus.discovery import components, package_folder
-from fmus.kinds import KINDS, PYTHON, Kind
+from fmus.discovery import components, fingerprint
+from fmus.kinds import FMI_VERSIONS, KINDS, PYTHON, platforms
 from fmus.native.packaging import NativeKind
-from fmus.platforms import VERSIONS, platforms
 from fmus.python.packaging import LOADERS, PythonKind, best_loader
 
 #: What a folder of built FMUs was built from, and what was built.
 MANIFEST = "build.json"
 
 
-def fingerprint(packages: Sequence[str]) -> str:
-    """Hash of everything in packages that a built FMU depends on."""
-    digest = hashlib.sha256()
-    for root in map(package_folder, packages):
-        for path in sorted(root.rglob("*")):
-            if path.suffix in (".py", ".md", ".html", ".png", ".c", ".h", ".so", ".dll"):
-                digest.update(f"{path.relative_to(root)}\0".encode())
-                digest.update(path.read_bytes())
-    for text in (documentation.licences(PYTHON), version("markdown-it-py")):
-        digest.update(text.encode())
-    return digest.hexdigest()
+class Kind(Protocol):
+    """How FMUs of one kind are built."""
+
+    @property
+    def name(self) -> str:
+        """One of :data:`fmus.kinds.KINDS`."""
+
+    @property
+    def settings(self) -> Mapping[str, str]:
+        """What they depend on besides their sources."""
+
+    def write(self, component: str, package: str, path: Path) -> None:
+        """Write the FMU of a component, whose folder is a package.
+
+        Raises:
+            OSError: it cannot be built or written.
+
+        """
 
 
 def build(destination: Path, kind: Kind) -> list[Path]:
@@ -52,7 +56,7 @@ def build(destination: Path, kind: Kind) -> list[Path]:
     """
     destination.mkdir(parents=True, exist_ok=True)
     manifest = destination / MANIFEST
-    made_from = {"fingerprint": fingerprint(kind.sources), "settings": dict(kind.settings)}
+    made_from = {"fingerprint": fingerprint(kind.name), "settings": dict(kind.settings)}
     before = built_before(manifest)
     current = {key: before.get(key) for key in made_from} == made_from
     digests = before["sha256"] if current else {}
@@ -87,7 +91,7 @@ def _digest(path: Path) -> str:
 def chosen_loader(destination: Path, wanted: str | None) -> str:
     """The loader that is wanted; None: what is there, else native where it can be compiled."""
     before = built_before(destination / MANIFEST)
-    there = before.get("fingerprint") == fingerprint(PythonKind.sources)
+    there = before.get("fingerprint") == fingerprint(PYTHON)
     kept = before["settings"].get("loader") if there else None
     return wanted or kept or best_loader()
 
@@ -98,7 +102,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("fmus", "dist"), help="folder to write")
     parser.add_argument("--kind", choices=KINDS, default=KINDS[0])
     parser.add_argument("--loader", choices=LOADERS, help="default: native if it can")
-    parser.add_argument("--fmi", choices=VERSIONS, default=VERSIONS[0])
+    parser.add_argument("--fmi", choices=FMI_VERSIONS, default=FMI_VERSIONS[0])
     parser.add_argument("--platforms", metavar="NAME,...|all", help="default: this machine")
     options = parser.parse_args()
     try:
@@ -119,7 +123,7 @@ def _kind(options: argparse.Namespace) -> Kind:
 
     """
     if options.kind == PYTHON:
-        if options.platforms is not None or options.fmi != VERSIONS[0]:
+        if options.platforms is not None or options.fmi != FMI_VERSIONS[0]:
             raise ValueError("--platforms and --fmi 3 need --kind native")
         return PythonKind(chosen_loader(options.out, options.loader))
     if options.loader is not None:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import signal
+import struct
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
@@ -11,9 +15,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from fmus.platforms import TARGETS, Platform, this_machine
-from fmus.python.loader import machines_compiler, run_compiler
-from fmus.universal import universal
+from fmus.kinds import TARGETS, Platform, this_machine
+
+#: C compilers, the first of which is taken that there is. The orchestrator has the same.
+COMPILERS = ("cc", "gcc", "clang")
 
 #: How sources are compiled. Contracted or reordered operations would change numbers.
 FLAGS = (
@@ -35,6 +40,15 @@ _APPLE = {"x86_64-darwin": ("-arch", "x86_64"), "aarch64-darwin": ("-arch", "arm
 #: How long this machine's compiler may take [s], and ziglang, which makes a C library, too.
 _LIMIT, _LIMIT_OF_ZIG = 120.0, 900.0
 
+#: Universal binaries, as Apple calls libraries for several processors in one file.
+_MAGIC_FAT, _MAGIC_64 = 0xCAFEBABE, 0xFEEDFACF
+
+#: Each library begins at a multiple of the largest page, as a power of two.
+_ALIGNMENT = 14
+
+#: Heads of the file, of a library in it, and of a library.
+_FAT, _ENTRY, _THIN = struct.Struct(">2I"), struct.Struct(">5I"), struct.Struct("<3I")
+
 
 class Compiler(NamedTuple):
     """A C compiler.
@@ -51,6 +65,41 @@ class Compiler(NamedTuple):
     command: Sequence[str]
     targets: Mapping[str, Sequence[str]]
     limit: float = _LIMIT
+
+
+def machines_compiler() -> str | None:
+    """The C compiler of this machine, if it has one."""
+    return next(filter(None, map(shutil.which, COMPILERS)), None)
+
+
+def run_compiler(
+    command: Sequence[str], folder: Path | None, limit: float = 120.0
+) -> subprocess.CompletedProcess[str]:
+    """Run a C compiler, and end it with all that it has started if it takes too long.
+
+    Args:
+        command: with its arguments.
+        folder: that it runs in; None: the current one.
+        limit: how long it may take [s].
+
+    Raises:
+        OSError: it takes longer, or cannot be started.
+
+    """
+    with subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        errors="replace", start_new_session=True,
+    ) as process:  # fmt: skip
+        try:
+            said, complaints = process.communicate(timeout=limit)
+        except BaseException as error:
+            if os.name == "posix":
+                os.killpg(process.pid, signal.SIGKILL)
+            process.kill()
+            if isinstance(error, subprocess.TimeoutExpired):
+                raise TimeoutError(f"{command[0]} has not ended after {limit:g} s") from None
+            raise
+    return subprocess.CompletedProcess(command, process.returncode, said, complaints)
 
 
 def compiler_for(platforms: Sequence[Platform]) -> Compiler:
@@ -121,3 +170,26 @@ def _complaint(process: subprocess.CompletedProcess[str]) -> str:
     """The first thing that a compiler complains of."""
     lines = process.stderr.strip().splitlines() or [f"exit status {process.returncode}"]
     return next((line for line in lines if "error" in line), lines[0])
+
+
+def universal(libraries: Sequence[bytes]) -> bytes:
+    """One file of libraries for different processors.
+
+    Raises:
+        ValueError: one is no 64-bit Mach-O file.
+
+    """
+    head, body = _FAT.pack(_MAGIC_FAT, len(libraries)), b""
+    begin = _aligned(_FAT.size + len(libraries) * _ENTRY.size)
+    for library in libraries:
+        magic, processor, model = _THIN.unpack_from(library)
+        if magic != _MAGIC_64:
+            raise ValueError("not a 64-bit Mach-O file")
+        start = _aligned(begin + len(body))
+        head += _ENTRY.pack(processor, model, start, len(library), _ALIGNMENT)
+        body = body.ljust(start - begin, b"\0") + library
+    return head.ljust(begin, b"\0") + body
+
+
+def _aligned(offset: int) -> int:
+    return -(-offset >> _ALIGNMENT) << _ALIGNMENT

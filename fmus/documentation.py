@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from importlib.metadata import distribution
 from pathlib import Path
 from string import Template
 
@@ -144,18 +143,6 @@ def html(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
     body = body.replace("<table>", '<div class="table"><table>')
     body = body.replace("</table>", "</table></div>")
     return Template(_HTML.read_text(encoding="utf-8")).substitute(title=name, body=body)
-
-
-def licences(kind: str) -> str:
-    """Licence of the bundle, and of PythonFMU, if parts of it are in the FMU."""
-    texts = {
-        package: distribution(package).read_text("licenses/LICENSE") or ""
-        for package in ("auv-fmu", "pythonfmu")
-    }
-    ours = f"auv-fmu\n\n{texts['auv-fmu']}"
-    if kind == NATIVE:
-        return ours
-    return f"{ours}\n\nPythonFMU, contained in resources and binaries\n\n{texts['pythonfmu']}"
 
 
 def main() -> None:

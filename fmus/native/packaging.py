@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -10,13 +9,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fmus import documentation, native
+from fmus.archive import digest_of, guid_of, licences, write_archive
 from fmus.compilers import Compiler, library
-from fmus.kinds import NATIVE
-from fmus.platforms import Platform
+from fmus.kinds import NATIVE, Platform
 from fmus.ports import description_fmi2, description_fmi3
 from fmus.ports.port import Port
 from fmus.ports.terminals import terminals_and_icons
-from fmus.python.sealing import digest_of, guid_of, write_archive
 
 Ports = Sequence[Port]
 
@@ -42,19 +40,17 @@ class Version(NamedTuple):
 
     Attributes:
         describe: writes modelDescription.xml.
-        main: the one of the sources that is compiled.
         files: that an FMU of this version has besides, from its name and ports.
 
     """
 
     describe: Callable[[str, str, str, Ports], bytes]
-    main: str
     files: Callable[[str, Ports], dict[str, bytes]]
 
 
 _VERSIONS = {
-    "2": Version(description_fmi2.fmi2_description, description_fmi2.SOURCE, _fmi2_files),
-    "3": Version(description_fmi3.fmi3_description, description_fmi3.SOURCE, _fmi3_files),
+    "2": Version(description_fmi2.fmi2_description, _fmi2_files),
+    "3": Version(description_fmi3.fmi3_description, _fmi3_files),
 }
 
 _IDENTITY = """\
@@ -89,7 +85,7 @@ def fmu_entries(
     """
     declared = import_module(f"{package}.ports")
     version = _VERSIONS[fmi]
-    written = native.sources(package, int(fmi))
+    written = native.sources(package, fmi)
     sources = {name: content.encode() for name, content in written.items()}
 
     def description(guid: str) -> bytes:
@@ -103,11 +99,11 @@ def fmu_entries(
         "modelDescription.xml": description(guid),
         **version.files(component, declared.PORTS),
         "documentation/index.html": page.encode(),
-        "documentation/licenses/license.txt": documentation.licences(NATIVE).encode(),
+        "documentation/licenses/license.txt": licences(NATIVE).encode(),
         **{f"sources/{name}": content for name, content in sources.items()},
         **{
             f"binaries/{platform.name}/{component}{platform.ending}": library(
-                compiler, platform, component, sources, version.main
+                compiler, platform, component, sources, native.MAIN[fmi]
             )
             for platform in platforms
         },
@@ -121,7 +117,7 @@ class NativeKind:
     fmi: str
     platforms: Sequence[Platform]
     compiler: Compiler
-    sources = ("auv_fmu", "fmus")
+    name = NATIVE
 
     @property
     def settings(self) -> dict[str, str]:
@@ -141,4 +137,4 @@ class NativeKind:
 
         """
         entries = fmu_entries(component, package, self.fmi, self.platforms, self.compiler)
-        write_archive(path, entries, zipfile.ZIP_DEFLATED)
+        write_archive(path, entries)

@@ -12,6 +12,7 @@ from pathlib import Path
 import pythonfmu
 
 from fmus import documentation
+from fmus.archive import licences
 from fmus.discovery import package_folder
 from fmus.kinds import PYTHON
 from fmus.python.loader import compiler, with_loader
@@ -82,7 +83,7 @@ def fmu_entries(script: str, text: str, loader: str, own: Path | None = None) ->
         with zipfile.ZipFile(raw) as archive:
             entries = {name: archive.read(name) for name in archive.namelist()}
     entries["model.png"] = documentation.ICON.read_bytes()
-    entries["documentation/licenses/license.txt"] = documentation.licences(PYTHON).encode()
+    entries["documentation/licenses/license.txt"] = licences(PYTHON).encode()
     return with_loader(entries) if loader == "native" else entries
 
 
@@ -96,7 +97,7 @@ class PythonKind:
     """The Python kind, with a loader."""
 
     loader: str
-    sources = ("auv_fmu", "fmus", "pythonfmu")
+    name = PYTHON
 
     @property
     def settings(self) -> dict[str, str]:

@@ -8,12 +8,10 @@ FMU's contents, and the FMU a GUID made from the same hash.
 
 from __future__ import annotations
 
-import hashlib
 import re
-import uuid
-import zipfile
-from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
+
+from fmus.archive import digest_of, guid_of, write_archive
 
 _RESOURCES = "resources/"
 _SLAVE_MODULE = "resources/slavemodule.txt"
@@ -25,39 +23,6 @@ _GUID = re.compile(rb'guid="[^"]*"')
 
 #: `import`, and the modules after it.
 _IMPORT = re.compile(r"^(\s*import\s+)([\w., \t]*\w)", re.MULTILINE)
-
-#: The oldest time a zip archive can hold: the time of a build is no part of its result.
-_EPOCH = (1980, 1, 1, 0, 0, 0)
-
-
-def write_archive(path: Path, entries: dict[str, bytes], compression: int) -> None:
-    """Write a zip archive whose bytes depend on nothing but its entries, all at once."""
-    partial = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-    try:
-        with zipfile.ZipFile(partial, "w") as archive:
-            for name in sorted(entries):
-                info = zipfile.ZipInfo(name, _EPOCH)
-                info.compress_type = compression
-                info.create_system = 3
-                info.external_attr = 0o644 << 16
-                archive.writestr(info, entries[name], compresslevel=9)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
-
-
-def digest_of(contents: Mapping[str, bytes]) -> bytes:
-    """What tells contents from all others."""
-    digest = hashlib.sha256()
-    for name in sorted(contents):
-        digest.update(f"{name}\0{len(contents[name])}\0".encode())
-        digest.update(contents[name])
-    return digest.digest()
-
-
-def guid_of(digest: bytes) -> str:
-    """A GUID made from a digest."""
-    return f"{{{uuid.UUID(bytes=digest[:16])}}}"
 
 
 def seal(entries: dict[str, bytes], destination: Path) -> None:
@@ -75,7 +40,7 @@ def seal(entries: dict[str, bytes], destination: Path) -> None:
     entries = _renamed(entries, digest.hex()[:12])
     entries[_DESCRIPTION] = _GUID.sub(b'guid="' + guid + b'"', entries[_DESCRIPTION], count=1)
     entries[_GUID_FILE] = guid
-    write_archive(destination, entries, zipfile.ZIP_DEFLATED)
+    write_archive(destination, entries)
 
 
 def _renamed(entries: dict[str, bytes], suffix: str) -> dict[str, bytes]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from fmus.kinds import NATIVE, PYTHON
 from orchestrator.analysis import gains
 from orchestrator.commands.options import (
     OK,
@@ -20,7 +21,7 @@ from orchestrator.commands.options import (
 from orchestrator.commands.streams import show
 from orchestrator.errors import InputError
 from orchestrator.experiments import bundle
-from orchestrator.experiments.bundle import DEFAULT_FOLDERS, NATIVE, PYTHON
+from orchestrator.experiments.bundle import DEFAULT_FOLDERS
 from orchestrator.experiments.own_controller import build_own
 from orchestrator.experiments.scenario import names, read_scenario
 from orchestrator.experiments.wiring import closed_loop

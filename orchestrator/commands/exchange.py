@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from fmus.kinds import PYTHON
 from orchestrator.commands.options import (
     FAILED,
     OK,
@@ -26,7 +27,6 @@ from orchestrator.commands.streams import say, show
 from orchestrator.errors import InputError
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.exchange.verify import verify
-from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.folder import replaced
 from orchestrator.experiments.preparation import (
     DEFAULT_STEP,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from fmus.kinds import FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.commands.streams import say
 from orchestrator.errors import InputError
-from orchestrator.experiments.bundle import FMI, KINDS, NATIVE, PYTHON
 from orchestrator.experiments.preparation import Request, loaded
 from orchestrator.experiments.scenario import Scenario
 from orchestrator.findings import Findings
@@ -98,9 +98,9 @@ def add_fmi(parser: argparse.ArgumentParser) -> None:
     """Which version of FMI."""
     parser.add_argument(
         "--fmi",
-        choices=FMI,
-        default=FMI[0],
-        help=f"version of the FMUs; 3 needs --kind {NATIVE}; default: {FMI[0]}",
+        choices=FMI_VERSIONS,
+        default=FMI_VERSIONS[0],
+        help=f"version of the FMUs; 3 needs --kind {NATIVE}; default: {FMI_VERSIONS[0]}",
     )
 
 
@@ -136,7 +136,7 @@ def add_force(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def read(options: argparse.Namespace, fmi: str = FMI[0]) -> tuple[Scenario, System]:
+def read(options: argparse.Namespace, fmi: str = FMI_VERSIONS[0]) -> tuple[Scenario, System]:
     """What is run; what is not as it should be, and does no harm, becomes a warning."""
     findings = Findings(options.strict)
     found = loaded(options.scenario, options.kind, fmi, options.variant, findings)

@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from auv_fmu.euler import STEP
+from fmus.kinds import FMI_VERSIONS, PYTHON
 from orchestrator.analysis.cautions import differing_vehicle
 from orchestrator.analysis.figures import check_figure
 from orchestrator.analysis.signals import CONTROLLER, PLANNER
 from orchestrator.errors import InputError
-from orchestrator.experiments.bundle import FMI, PYTHON, current_fmus
+from orchestrator.experiments.bundle import current_fmus
 from orchestrator.experiments.events import check_events, read_events, shared_events
 from orchestrator.experiments.inputs import Inputs, read_inputs
 from orchestrator.experiments.scenario import Scenario, names, read_scenario
@@ -60,7 +61,7 @@ class Request:
         stop_time, step: experiment [s]; None: the scenario's or the system's own.
         order: of evaluation; None: the scenario's own, or else the first of :data:`ORDERS`.
         parameters: values that win over the scenario's.
-        kind: of the bundle's FMUs, one of :data:`orchestrator.experiments.bundle.KINDS`.
+        kind: of the bundle's FMUs, one of :data:`fmus.kinds.KINDS`.
         isolation: of the FMUs in processes of their own; None: they run in this one.
         loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
         strict: whether what is not as it should be is refused, even if it is harmless.
@@ -174,7 +175,7 @@ def warned(strict: bool = False) -> Iterator[Findings]:
 def loaded(
     name: str,
     kind: str = PYTHON,
-    fmi: str = FMI[0],
+    fmi: str = FMI_VERSIONS[0],
     variant: str | None = None,
     findings: Findings | None = None,
 ) -> tuple[Scenario, System]:
@@ -204,7 +205,7 @@ def loaded(
         return Scenario(named.stem, title=path.name or named.name), system
     scenario = read_scenario(name)
     check_figure(scenario.figure)
-    versions = RUNNABLE if fmi == FMI[0] else WRITABLE
+    versions = RUNNABLE if fmi == FMI_VERSIONS[0] else WRITABLE
     return scenario, closed_loop(current_fmus(kind, fmi), scenario, versions)
 
 
@@ -255,14 +256,14 @@ def left_behind(scenario: Scenario) -> str | None:
     return f"{scenario.name}: the system comes without the scenario's {names}" if names else None
 
 
-def check_brings_its_own(name: str, kind: str, fmi: str = FMI[0]) -> None:
+def check_brings_its_own(name: str, kind: str, fmi: str = FMI_VERSIONS[0]) -> None:
     """Check that no other FMUs are asked for than those that a system comes with.
 
     Raises:
         InputError: it would not have any effect.
 
     """
-    if (kind, fmi) != (PYTHON, FMI[0]):
+    if (kind, fmi) != (PYTHON, FMI_VERSIONS[0]):
         raise InputError(f"{name}: comes with its FMUs; kind and fmi are for the bundle's own")
 
 

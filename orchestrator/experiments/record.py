@@ -13,7 +13,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from orchestrator.experiments.bundle import NATIVE, PYTHON
+from fmus.kinds import NATIVE, PYTHON
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.master import identity
 from orchestrator.master.experiment import Experiment

@@ -11,10 +11,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fmus.kinds import PYTHON
 from orchestrator.analysis.metrics import metrics_of
 from orchestrator.analysis.plot import plot
 from orchestrator.errors import InputError, did_you_mean, reason
-from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.checkpoints import checkpoints_of, leave
 from orchestrator.experiments.folder import locked, replaced
 from orchestrator.experiments.inputs import inputs_of

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from fmus.kinds import PYTHON
 from orchestrator.analysis.metrics import Metrics
 from orchestrator.analysis.visible import VisibleRows
 from orchestrator.errors import InputError
-from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.folder import opened
 from orchestrator.experiments.preparation import Prepared
 from orchestrator.experiments.run import metrics_json

@@ -10,8 +10,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from fmus.kinds import PYTHON
 from orchestrator.analysis import gains
-from orchestrator.experiments.bundle import PYTHON, current_fmus
+from orchestrator.experiments.bundle import current_fmus
 from orchestrator.experiments.folder import inner, replaced
 from orchestrator.experiments.record import PACKAGES, Clock, write_files
 from orchestrator.experiments.wiring import closed_loop

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from orchestrator.experiments.bundle import PYTHON
+from fmus.kinds import PYTHON
 from orchestrator.experiments.inputs import inputs_of
 from orchestrator.experiments.preparation import (
     Prepared,

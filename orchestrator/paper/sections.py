@@ -9,9 +9,9 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
+from fmus.kinds import PYTHON
 from orchestrator.analysis.figures import FIGURES, Drawn, draw
 from orchestrator.errors import InputError, did_you_mean
-from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.scenario import Scenario, read_scenario
 from orchestrator.paper.formatting import actuator_values, numbers, picture, plain, table
 from orchestrator.paper.outcomes import Outcome, Outcomes

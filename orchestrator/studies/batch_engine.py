@@ -14,10 +14,11 @@ import numpy as np
 from auv_fmu.closed_loop import Setting, splits
 from auv_fmu.euler import MOST_INTERNAL_STEPS
 from auv_fmu.output_feedback import Gains
+from fmus.kinds import PYTHON
 from orchestrator.analysis.metrics import LAST_SECONDS
 from orchestrator.analysis.signals import ACTUATORS, AXES, DY_HAT
 from orchestrator.errors import InputError
-from orchestrator.experiments.bundle import PYTHON, current_fmus
+from orchestrator.experiments.bundle import current_fmus
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import digest_of
 from orchestrator.master.observer import Ending, Header

@@ -15,8 +15,8 @@ from typing import Any
 
 from tqdm import tqdm
 
+from fmus.kinds import PYTHON
 from orchestrator.errors import InputError
-from orchestrator.experiments.bundle import PYTHON
 from orchestrator.experiments.preparation import Prepared, loaded
 from orchestrator.experiments.scenario import Scenario
 from orchestrator.master.experiment import ORDERS, Experiment

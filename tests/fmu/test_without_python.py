@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from fmus.compilers import FLAGS
-from fmus.platforms import TARGETS
+from fmus.kinds import TARGETS
 from orchestrator.exchange import c_host
 from orchestrator.exchange.verify import verify
 from orchestrator.experiments import bundle

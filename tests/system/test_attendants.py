@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.experiments.bundle import NATIVE
+from fmus.kinds import NATIVE
 from orchestrator.experiments.preparation import load
 from orchestrator.master.attendant import NEVER, Run
 from orchestrator.master.experiment import ORDERS, Experiment

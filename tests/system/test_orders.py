@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
 from orchestrator.errors import InputError
-from orchestrator.experiments.bundle import NATIVE
 from orchestrator.experiments.preparation import Request, load, prepare
 from orchestrator.experiments.result import simulate as simulated
 from orchestrator.experiments.scenario import Scenario

@@ -10,7 +10,8 @@ import pytest
 
 import auv_fmu
 import fmus
-from fmus import build
+from fmus import build, discovery
+from fmus.kinds import NATIVE
 from support.instances import NAMES
 
 
@@ -22,14 +23,14 @@ def test_every_source_is_part_of_the_fingerprint(tmp_path: Path, monkeypatch: py
         shutil.copytree(
             folder,
             folders[package.__name__],
-            ignore=shutil.ignore_patterns("dist", "__pycache__", "py.typed"),
+            ignore=shutil.ignore_patterns("dist", "__pycache__"),
         )
-    monkeypatch.setattr(build, "package_folder", folders.__getitem__)
-    fingerprints = {build.fingerprint(tuple(folders))}
+    monkeypatch.setattr(discovery, "package_folder", folders.__getitem__)
+    fingerprints = {discovery.fingerprint(NATIVE)}
     sources = [path for path in sorted(tmp_path.rglob("*")) if path.is_file()]
     for path in sources:
         path.write_bytes(path.read_bytes() + b"\n")
-        fingerprints.add(build.fingerprint(tuple(folders)))
+        fingerprints.add(discovery.fingerprint(NATIVE))
     assert len(fingerprints) == 1 + len(sources)
 
 

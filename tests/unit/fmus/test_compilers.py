@@ -9,7 +9,7 @@ import pytest
 
 from fmus import compilers
 from fmus.compilers import compiler_for, library
-from fmus.platforms import platforms
+from fmus.kinds import platforms
 from fmus.python import loader
 from orchestrator.master.library import COMPILERS, machines_compiler
 
@@ -81,8 +81,8 @@ def test_any_one_compiler_will_do(name, tmp_path, monkeypatch):
     wrapper.write_text(f'#!/bin/sh\nPATH={os.environ["PATH"]} exec {real} "$@"\n')
     wrapper.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert loader.COMPILERS == COMPILERS
-    assert loader.machines_compiler() == machines_compiler() == str(wrapper)
+    assert compilers.COMPILERS == COMPILERS
+    assert compilers.machines_compiler() == machines_compiler() == str(wrapper)
     [own] = platforms("2" if compilers.this_machine() == "x86_64-linux" else "3")
     assert library(compiler_for([own]), own, "Answer", SOURCES, "main.c")
     loader.compiled.cache_clear()

@@ -9,7 +9,7 @@ import pytest
 from fmus.documentation import page
 from support.instances import NAMES
 
-PAGES = Path(__file__).parents[4] / "docs" / "components"
+PAGES = Path(__file__).parents[3] / "docs" / "components"
 
 
 @pytest.mark.parametrize("name", NAMES)

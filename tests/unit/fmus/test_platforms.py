@@ -6,7 +6,7 @@ import platform
 
 import pytest
 
-from fmus.platforms import platforms, this_machine
+from fmus.kinds import platforms, this_machine
 
 #: Names of folders in `binaries`: FMI 2.0.4, section 2.3, and FMI 3.0.1, section 2.5.1.4.1.
 FOLDERS = {

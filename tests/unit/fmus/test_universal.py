@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.universal import universal
+from fmus.compilers import universal
 
 #: CPU_TYPE_X86_64 with CPU_SUBTYPE_X86_64_ALL, and CPU_TYPE_ARM64 with CPU_SUBTYPE_ARM64_ALL.
 PROCESSORS = {"x86_64": (0x01000007, 3), "arm64": (0x0100000C, 0)}

@@ -9,9 +9,9 @@ import pytest
 from fmus import native
 from fmus.compilers import Compiler
 from fmus.discovery import components
+from fmus.kinds import platforms
 from fmus.native import packaging
 from fmus.native.packaging import fmu_entries
-from fmus.platforms import platforms
 from support.instances import NAMES
 
 ANY = Compiler("any", ["any"], targets={})
