@@ -22,7 +22,8 @@ from fmpy.validation import validate_fmu
 
 import auv_fmu
 import fmus
-from support.instances import NAMES, WITH_INPUTS, FmuInstance, unpacked
+from support.instances import FmuInstance, unpacked
+from support.settings import NAMES, WITH_INPUTS
 
 each = pytest.mark.parametrize("name", NAMES)
 

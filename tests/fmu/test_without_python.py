@@ -26,8 +26,8 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.library import machines_compiler
 from orchestrator.system.component import Component
 from orchestrator.system.structure import System
-from support.instances import NAMES
 from support.runs import run
+from support.settings import NAMES
 
 #: Both controllers, so that all FMUs of the paper are run.
 SCENARIOS = ("fig4", "fig5-pd")

@@ -18,10 +18,6 @@ from fmus.python.callbacks import ANSWER
 from fmus.python.component import Component
 from fmus.python.slave import slave_of
 
-#: Names of all components, and of those with inputs.
-NAMES = [*components()]
-WITH_INPUTS = [name for name in NAMES if not name.endswith("Planner")]
-
 
 def component(name: str) -> type[Component[Any, Any, Any, Any]]:
     """The class of a component."""

@@ -20,8 +20,8 @@ from orchestrator.commands.main import main
 from orchestrator.experiments import bundle
 from orchestrator.paper.report import write_report
 from orchestrator.paper.runs import Run
-from support.instances import NAMES
 from support.machine import contents
+from support.settings import NAMES
 
 SECOND = ["--stop-time", "1"]
 

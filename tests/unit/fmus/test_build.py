@@ -12,7 +12,7 @@ import auv_fmu
 import fmus
 from fmus import build, discovery
 from fmus.kinds import NATIVE
-from support.instances import NAMES
+from support.settings import NAMES
 
 
 def test_every_source_is_part_of_the_fingerprint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

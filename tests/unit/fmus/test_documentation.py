@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fmus.documentation import page
-from support.instances import NAMES
+from support.settings import NAMES
 
 PAGES = Path(__file__).parents[3] / "docs" / "components"
 

@@ -12,7 +12,7 @@ from fmus.discovery import components
 from fmus.kinds import platforms
 from fmus.native import packaging
 from fmus.native.packaging import fmu_entries
-from support.instances import NAMES
+from support.settings import NAMES
 
 ANY = Compiler("any", ["any"], targets={})
 

@@ -7,9 +7,12 @@ from math import inf, isfinite, nan, radians
 import pytest
 from pythonfmu.enums import Fmi2Status
 
-from support.instances import NAMES, WITH_INPUTS, ClassInstance, answers_of, component, messages_of
+from fmus.discovery import ports_of
+from fmus.ports.port import H_MAX
+from support.instances import ClassInstance, answers_of, component, messages_of
+from support.settings import NAMES, WITH_INPUTS
 
-WITH_STEP_LIMIT = [name for name in NAMES if name != "DisturbanceGenerator"]
+WITH_STEP_LIMIT = [name for name in NAMES if H_MAX in ports_of(name)]
 
 
 @pytest.fixture(params=NAMES)
@@ -227,7 +230,7 @@ REFUSED_CALLS = {
 
 def stepped(name: str, call: str = "", **arguments: bool) -> ClassInstance:
     """An instance in the middle of a run, in which a call can be refused."""
-    if call == "fixed parameter" and name == "DisturbanceGenerator":
+    if call == "fixed parameter" and not any(p.variability == "fixed" for p in ports_of(name)):
         pytest.skip("all of its parameters are tunable")
     driver = ClassInstance(name, **arguments)
     driver.excite(1)

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from pythonfmu.enums import Fmi2Status
 
 from fmus.python.state import Snapshot, nearly_equal
-from support.instances import NAMES, WITH_INPUTS, ClassInstance
+from support.instances import ClassInstance
+from support.settings import NAMES, WITH_INPUTS
 
 
 @pytest.fixture(params=NAMES)
