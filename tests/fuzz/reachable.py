@@ -119,9 +119,9 @@ def _is_number(value: Any) -> bool:
         return False
 
 
-def _fits(description: Description, port: Variable, value: Any) -> bool:
+def _fits(fmu: Description, port: Variable, value: Any) -> bool:
     if port.kind == "String":
-        return value in choices_of(description.name, port.name)
+        return value in choices_of(fmu.name, port.name)
     if port.kind == "Boolean":
         return isinstance(value, bool)
     if port.kind == "Integer" and not isinstance(value, int):

@@ -127,9 +127,7 @@ class Draw:
         """One that a run goes on well with."""
         start, low, high = variable.start, variable.minimum, variable.maximum
         if variable.kind == "String":
-            return self.random.choice(
-                choices_of(self.description.name).get(variable.name, (start,))
-            )
+            return self.random.choice(choices_of(self.description.name, variable.name) or (start,))
         if variable.kind == "Boolean":
             return self.random.randrange(2)
         if variable.kind == "Integer":

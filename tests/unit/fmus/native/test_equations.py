@@ -14,6 +14,7 @@ from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from fmus.discovery import components
 from fmus.python.callbacks import explained
 from support.equations import WHY, bits, equations, filled, flat, structure
+from support.settings import behaviour_of
 
 PACKAGES = [*components().values()]
 
@@ -103,7 +104,7 @@ def test_advance(package, random):
 
 
 @pytest.mark.parametrize(
-    "package", [p for p in PACKAGES if hasattr(equations(p).behaviour, "expected")]
+    "package", [p for name, p in components().items() if behaviour_of(name).hooks["expected"]]
 )
 @given(random=randoms)
 def test_expected(package, random):
