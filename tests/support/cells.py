@@ -30,6 +30,16 @@ class Company(NamedTuple):
     foreign: bytes  #: a serialised state of another FMU
 
 
+def company_of(library: Library, other: Library) -> Company:
+    """Company for trials on an FMU, which another one gives a state to."""
+    with instance(other) as foreign:
+        content = foreign.content()
+    beside = Host(library)
+    assert beside.instantiate()
+    assert beside.setup() == beside.enter() == beside.exit() == Status.OK
+    return Company(beside, content)
+
+
 def check(library: Library, key: tuple[str, str], state: str, company: Company) -> bool:
     """Hold an FMU against a cell.
 
