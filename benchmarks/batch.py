@@ -28,13 +28,13 @@ from statistics import median
 from time import process_time
 
 from auv_fmu.closed_loop import Setting, closed_loop
-from orchestrator.analysis.signals import NU, POSITION, THETA_HAT
-from orchestrator.experiments.preparation import load, loaded
 from orchestrator.master.experiment import Experiment
+from orchestrator.runs.preparation import load, loaded
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Run
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import read_study, ready_studies
+from orchestrator.vehicle.signals import NU, POSITION, THETA_HAT
 
 #: Runs that are timed: noise is drawn in the first.
 _SCENARIOS = ("fig4", "fig5", "fig5-pd")

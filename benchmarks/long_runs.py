@@ -23,17 +23,17 @@ from memory import resident
 from auv_fmu.euler import STEP
 from fmus.kinds import KINDS, NATIVE
 from orchestrator import load
-from orchestrator.analysis.certificates import CertificatesFile
-from orchestrator.analysis.metrics import Metrics
-from orchestrator.analysis.visible import VisibleRows
-from orchestrator.master.attendant import NEVER, Attendant, Run
-from orchestrator.master.checkpoint import Checkpoints
+from orchestrator.figures.visible import VisibleRows
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.files import CsvFile
+from orchestrator.master.hooks.checkpoint import Checkpoints
+from orchestrator.master.hooks.hook import NEVER, Attendant, Run
 from orchestrator.master.loop import LOOPS, chosen
-from orchestrator.master.observer import Observer
-from orchestrator.master.selection import Selection
+from orchestrator.master.observers.files import CsvFile
+from orchestrator.master.observers.observer import Observer
+from orchestrator.master.observers.selection import Selection
 from orchestrator.master.simulation import simulate
+from orchestrator.vehicle.certificates import CertificatesFile
+from orchestrator.vehicle.metrics import Metrics
 
 #: Parts of a run that are compared, and simulated seconds between the rows that are kept.
 _PARTS, _INTERVAL = 10, 1.0

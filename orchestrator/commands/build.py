@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from fmus.kinds import NATIVE, PYTHON
-from orchestrator.analysis import gains
 from orchestrator.commands.options import (
     OK,
     add_fmi,
@@ -19,12 +18,13 @@ from orchestrator.commands.options import (
     assignments,
 )
 from orchestrator.commands.streams import show
-from orchestrator.errors import InputError
-from orchestrator.experiments import bundle
-from orchestrator.experiments.bundle import DEFAULT_FOLDERS
-from orchestrator.experiments.own_controller import build_own
-from orchestrator.experiments.scenario import names, read_scenario
-from orchestrator.experiments.wiring import closed_loop
+from orchestrator.machine.errors import InputError
+from orchestrator.runs import bundle
+from orchestrator.runs.bundle import DEFAULT_FOLDERS
+from orchestrator.runs.own_controller import build_own
+from orchestrator.runs.scenario import names, read_scenario
+from orchestrator.runs.wiring import closed_loop
+from orchestrator.vehicle import gains
 
 
 def add_to(commands: Any) -> None:

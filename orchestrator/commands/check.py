@@ -8,12 +8,12 @@ from typing import Any
 
 from orchestrator.commands.options import BAD_INPUT, OK, add_variant
 from orchestrator.commands.streams import show
-from orchestrator.experiments.preparation import SOME_TIME, Request, loaded, prepare
-from orchestrator.experiments.waypoints import impossible_paths
-from orchestrator.findings import Findings
-from orchestrator.master.binary import binary_of, check_binary
+from orchestrator.formats.examination import examine, surprises
+from orchestrator.machine.findings import Findings
+from orchestrator.master.fmi.binary import binary_of, check_binary
+from orchestrator.runs.preparation import SOME_TIME, Request, loaded, prepare
+from orchestrator.runs.waypoints import impossible_paths
 from orchestrator.system.component import Component
-from orchestrator.system.examination import examine, surprises
 from orchestrator.system.graph import rings
 
 

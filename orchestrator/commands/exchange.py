@@ -24,11 +24,15 @@ from orchestrator.commands.options import (
     read,
 )
 from orchestrator.commands.streams import say, show
-from orchestrator.errors import InputError
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.exchange.verify import verify
-from orchestrator.experiments.folder import replaced
-from orchestrator.experiments.preparation import (
+from orchestrator.formats.container import write_container
+from orchestrator.formats.osp import write_osp
+from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.machine.errors import InputError
+from orchestrator.master.experiment import ORDERS
+from orchestrator.runs.folder import replaced
+from orchestrator.runs.preparation import (
     DEFAULT_STEP,
     SOME_TIME,
     Request,
@@ -36,10 +40,6 @@ from orchestrator.experiments.preparation import (
     load,
     prepare,
 )
-from orchestrator.master.experiment import ORDERS
-from orchestrator.system.container import write_container
-from orchestrator.system.osp import write_osp
-from orchestrator.system.ssp.writing import write_ssp
 from orchestrator.system.structure import System
 
 #: Writers by the names of their formats.

@@ -8,12 +8,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from orchestrator.analysis.animation import FRAMES_PER_SECOND, animate, check_film
-from orchestrator.analysis.figures import save
-from orchestrator.analysis.plot import plot, wanted
-from orchestrator.analysis.signals import CONTROL_POINT
-from orchestrator.analysis.view import page
-from orchestrator.analysis.visible import VisibleRows
 from orchestrator.commands.options import (
     OK,
     add_experiment,
@@ -25,15 +19,21 @@ from orchestrator.commands.options import (
     status,
 )
 from orchestrator.commands.streams import say, show
-from orchestrator.errors import InputError
-from orchestrator.experiments.folder import VIEW, replaced
-from orchestrator.experiments.preparation import prepare
-from orchestrator.experiments.stored import changed_files, read_record, read_result, table_in
-from orchestrator.master.observer import Observer
-from orchestrator.master.progress import Progress
+from orchestrator.figures import save
+from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
+from orchestrator.figures.plot import plot, wanted
+from orchestrator.figures.view import page
+from orchestrator.figures.visible import VisibleRows
+from orchestrator.machine.errors import InputError
+from orchestrator.master.observers.observer import Observer
+from orchestrator.master.observers.progress import Progress
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs.folder import VIEW, replaced
+from orchestrator.runs.preparation import prepare
+from orchestrator.runs.stored import changed_files, read_record, read_result, table_in
 from orchestrator.system.names import PortName
+from orchestrator.vehicle.signals import CONTROL_POINT
 
 #: Runs of one scenario are told apart by so many parameters.
 _FEW = 2

@@ -9,7 +9,7 @@ from typing import Any
 
 from orchestrator.commands.options import OK
 from orchestrator.commands.streams import show
-from orchestrator.experiments.own_controller import BASES, new_controller
+from orchestrator.runs.own_controller import BASES, new_controller
 
 
 def add_to(commands: Any) -> None:

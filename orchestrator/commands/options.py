@@ -7,13 +7,13 @@ from pathlib import Path
 
 from fmus.kinds import FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.commands.streams import say
-from orchestrator.errors import InputError
-from orchestrator.experiments.preparation import Request, loaded
-from orchestrator.experiments.scenario import Scenario
-from orchestrator.findings import Findings
+from orchestrator.machine.errors import InputError
+from orchestrator.machine.findings import Findings
 from orchestrator.master.experiment import ORDERS, order_of
 from orchestrator.master.loop import LOOPS
-from orchestrator.master.observer import Ending
+from orchestrator.master.observers.observer import Ending
+from orchestrator.runs.preparation import Request, loaded
+from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 

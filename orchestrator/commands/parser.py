@@ -12,7 +12,7 @@ from itertools import pairwise
 from orchestrator.commands import build, check, exchange, look, new, paper, run, sweep, upkeep
 from orchestrator.commands.options import BAD_INPUT, FAILED, INTERRUPTED
 from orchestrator.commands.streams import Unheard, say
-from orchestrator.errors import InputError, StartError
+from orchestrator.machine.errors import InputError, StartError
 
 
 def dispatch(arguments: Sequence[str] | None) -> int:

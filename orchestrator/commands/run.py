@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.analysis.metrics import LAST_SECONDS
 from orchestrator.commands.options import (
     add_experiment,
     add_force,
@@ -25,15 +24,16 @@ from orchestrator.commands.options import (
     status,
 )
 from orchestrator.commands.streams import say, show
-from orchestrator.experiments.inputs import inputs_of
-from orchestrator.experiments.preparation import prepare, with_companion
-from orchestrator.experiments.run import Files, run_into
-from orchestrator.experiments.scenario import read_scenario
-from orchestrator.findings import Findings
+from orchestrator.machine.findings import Findings
+from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.master.experiment import COUPLINGS
-from orchestrator.master.files import FORMATS
-from orchestrator.master.interrupts import Interrupts, held_interrupts
-from orchestrator.master.isolated import STEP_TIMEOUT, isolation_of
+from orchestrator.master.fmi.isolated import STEP_TIMEOUT, isolation_of
+from orchestrator.master.observers.files import FORMATS
+from orchestrator.runs.inputs import inputs_of
+from orchestrator.runs.preparation import prepare, with_companion
+from orchestrator.runs.run import Files, run_into
+from orchestrator.runs.scenario import read_scenario
+from orchestrator.vehicle.metrics import LAST_SECONDS
 
 
 def add_to(commands: Any) -> None:

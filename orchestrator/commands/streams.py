@@ -7,7 +7,7 @@ import sys
 from contextlib import suppress
 from typing import TextIO
 
-from orchestrator.errors import plain, shortened
+from orchestrator.machine.errors import plain, shortened
 
 #: Letters of a line for the user: a name or a value in it may be a whole file.
 _LONGEST = 4000

@@ -9,10 +9,10 @@ from typing import Any
 from orchestrator.commands.options import OK, add_force, add_out
 from orchestrator.commands.streams import show
 from orchestrator.exchange.reference import write_reference
-from orchestrator.experiments.bundle import current_fmus, run_fmus
-from orchestrator.experiments.folder import replaced
-from orchestrator.experiments.scenario_page import scenario_page
 from orchestrator.paper.errata import errata_page
+from orchestrator.runs.bundle import current_fmus, run_fmus
+from orchestrator.runs.folder import replaced
+from orchestrator.runs.scenario_page import scenario_page
 from orchestrator.studies.ready_page import ready_page
 from orchestrator.studies.study_page import study_page
 

@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orchestrator.errors import InputError
-from orchestrator.exchange.foreign import ForeignTable, read_table
-from orchestrator.experiments.preparation import DEFAULT_STEP
+from orchestrator.exchange.table_import import ForeignTable, read_table
+from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import (
     DELAY,
     ORDERS,
@@ -19,10 +18,11 @@ from orchestrator.master.experiment import (
     Order,
     written_order,
 )
-from orchestrator.master.observer import Ending, Header
+from orchestrator.master.fmi.transfer import KINDS
+from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.schedule import stages
 from orchestrator.master.simulation import completed
-from orchestrator.master.transfer import KINDS
+from orchestrator.runs.preparation import DEFAULT_STEP
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from orchestrator.errors import InputError, StartError
+from orchestrator.machine.errors import InputError, StartError
+from orchestrator.master.decimation import paces
 from orchestrator.master.experiment import (
     DELAY,
     GAUSS_SEIDEL,
@@ -14,15 +15,14 @@ from orchestrator.master.experiment import (
     Exchange,
     Experiment,
 )
-from orchestrator.master.instance import Instance
+from orchestrator.master.fmi.instance import Instance
+from orchestrator.master.fmi.log import Log
+from orchestrator.master.gathering import Gathering
 from orchestrator.master.linear import LinearSteps
-from orchestrator.master.log import Log
-from orchestrator.master.paces import paces
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import Action, Stage, delays, schedule, stages
 from orchestrator.master.settling import Settling
-from orchestrator.master.signals import Gathering
 from orchestrator.system.graph import has_feedthrough, rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System

@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 from fmpy.fmi2 import fmi2OK, fmi2Warning
 
-from orchestrator.master.attendant import Run
 from orchestrator.master.experiment import ROUNDING
-from orchestrator.master.instance import Ended
+from orchestrator.master.fmi.instance import Ended
+from orchestrator.master.hooks.hook import Run
 from orchestrator.master.loop import Steps
 from orchestrator.master.schedule import Stage, step
 

@@ -8,7 +8,7 @@ from math import ceil, floor, isfinite, ulp
 from numbers import Real
 from typing import NamedTuple, TypeAlias
 
-from orchestrator.errors import InputError
+from orchestrator.machine.errors import InputError
 
 #: Orders in which components are stepped; the first is the default.
 ORDERS = GAUSS_SEIDEL, JACOBI = "gauss-seidel", "jacobi"

@@ -7,8 +7,8 @@ from collections.abc import Collection
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from orchestrator.errors import InputError
-from orchestrator.master.observer import Ending, Header
+from orchestrator.machine.errors import InputError
+from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.system.names import PortName
 
 #: A value grows without bound if it doubles at least so often in each of so many intervals, one

@@ -15,9 +15,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from platform import python_version
 
-from orchestrator.master.events import Event
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.playback import Course
+from orchestrator.master.hooks.events import Event
+from orchestrator.master.hooks.playback import Course
 from orchestrator.system.structure import System
 
 #: Packages whose versions the rows depend on.
@@ -25,6 +25,9 @@ PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy")
 
 #: All that decides the numbers of a run: by names in words, each as text.
 Identity = Mapping[str, str]
+
+#: Rooms whose code makes the rows.
+ROOMS = ("machine", "system", "formats", "master")
 
 
 def identity(
@@ -43,7 +46,9 @@ def identity(
 
     """
     return {
-        "the code": code_of("orchestrator.system", "orchestrator.master"),
+        "the code": code_of(
+            *(f"orchestrator.{room}" for room in ("machine", "system", "formats", "master"))
+        ),
         "the version of Python": python_version(),
         **{f"the version of {package}": version(package) for package in PACKAGES},
         # Their order is that of the columns, and says where a ring is opened.

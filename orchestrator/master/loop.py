@@ -13,11 +13,11 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from orchestrator.errors import InputError
-from orchestrator.master.attendant import Run
+from orchestrator.machine.errors import InputError
+from orchestrator.master.compiled import kept, made
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.isolated import Isolation
-from orchestrator.master.library import kept, made
+from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.hooks.hook import Run
 from orchestrator.master.schedule import step
 from orchestrator.master.stepper import stepped
 

@@ -8,9 +8,9 @@ from math import isfinite
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from orchestrator.master.instance import Instance, Part
-from orchestrator.master.texts import Texts
-from orchestrator.master.transfer import KINDS, are_integers
+from orchestrator.master.fmi.instance import Instance, Part
+from orchestrator.master.fmi.string_table import Texts
+from orchestrator.master.fmi.transfer import KINDS, are_integers
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System

@@ -30,15 +30,15 @@ from typing import NamedTuple, Protocol
 
 from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
 
-from orchestrator.errors import InputError, shortened
-from orchestrator.master import layout
+from orchestrator.machine.errors import InputError, shortened
+from orchestrator.master import stepper_types as layout
+from orchestrator.master.decimation import paces
 from orchestrator.master.experiment import JACOBI, ORDERS, Experiment, Order
-from orchestrator.master.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
-from orchestrator.master.mode import PRODUCT, A, B, C, put_back
-from orchestrator.master.paces import paces
+from orchestrator.master.fmi.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
+from orchestrator.master.fmi.mode import PRODUCT, A, B, C, put_back
+from orchestrator.master.gathering import Gathering
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Row
-from orchestrator.master.signals import Gathering
 from orchestrator.system.component import Component
 from orchestrator.system.graph import delayed, derived_order, has_feedthrough, in_stages
 from orchestrator.system.names import PortName

@@ -10,26 +10,26 @@ from time import monotonic
 
 import numpy as np
 
-from orchestrator.errors import InputError, StartError, reason, unforeseen
-from orchestrator.master.attendant import Attendance, Attendant, Run
+from orchestrator.machine.errors import InputError, StartError, reason, unforeseen
+from orchestrator.machine.interrupts import held_interrupts
 from orchestrator.master.coupling import Coupling
+from orchestrator.master.decimation import paces
 from orchestrator.master.ends import to_its_end
 from orchestrator.master.experiment import LINEAR, OURS, Exchange, Experiment
+from orchestrator.master.fmi.instance import ComponentFailed, Ended, Instance
+from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.fmi.log import Log
+from orchestrator.master.fmi.mode import default_mode
+from orchestrator.master.fmi.placement import placed
+from orchestrator.master.fmi.surroundings import Surroundings
+from orchestrator.master.gathering import Signals
 from orchestrator.master.growth import Growth
-from orchestrator.master.instance import ComponentFailed, Ended, Instance
-from orchestrator.master.interrupts import held_interrupts
-from orchestrator.master.isolated import Isolation
+from orchestrator.master.hooks.hook import Attendance, Attendant, Run
 from orchestrator.master.linear import check_linear
-from orchestrator.master.log import Log
 from orchestrator.master.loop import PYTHON_LOOP, Loop
-from orchestrator.master.mode import default_mode
-from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
-from orchestrator.master.paces import paces
-from orchestrator.master.placing import placed
+from orchestrator.master.observers.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import stages
-from orchestrator.master.signals import Signals
-from orchestrator.master.surroundings import Surroundings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import literal, same

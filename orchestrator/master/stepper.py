@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from ctypes import CDLL, POINTER, c_double, c_int, c_size_t
 
-from orchestrator.master import layout
-from orchestrator.master.attendant import Run
-from orchestrator.master.instance import CALLS
+from orchestrator.master import stepper_types as layout
+from orchestrator.master.fmi.instance import CALLS
+from orchestrator.master.hooks.hook import Run
 from orchestrator.master.schedule import Pace, Stage
 
 #: Longest time until Python looks whether somebody wants the run to stop [s].

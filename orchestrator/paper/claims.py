@@ -18,6 +18,7 @@ from auv_fmu.proof.attraction import theorem
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from auv_fmu.vehicle import Vehicle
 from orchestrator.paper.formatting import actuator_values, numbers
+from orchestrator.paper.kept_runs import Outcome
 from orchestrator.paper.measures import (
     largest_error_after,
     largest_estimate,
@@ -26,7 +27,6 @@ from orchestrator.paper.measures import (
     turning_radius,
     way_of,
 )
-from orchestrator.paper.outcomes import Outcome
 from orchestrator.paper.published import (
     EFFORT_PD,
     EFFORT_PROPOSED,
@@ -34,7 +34,7 @@ from orchestrator.paper.published import (
     FINAL_ERROR_PROPOSED,
     TURNING_RADIUS,
 )
-from orchestrator.paper.runs import Run
+from orchestrator.paper.variations import Run
 from orchestrator.studies.engine import REACHED
 
 #: The runs of the figures, and what the claims change in them.

@@ -13,8 +13,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from auv_fmu.euler import STEP
 from auv_fmu.output_feedback import Gains
-from orchestrator.analysis.certificates import COLUMNS, certificates
-from orchestrator.analysis.figures import (
+from orchestrator.figures import (
     COLOURS,
     STYLES,
     Drawn,
@@ -22,13 +21,14 @@ from orchestrator.analysis.figures import (
     overlay,
     save,
 )
-from orchestrator.analysis.figures.style import WIDTH, styled
-from orchestrator.analysis.signals import ACTUATORS, AXES, limits
+from orchestrator.figures.style import WIDTH, styled
 from orchestrator.paper.claims import FIVE, FIVE_PD, QUIET, SEVEN
 from orchestrator.paper.formatting import actuator_values, numbers, picture, plain
-from orchestrator.paper.outcomes import Outcome
+from orchestrator.paper.kept_runs import Outcome
 from orchestrator.paper.published import EFFORT_PD, EFFORT_PROPOSED
-from orchestrator.paper.runs import Run
+from orchestrator.paper.variations import Run
+from orchestrator.vehicle.certificates import COLUMNS, certificates
+from orchestrator.vehicle.signals import ACTUATORS, AXES, limits
 
 #: Levels of measurement noise to show the effect of [m].
 NOISE_LEVELS = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)

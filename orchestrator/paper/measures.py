@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from orchestrator.analysis.signals import APPLIED, THETA_HAT, tracking_error
-from orchestrator.master.table import Table
+from orchestrator.master.observers.table import Table
 from orchestrator.studies.engine import REACHED
+from orchestrator.vehicle.signals import APPLIED, THETA_HAT, tracking_error
 
 
 def sum_without_step(l2: Any, duration: Any, h: float) -> Any:

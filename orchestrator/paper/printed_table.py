@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from auv_fmu.euler import STEP
-from orchestrator.analysis.signals import ACTUATORS, AXES
 from orchestrator.paper.choices import AGAINST_FIVE, END_TIMES, FIVE, PD, PROPOSED, VEHICLE
 from orchestrator.paper.formatting import numbers, plain, table
 from orchestrator.paper.sensitivity import (
@@ -23,6 +22,7 @@ from orchestrator.paper.sensitivity import (
     Variant,
 )
 from orchestrator.studies.engine import REACHED
+from orchestrator.vehicle.signals import ACTUATORS, AXES
 
 #: The score is told of so much less and more than T_f [s], for e_f moves with the waves.
 _AROUND = 10

@@ -11,21 +11,21 @@ from pathlib import Path
 from typing import Any
 
 from fmus.kinds import PYTHON
-from orchestrator.analysis import gains
-from orchestrator.experiments.bundle import current_fmus
-from orchestrator.experiments.folder import inner, replaced
-from orchestrator.experiments.record import PACKAGES, Clock, write_files
-from orchestrator.experiments.wiring import closed_loop
+from orchestrator.machine.ledger import RECORD
+from orchestrator.machine.workers import Workers, workers
 from orchestrator.paper import errata, printed_table, readings, studies
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS, show_effect
 from orchestrator.paper.formatting import table
-from orchestrator.paper.outcomes import Outcomes
+from orchestrator.paper.kept_runs import Outcomes
 from orchestrator.paper.page import contents, html
 from orchestrator.paper.sections import Section, draw_section, sections, written
 from orchestrator.paper.variants import all_variants
-from orchestrator.paper.workers import Workers, workers
-from orchestrator.system.ledger import RECORD
+from orchestrator.runs.bundle import current_fmus
+from orchestrator.runs.folder import inner, replaced
+from orchestrator.runs.record import PACKAGES, Clock, write_files
+from orchestrator.runs.wiring import closed_loop
+from orchestrator.vehicle import gains
 
 #: Folders within the report's: figures, and outcomes that the next report can use again.
 _FIGURES, _RUNS, _STUDIES = "figures", "runs", "studies"

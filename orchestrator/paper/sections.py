@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from fmus.kinds import PYTHON
-from orchestrator.analysis.figures import FIGURES, Drawn, draw
-from orchestrator.errors import InputError, did_you_mean
-from orchestrator.experiments.scenario import Scenario, read_scenario
+from orchestrator.figures import FIGURES, Drawn, draw
+from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.paper.formatting import actuator_values, numbers, picture, plain, table
-from orchestrator.paper.outcomes import Outcome, Outcomes
-from orchestrator.paper.runs import Run
+from orchestrator.paper.kept_runs import Outcome, Outcomes
+from orchestrator.paper.variations import Run
+from orchestrator.runs.scenario import Scenario, read_scenario
 from orchestrator.system.names import port_name
 
 #: The parameter that decides whether a run has a twin without noise.

@@ -6,8 +6,8 @@ import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from orchestrator.experiments.folder import inner
 from orchestrator.paper.formatting import picture, plain
+from orchestrator.runs.folder import inner
 from orchestrator.studies.study import Study, read_study, ready_studies
 from orchestrator.studies.sweep import Means, swept
 from orchestrator.system.names import file_name

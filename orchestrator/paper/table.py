@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.experiments.folder import replaced
-from orchestrator.experiments.record import PACKAGES, Clock, write_files
+from orchestrator.machine.ledger import RECORD
+from orchestrator.machine.workers import workers
 from orchestrator.paper.printed_table import NUMBERS, section
 from orchestrator.paper.sensitivity import PUBLISHED, Found
 from orchestrator.paper.variants import all_variants
-from orchestrator.paper.workers import workers
-from orchestrator.system.ledger import RECORD
+from orchestrator.runs.folder import replaced
+from orchestrator.runs.record import PACKAGES, Clock, write_files
 
 #: The files.
 _NAMES = _TEXT, _VARIANTS = "table.md", "variants.csv"

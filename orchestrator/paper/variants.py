@@ -7,19 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from orchestrator.analysis.metrics import LAST_SECONDS
-from orchestrator.analysis.signals import (
-    APPLIED,
-    ATTITUDE,
-    AXES,
-    COMMANDED,
-    ELL,
-    POSITION,
-    Y_D,
-    parameter,
-)
-from orchestrator.experiments.preparation import loaded
-from orchestrator.master.table import Table
+from orchestrator.machine.workers import Workers
+from orchestrator.master.observers.table import Table
 from orchestrator.paper.choices import (
     END_TIMES,
     OF_RUNS,
@@ -40,10 +29,21 @@ from orchestrator.paper.sensitivity import (
     Sensitivity,
     Variant,
 )
-from orchestrator.paper.workers import Workers
+from orchestrator.runs.preparation import loaded
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Run
 from orchestrator.studies.sweep import check_installed
+from orchestrator.vehicle.metrics import LAST_SECONDS
+from orchestrator.vehicle.signals import (
+    APPLIED,
+    ATTITUDE,
+    AXES,
+    COMMANDED,
+    ELL,
+    POSITION,
+    Y_D,
+    parameter,
+)
 
 #: Runs that a worker makes at a time.
 _BLOCK = 16

@@ -15,15 +15,13 @@ from auv_fmu.closed_loop import Setting, splits
 from auv_fmu.euler import MOST_INTERNAL_STEPS
 from auv_fmu.output_feedback import Gains
 from fmus.kinds import PYTHON
-from orchestrator.analysis.metrics import LAST_SECONDS
-from orchestrator.analysis.signals import ACTUATORS, AXES, DY_HAT
-from orchestrator.errors import InputError
-from orchestrator.experiments.bundle import current_fmus
+from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import digest_of
-from orchestrator.master.observer import Ending, Header
+from orchestrator.master.observers.observer import Ending, Header
+from orchestrator.master.observers.table import Table
 from orchestrator.master.schedule import stages
-from orchestrator.master.table import Table
+from orchestrator.runs.bundle import current_fmus
 from orchestrator.studies.batch import tally
 from orchestrator.studies.batch.columns import COLUMNS
 from orchestrator.studies.batch.kernel import Moment, Plan
@@ -39,6 +37,8 @@ from orchestrator.studies.batch.verdict import (
 from orchestrator.studies.engine import Outcome, Run
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
+from orchestrator.vehicle.metrics import LAST_SECONDS
+from orchestrator.vehicle.signals import ACTUATORS, AXES, DY_HAT
 
 #: What makes every system.
 _OTHER = "use --engine fmu"

@@ -37,12 +37,12 @@ from distributed.comm import connect, get_address_host_port
 from distributed.utils import silence_logging_cmgr
 
 from auv_fmu import __version__
-from orchestrator.errors import InputError, reason
-from orchestrator.master.interrupts import without_interrupt
+from orchestrator.machine import cache
+from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.interrupts import without_interrupt
+from orchestrator.machine.locks import process_folder
 from orchestrator.studies.engine import Engine, Outcome, Run
 from orchestrator.studies.sockets import LocalScheduler, LocalWorker, place_in
-from orchestrator.system import cache
-from orchestrator.system.leftovers import process_folder
 
 #: How long a block shall take [s]: long beside the millisecond that a task costs, short for who
 #: waits for the last one, or loses it. One that takes so many times as long, because its runs take

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
-from orchestrator.analysis.signals import ACTUATORS, AXES
 from orchestrator.master.experiment import ORDERS, Order
+from orchestrator.vehicle.signals import ACTUATORS, AXES
 
 #: An error of tracking that counts as having reached the reference [m].
 REACHED = 1.0

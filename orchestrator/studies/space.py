@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from orchestrator.errors import InputError, reason, shortened
-from orchestrator.experiments.entries import is_finite
-from orchestrator.experiments.preparation import Prepared, Request, prepare
-from orchestrator.experiments.scenario import Scenario
+from orchestrator.machine.errors import InputError, reason, shortened
+from orchestrator.runs.entries import is_finite
+from orchestrator.runs.preparation import Prepared, Request, prepare
+from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.engine import Run
 from orchestrator.studies.study import (
     LATIN_HYPERCUBE,

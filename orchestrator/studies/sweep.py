@@ -16,13 +16,13 @@ from typing import Any
 from tqdm import tqdm
 
 from fmus.kinds import PYTHON
-from orchestrator.errors import InputError
-from orchestrator.experiments.preparation import Prepared, loaded
-from orchestrator.experiments.scenario import Scenario
+from orchestrator.machine.errors import InputError
+from orchestrator.master.compiled import machines_compiler
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import PACKAGES, digest_of
-from orchestrator.master.library import machines_compiler
 from orchestrator.master.loop import LOOPS
+from orchestrator.runs.preparation import Prepared, loaded
+from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Engine
 from orchestrator.studies.figures import draw_figures, figure_files, read_figures

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from sys import float_info
 
-from orchestrator.errors import InputError, did_you_mean
+from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, plain, splits
 from orchestrator.system.transformation import Linear, Mapped, Transformation

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TypeAlias
 
-from orchestrator.errors import InputError
+from orchestrator.machine.errors import InputError
 
 #: Values of a mapping that is made of several.
 _MOST_PAIRS = 1000

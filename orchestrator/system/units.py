@@ -8,7 +8,7 @@ from math import isfinite
 from sys import float_info
 from typing import Any
 
-from orchestrator.errors import InputError
+from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component
 from orchestrator.system.transformation import Linear
 from orchestrator.system.values import unit_of

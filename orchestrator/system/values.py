@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from fmpy.model_description import ModelVariable
 
-from orchestrator.errors import InputError, shortened
+from orchestrator.machine.errors import InputError, shortened
 
 #: A value in the type of its variable.
 Value: TypeAlias = float | int | bool | str

@@ -13,7 +13,7 @@ import pytest
 
 from fmus.python.loader import FLAGS, FOLDER, compiler
 from fmus.python.own import build_own
-from orchestrator.experiments import bundle
+from orchestrator.runs import bundle
 from support.settings import NAMES
 
 LIBPYTHON = Path(

@@ -9,7 +9,7 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from orchestrator.experiments import bundle
+from orchestrator.runs import bundle
 from support.calls import CASES, MODEL_EXCHANGE_FUNCTIONS
 from support.kinds import FIXTURES
 from support.settings import NAMES

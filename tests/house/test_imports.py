@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[2]
 #: Rooms, each of which may import those before it.
 FLOORS = {
     "orchestrator": (
-        "errors", "findings", "reading", "system", "master", "analysis", "experiments", "exchange",
+        "machine", "system", "formats", "master", "vehicle", "figures", "runs", "exchange",
         "studies", "paper", "commands",
     ),
     "fmus": (
@@ -44,7 +44,7 @@ ALLOWED = {
 DECLARED = re.compile(r"fmus\.(kinds|discovery|ports|\w+\.ports)(\.|$)")
 
 #: Rooms that run any system.
-GENERAL = ("errors", "findings", "reading", "system", "master")
+GENERAL = ("machine", "system", "formats", "master")
 
 
 def folder_of(package: str) -> Path:
@@ -134,7 +134,7 @@ def ports() -> set[str]:
 
 
 def test_the_general_half_names_no_component_and_no_port_of_this_vehicle():
-    wiring = (folder_of("orchestrator") / "experiments/closed_loop.toml").read_text()
+    wiring = (folder_of("orchestrator") / "runs/closed_loop.toml").read_text()
     instances = set(re.findall(r"^(\w+) = \"\w+\"$", wiring.split("[wires]")[0], re.MULTILINE))
     assert "plant" in instances
     words = instances - {"name"} | set(components())

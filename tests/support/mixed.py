@@ -11,7 +11,7 @@ from zipfile import ZipFile
 
 from hypothesis import strategies as st
 
-from orchestrator.master.events import Alter, Event
+from orchestrator.master.hooks.events import Alter, Event
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System

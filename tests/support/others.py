@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from zipfile import ZipFile
 
-from orchestrator.master.attendant import Attendant
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.isolated import Isolation
+from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.hooks.hook import Attendant
 from orchestrator.master.loop import chosen
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from fmus.kinds import NATIVE
-from orchestrator.experiments.preparation import load
-from orchestrator.master.attendant import NEVER, Run
 from orchestrator.master.experiment import ORDERS, Experiment
-from orchestrator.master.instance import Ended
+from orchestrator.master.fmi.instance import Ended
+from orchestrator.master.hooks.hook import NEVER, Run
 from orchestrator.master.loop import chosen
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs.preparation import load
 from orchestrator.system.names import port_name
 from support.machine import LOOPS
 

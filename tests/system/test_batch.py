@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator.errors import InputError
-from orchestrator.experiments.bundle import current_fmus
-from orchestrator.experiments.preparation import load, loaded
-from orchestrator.experiments.scenario import read_scenario
-from orchestrator.experiments.wiring import closed_loop
+from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs.bundle import current_fmus
+from orchestrator.runs.preparation import load, loaded
+from orchestrator.runs.scenario import read_scenario
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Run
 from orchestrator.studies.fmu_engine import FmuEngine

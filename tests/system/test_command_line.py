@@ -13,10 +13,10 @@ import pytest
 from fmpy.util import read_csv
 
 from orchestrator.commands.main import main
-from orchestrator.experiments import bundle
-from orchestrator.experiments.scenario import FOLDER as SCENARIOS
-from orchestrator.experiments.scenario import names, read_scenario
-from orchestrator.system.ledger import LEDGER
+from orchestrator.machine.ledger import LEDGER
+from orchestrator.runs import bundle
+from orchestrator.runs.scenario import FOLDER as SCENARIOS
+from orchestrator.runs.scenario import names, read_scenario
 
 
 def files(folder: Path) -> set[str]:

@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError
-from orchestrator.experiments.inputs import Inputs, read_inputs
-from orchestrator.experiments.stored import read_result
-from orchestrator.findings import Findings
-from orchestrator.master.playback import Playback
+from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.machine.errors import InputError
+from orchestrator.machine.findings import Findings
+from orchestrator.master.hooks.playback import Playback
+from orchestrator.runs.inputs import Inputs, read_inputs
+from orchestrator.runs.stored import read_result
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
-from orchestrator.system.ssp.writing import write_ssp
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.transformation import Linear
 from support.others import WAYS, build, run, system_of

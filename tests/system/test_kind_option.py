@@ -17,9 +17,9 @@ from fmpy.validation import validate_fmu
 from fmus.kinds import FMI_VERSIONS, KINDS
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.experiments import bundle
 from orchestrator.paper.report import write_report
-from orchestrator.paper.runs import Run
+from orchestrator.paper.variations import Run
+from orchestrator.runs import bundle
 from support.machine import contents
 from support.settings import NAMES
 

@@ -14,17 +14,17 @@ from hypothesis import strategies as st
 
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError
-from orchestrator.experiments.preparation import Request, load, prepare
-from orchestrator.experiments.result import simulate as simulated
-from orchestrator.experiments.scenario import Scenario
+from orchestrator.machine.errors import InputError
+from orchestrator.master.decimation import paces
 from orchestrator.master.experiment import ORDERS, Experiment
-from orchestrator.master.isolated import Isolation
+from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.loop import chosen
-from orchestrator.master.paces import paces
+from orchestrator.master.observers.table import Table
 from orchestrator.master.schedule import delays, stages
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs.preparation import Request, load, prepare
+from orchestrator.runs.result import simulate as simulated
+from orchestrator.runs.scenario import Scenario
 from orchestrator.system.graph import delayed
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System

@@ -15,9 +15,9 @@ from uuid import uuid4
 
 import pytest
 
-from orchestrator.master import library
-from orchestrator.system.cache import keep, kept
-from orchestrator.system.leftovers import process_folder
+from orchestrator.machine.cache import keep, kept
+from orchestrator.machine.locks import process_folder
+from orchestrator.master import compiled as library
 from support.machine import called
 from support.toy_engine import Toy, outcome, run
 

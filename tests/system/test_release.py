@@ -9,7 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from orchestrator.experiments import bundle
+from orchestrator.runs import bundle
 from support.machine import contents
 
 ROOT = Path(__file__).parents[2]

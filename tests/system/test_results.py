@@ -17,15 +17,15 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError
-from orchestrator.experiments.preparation import Prepared
-from orchestrator.experiments.scenario import Scenario
-from orchestrator.experiments.stored import read_result
+from orchestrator.machine.archives import unpacked
+from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.files import read_columns, read_rows
+from orchestrator.master.observers.files import read_columns, read_rows
+from orchestrator.runs.preparation import Prepared
+from orchestrator.runs.scenario import Scenario
+from orchestrator.runs.stored import read_result
 from orchestrator.studies.engine import Run
 from orchestrator.studies.fmu_engine import FmuEngine
-from orchestrator.system.unpacking import unpacked
 from support.others import build, system_of
 
 pytestmark = pytest.mark.usefixtures("workplace")

@@ -8,16 +8,16 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from orchestrator.errors import InputError
-from orchestrator.master.attendant import Run
-from orchestrator.master.checkpoint import Checkpoints
+from orchestrator.machine.errors import InputError
+from orchestrator.master.compiled import made
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.instance import ComponentFailed
-from orchestrator.master.isolated import Isolation
-from orchestrator.master.library import made
+from orchestrator.master.fmi.instance import ComponentFailed
+from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.hooks.checkpoint import Checkpoints
+from orchestrator.master.hooks.hook import Run
 from orchestrator.master.loop import PYTHON_LOOP, Loop, chosen
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from support.linear import QUARTER_TRUCK, SINE, TWO_MASSES, Model, Part, error, linear, system_of

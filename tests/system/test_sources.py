@@ -10,9 +10,10 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError
-from orchestrator.master import library, sources
-from orchestrator.system import unpacking
+from orchestrator.machine import archives as unpacking
+from orchestrator.machine.errors import InputError
+from orchestrator.master import compiled as library
+from orchestrator.master.fmi import sources
 from support.relay import relay
 
 SUPPORT = Path(__file__).parents[1] / "support"

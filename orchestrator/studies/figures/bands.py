@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestrator.analysis.figures.style import COLOURS, STYLES
+from orchestrator.figures.style import COLOURS, STYLES
 from orchestrator.studies.figures.bins import Bins, bins_of, grouped, is_logarithmic
 from orchestrator.studies.figures.entries import Plan
 from orchestrator.studies.figures.panels import legend, paneled, spread

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestrator.analysis.figures.style import save, styled
+from orchestrator.figures.style import save, styled
 from orchestrator.studies.figures.bands import bands
 from orchestrator.studies.figures.entries import BANDS, FRONT, INFLUENCE, MAPS, Plan
 from orchestrator.studies.figures.fronts import front

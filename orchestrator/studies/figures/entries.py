@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from orchestrator.errors import InputError, did_you_mean
-from orchestrator.experiments.entries import (
+from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.runs.entries import (
     Entry,
     are_names,
     check_entries,

@@ -7,7 +7,7 @@ from itertools import cycle
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestrator.analysis.figures.style import COLOURS, STYLES
+from orchestrator.figures.style import COLOURS, STYLES
 from orchestrator.studies.figures.bins import is_logarithmic
 from orchestrator.studies.figures.entries import Plan
 from orchestrator.studies.figures.panels import legend, paneled, spread

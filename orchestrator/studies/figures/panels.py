@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
-from orchestrator.analysis.figures.style import WIDTH, heading
+from orchestrator.figures.style import WIDTH, heading
 
 #: Room for a heading, and for a legend or the names of axes [in].
 _HEADING, _NAMES = 0.3, 0.45

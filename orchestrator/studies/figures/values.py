@@ -10,11 +10,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from orchestrator.analysis.figures.style import heading
-from orchestrator.analysis.signals import THETA_UNITS
-from orchestrator.errors import InputError
-from orchestrator.experiments.scenario import read_scenario
+from orchestrator.figures.style import heading
+from orchestrator.machine.errors import InputError
+from orchestrator.runs.scenario import read_scenario
 from orchestrator.studies.engine import INDICES, REACHED
+from orchestrator.vehicle.signals import THETA_UNITS
 
 #: Columns of runs.parquet, an array each; what a run does not have is nan or None.
 Columns: TypeAlias = Mapping[str, np.ndarray]

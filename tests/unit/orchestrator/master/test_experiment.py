@@ -11,10 +11,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from orchestrator.errors import InputError
-from orchestrator.experiments.preparation import load
+from orchestrator.machine.errors import InputError
+from orchestrator.master.decimation import paces
 from orchestrator.master.experiment import MOST_STEPS, Experiment
-from orchestrator.master.paces import paces
+from orchestrator.runs.preparation import load
 
 
 @given(step=st.floats(1e-3, 1.0), n=st.integers(1, 200), rest=st.floats(0.0, 0.99))

@@ -14,14 +14,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestrator.experiments.preparation import Prepared, Request
 from orchestrator.master import identity as module
-from orchestrator.master.events import Event, Stop
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.hooks.events import Event, Stop
+from orchestrator.master.hooks.playback import Course
 from orchestrator.master.identity import digest_of
-from orchestrator.master.isolated import Isolation
 from orchestrator.master.loop import chosen
-from orchestrator.master.playback import Course
+from orchestrator.runs.preparation import Prepared, Request
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.transformation import Linear

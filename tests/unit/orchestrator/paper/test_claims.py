@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from auv_fmu.vehicle import Vehicle, accelerations
-from orchestrator.analysis.signals import APPLIED, THETA_HAT, Y_D
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.observer import Header
-from orchestrator.master.table import Table
+from orchestrator.master.observers.observer import Header
+from orchestrator.master.observers.table import Table
 from orchestrator.paper import claims
 from orchestrator.paper.claims import CLAIMS, Claim
+from orchestrator.paper.kept_runs import Outcome
 from orchestrator.paper.measures import (
     Way,
     largest_error_after,
@@ -22,8 +22,8 @@ from orchestrator.paper.measures import (
     turning_radius,
     way_of,
 )
-from orchestrator.paper.outcomes import Outcome
 from orchestrator.system.names import PortName
+from orchestrator.vehicle.signals import APPLIED, THETA_HAT, Y_D
 
 ELL = 0.35
 ONES, TWOS, THREES = (1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (3.0, 3.0, 3.0)

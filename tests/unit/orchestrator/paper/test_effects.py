@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.master.table import Table
+from orchestrator.master.observers.table import Table
 from orchestrator.paper import effects
 from orchestrator.paper.effects import EFFECTS, LAMBDAS, NOISE_LEVELS, STEPS, show_effect
-from orchestrator.paper.outcomes import Outcome, Outcomes
+from orchestrator.paper.kept_runs import Outcome, Outcomes
 
 
 class Here:

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.experiments.scenario import names, read_scenario
-from orchestrator.master.table import Table
-from orchestrator.paper.outcomes import Outcome
-from orchestrator.paper.runs import Run
+from orchestrator.master.observers.table import Table
+from orchestrator.paper.kept_runs import Outcome
 from orchestrator.paper.sections import draw_section, sections, written
+from orchestrator.paper.variations import Run
+from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.system.names import port_name
 
 INDICES = {

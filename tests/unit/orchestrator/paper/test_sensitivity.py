@@ -7,13 +7,9 @@ import csv
 import numpy as np
 import pytest
 
-from orchestrator.analysis.signals import APPLIED as APPLIED_PORTS
-from orchestrator.analysis.signals import COMMANDED as COMMANDED_PORTS
-from orchestrator.analysis.signals import ELL, POSTURE, Y_D, tracking_error
-from orchestrator.experiments.preparation import Request, loaded, prepare
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.observer import Header
-from orchestrator.master.table import Table
+from orchestrator.master.observers.observer import Header
+from orchestrator.master.observers.table import Table
 from orchestrator.paper import choices
 from orchestrator.paper.choices import (
     FIVE,
@@ -30,9 +26,13 @@ from orchestrator.paper.printed_table import section
 from orchestrator.paper.sensitivity import PUBLISHED, as_read
 from orchestrator.paper.table import write_variants
 from orchestrator.paper.variants import errors, moved, numbers_of
+from orchestrator.runs.preparation import Request, loaded, prepare
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Run
 from orchestrator.system.names import port_name
+from orchestrator.vehicle.signals import APPLIED as APPLIED_PORTS
+from orchestrator.vehicle.signals import COMMANDED as COMMANDED_PORTS
+from orchestrator.vehicle.signals import ELL, POSTURE, Y_D, tracking_error
 from support.variants import (
     APPLIED,
     COMMANDED,

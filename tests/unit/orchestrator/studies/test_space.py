@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator.errors import InputError
-from orchestrator.experiments.preparation import loaded
+from orchestrator.machine.errors import InputError
+from orchestrator.runs.preparation import loaded
 from orchestrator.studies.engine import Run
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import MOST_RUNS, study_of

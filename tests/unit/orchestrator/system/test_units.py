@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.errors import InputError
+from orchestrator.machine.errors import InputError
 from orchestrator.system.transformation import Linear, Mapped, chained
 from orchestrator.system.units import UndefinedUnit, Unit, conversion
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.errors import InputError
+from orchestrator.machine.errors import InputError
 from orchestrator.studies.figures.entries import read_figures
 
 VARIED = {"plant.eta0.z": float, "controller.k_d": float, "controller.observer": str}
