@@ -19,8 +19,8 @@ from auv_fmu.closed_loop import LAWS, Scene, Setting, Vehicles
 from auv_fmu.euler import STEP
 from orchestrator import load, simulate
 from orchestrator.master.observers.table import Table
-from orchestrator.paper.formatting import table
 from orchestrator.paper.measures import total_variation_until
+from orchestrator.paper.page import table
 from orchestrator.studies.batch.flat import flat
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Run

@@ -1,8 +1,9 @@
-"""`auv-fmu build`, `list` and `gains`."""
+"""Commands that make FMUs: build, new; and what is known before a run: list, gains."""
 
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from orchestrator.commands.streams import show
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
 from orchestrator.runs.bundle import DEFAULT_FOLDERS, NATIVE, PYTHON
-from orchestrator.runs.own_controller import build_own
+from orchestrator.runs.own_controller import BASES, build_own, new_controller
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle import gains
@@ -63,6 +64,7 @@ def add_to(commands: Any) -> None:
     check = commands.add_parser("gains", help="check the conditions of Theorems 1 and 2")
     add_set(check)
     check.set_defaults(action=_gains)
+    _add_new(commands)
 
 
 def _build(options: argparse.Namespace) -> int:
@@ -103,4 +105,32 @@ def _list(_: argparse.Namespace) -> int:
 def _gains(options: argparse.Namespace) -> int:
     system = closed_loop(bundle.current_fmus()).with_parameters(assignments(options))
     show(*gains.check(system).splitlines())
+    return OK
+
+
+def _add_new(commands: Any) -> None:
+    new = commands.add_parser("new", help="begin something of your own")
+    kinds = new.add_subparsers(required=True, metavar="KIND")
+    controller = kinds.add_parser("controller", help="a folder with a controller that runs")
+    controller.add_argument("name", metavar="NAME", help="of the controller, MyLaw or my_law")
+    controller.add_argument(
+        "folder", nargs="?", type=Path, metavar="DIR", help="to make; default: NAME/"
+    )
+    controller.add_argument(
+        "--base",
+        choices=BASES,
+        default=BASES[0],
+        help="plain: PythonFMU alone; hardened: the base of the bundle's components, which checks "
+        f"values, saves states and survives exceptions; default: {BASES[0]}",
+    )
+    controller.set_defaults(action=_controller)
+
+
+def _controller(options: argparse.Namespace) -> int:
+    script, scenario, *others = new_controller(options.name, options.folder, options.base)
+    for path in (script, scenario, *others):
+        show(path)
+    show(f"change {script}, then build and run it:")
+    show(f"  auv-fmu build {script}")
+    show(f"  auv-fmu run {scenario} --out {script.parent}{os.sep}results")
     return OK

@@ -9,7 +9,7 @@ from typing import Any
 from orchestrator.commands.options import BAD_INPUT, OK, add_variant
 from orchestrator.commands.streams import show
 from orchestrator.formats.examination import examine, surprises
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings
 from orchestrator.master.fmi.binary import binary_of, check_binary
 from orchestrator.runs.preparation import SOME_TIME, Request, loaded, prepare
 from orchestrator.runs.waypoints import impossible_paths

@@ -6,8 +6,7 @@ import argparse
 from pathlib import Path
 
 from orchestrator.commands.streams import say
-from orchestrator.machine.errors import InputError
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings, InputError
 from orchestrator.master.experiment import ORDERS, order_of
 from orchestrator.master.loop import LOOPS
 from orchestrator.master.observers.observer import Ending

@@ -8,8 +8,8 @@ from typing import Any
 
 from orchestrator.commands.options import OK, add_force, add_kind, add_out
 from orchestrator.commands.streams import show
+from orchestrator.paper.printed_table import write_table
 from orchestrator.paper.report import write_report
-from orchestrator.paper.table import write_table
 from orchestrator.runs.scenario import names
 from orchestrator.studies.study import ready_studies
 

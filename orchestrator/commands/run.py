@@ -24,7 +24,7 @@ from orchestrator.commands.options import (
     status,
 )
 from orchestrator.commands.streams import say, show
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.master.experiment import COUPLINGS
 from orchestrator.master.fmi.isolated import STEP_TIMEOUT, isolation_of

@@ -9,12 +9,11 @@ import numpy as np
 from fmpy.model_description import ModelVariable
 
 from orchestrator.master.fmi.instance import Instance, Part
-from orchestrator.master.fmi.string_table import Texts
 from orchestrator.master.fmi.transfer import KINDS, are_integers
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.values import Value
+from orchestrator.system.values import Texts, Value
 
 #: A change so small, or so small a share of the value, is a rounding error.
 _ROUNDING = 1e-12

@@ -32,10 +32,9 @@ from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
 
 from orchestrator.machine.errors import InputError, shortened
 from orchestrator.master import stepper_types as layout
-from orchestrator.master.decimation import paces
-from orchestrator.master.experiment import JACOBI, ORDERS, Experiment, Order
+from orchestrator.master.experiment import JACOBI, ORDERS, Experiment, Order, paces
 from orchestrator.master.fmi.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
-from orchestrator.master.fmi.mode import PRODUCT, A, B, C, put_back
+from orchestrator.master.fmi.surroundings import PRODUCT, A, B, C, put_back
 from orchestrator.master.gathering import Gathering
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Row

@@ -12,18 +12,15 @@ import numpy as np
 
 from orchestrator.machine.errors import InputError, StartError, reason, unforeseen
 from orchestrator.machine.interrupts import held_interrupts
-from orchestrator.master.coupling import Coupling
-from orchestrator.master.decimation import paces
+from orchestrator.master.coupling import Coupling, Growth
 from orchestrator.master.ends import to_its_end
-from orchestrator.master.experiment import LINEAR, OURS, Exchange, Experiment
+from orchestrator.master.experiment import LINEAR, OURS, Exchange, Experiment, paces
 from orchestrator.master.fmi.instance import ComponentFailed, Ended, Instance
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.fmi.log import Log
-from orchestrator.master.fmi.mode import default_mode
 from orchestrator.master.fmi.placement import placed
-from orchestrator.master.fmi.surroundings import Surroundings
+from orchestrator.master.fmi.surroundings import Surroundings, default_mode
 from orchestrator.master.gathering import Signals
-from orchestrator.master.growth import Growth
 from orchestrator.master.hooks.hook import Attendance, Attendant, Run
 from orchestrator.master.linear import check_linear
 from orchestrator.master.loop import PYTHON_LOOP, Loop

@@ -17,9 +17,13 @@ from auv_fmu.output_feedback import Gains
 from auv_fmu.proof.attraction import theorem
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from auv_fmu.vehicle import Vehicle
-from orchestrator.paper.formatting import actuator_values, numbers
 from orchestrator.paper.kept_runs import Outcome
 from orchestrator.paper.measures import (
+    EFFORT_PD,
+    EFFORT_PROPOSED,
+    FINAL_ERROR_PD,
+    FINAL_ERROR_PROPOSED,
+    TURNING_RADIUS,
     largest_error_after,
     largest_estimate,
     sum_without_step,
@@ -27,13 +31,7 @@ from orchestrator.paper.measures import (
     turning_radius,
     way_of,
 )
-from orchestrator.paper.published import (
-    EFFORT_PD,
-    EFFORT_PROPOSED,
-    FINAL_ERROR_PD,
-    FINAL_ERROR_PROPOSED,
-    TURNING_RADIUS,
-)
+from orchestrator.paper.page import actuator_values, numbers
 from orchestrator.paper.variations import Run
 from orchestrator.studies.engine import REACHED
 

@@ -23,9 +23,9 @@ from orchestrator.figures import (
 )
 from orchestrator.figures.style import WIDTH, styled
 from orchestrator.paper.claims import FIVE, FIVE_PD, QUIET, SEVEN
-from orchestrator.paper.formatting import actuator_values, numbers, picture, plain
 from orchestrator.paper.kept_runs import Outcome
-from orchestrator.paper.published import EFFORT_PD, EFFORT_PROPOSED
+from orchestrator.paper.measures import EFFORT_PD, EFFORT_PROPOSED
+from orchestrator.paper.page import actuator_values, numbers, picture, plain
 from orchestrator.paper.variations import Run
 from orchestrator.vehicle.certificates import COLUMNS, certificates
 from orchestrator.vehicle.signals import ACTUATORS, AXES, limits

@@ -1,4 +1,4 @@
-"""Numbers of a run that claims speak of, beyond the indices of every run."""
+"""Measures of a run that the paper's claims are about, and the numbers that it prints."""
 
 from __future__ import annotations
 
@@ -10,6 +10,15 @@ import numpy as np
 from orchestrator.master.observers.table import Table
 from orchestrator.studies.engine import REACHED
 from orchestrator.vehicle.signals import APPLIED, THETA_HAT, tracking_error
+
+#: Control efforts of section 4.2, in the order u, q, r.
+EFFORT_PROPOSED, EFFORT_PD = (130.0, 40.0, 53.0), (235.0, 163.0, 172.0)
+
+#: e_f of section 4.2, in the order x, y, z [m].
+FINAL_ERROR_PROPOSED, FINAL_ERROR_PD = (0.01, 0.02, 0.06), (0.004, 0.001, 0.001)
+
+#: Turning radius of section 4.1 [m].
+TURNING_RADIUS = 0.6
 
 
 def sum_without_step(l2: Any, duration: Any, h: float) -> Any:

@@ -12,13 +12,19 @@ from typing import Any
 
 from orchestrator.machine.ledger import RECORD
 from orchestrator.machine.workers import Workers, workers
-from orchestrator.paper import errata, printed_table, readings, studies
+from orchestrator.paper import errata, printed_table, readings
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS, show_effect
-from orchestrator.paper.formatting import table
 from orchestrator.paper.kept_runs import Outcomes
-from orchestrator.paper.page import contents, html
-from orchestrator.paper.sections import Section, draw_section, sections, written
+from orchestrator.paper.page import contents, html, table
+from orchestrator.paper.sections import (
+    Section,
+    draw_section,
+    make_studies,
+    sections,
+    study_sections,
+    written,
+)
 from orchestrator.paper.variants import all_variants
 from orchestrator.runs.bundle import PYTHON, current_fmus
 from orchestrator.runs.folder import inner, replaced
@@ -90,7 +96,7 @@ def write_report(
     fmus = current_fmus(kind)
     chapters = sections(scenarios, kind)
     outcomes = Outcomes(inner(folder, _RUNS), stop_time, kind, force)
-    made = studies.make_studies(ready, inner(folder, _STUDIES), kind, command, force)
+    made = make_studies(ready, inner(folder, _STUDIES), kind, command, force)
     with replaced(folder, (*_NAMES, RECORD), force=force) as unfinished:
         with workers() as crew:
             outcomes.make(
@@ -103,7 +109,7 @@ def write_report(
             )
             notes, effects = _draw(chapters, outcomes, unfinished, crew)
             held = printed_table.section(all_variants(crew)) if variants else _NO_VARIANTS
-        shown = list(studies.sections(made, folder / _STUDIES, unfinished))
+        shown = list(study_sections(made, folder / _STUDIES, unfinished))
         parts = _text(chapters, outcomes, notes, effects, command, unfinished, fmus, shown, held)
         body = "\n\n".join(parts)
         body = readings.linked(body)

@@ -1,8 +1,9 @@
-"""A section of the report for each scenario: its figure, its indices, and what in it is ours."""
+"""Sections of the report: a scenario with its figure and indices, a study with its figures."""
 
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
@@ -11,12 +12,15 @@ from typing import Any
 
 from orchestrator.figures import FIGURES, Drawn, draw
 from orchestrator.machine.errors import InputError, did_you_mean
-from orchestrator.paper.formatting import actuator_values, numbers, picture, plain, table
 from orchestrator.paper.kept_runs import Outcome, Outcomes
+from orchestrator.paper.page import actuator_values, numbers, picture, plain, table
 from orchestrator.paper.variations import Run
 from orchestrator.runs.bundle import PYTHON
+from orchestrator.runs.folder import inner
 from orchestrator.runs.scenario import Scenario, read_scenario
-from orchestrator.system.names import port_name
+from orchestrator.studies.study import Study, read_study, ready_studies
+from orchestrator.studies.sweep import Means, swept
+from orchestrator.system.names import file_name, port_name
 
 #: The parameter that decides whether a run has a twin without noise.
 _NOISE = "plant.noise.std"
@@ -179,3 +183,59 @@ def _ours(scenario: Scenario) -> Iterator[str]:
         is_short = value is not None and not isinstance(value, Mapping)
         stated = f"{name} = {json.dumps(value, default=str)}" if is_short else name
         yield f"- `{stated}`: {plain(why)}"
+
+
+_WITHOUT = (
+    f"Not in this report: {', '.join(ready_studies())}, each 10,000 runs or more. "
+    "`auv-fmu report --studies` makes them, or what is missing of them."
+)
+
+
+def make_studies(
+    names: Sequence[str], folder: Path, kind: str, command: Sequence[str], force: bool = False
+) -> list[Study]:
+    """Make what is missing of some studies.
+
+    Args:
+        names: of ready studies, or paths of files.
+        folder: in which each has a folder, from one report to the next.
+        kind: of the bundle's FMUs.
+        command: for the record.
+        force: move aside files of the user's that are in the way.
+
+    Raises:
+        InputError: something about a study is not usable, or cannot be written.
+        KeyboardInterrupt: somebody wants it to stop; what is done is kept.
+
+    """
+    studies = [read_study(name) for name in names]
+    for study in studies:
+        place = inner(folder, study.stem)
+        swept(study, Means(kind=kind, force=force), place, command, progress=True)
+    return studies
+
+
+def study_sections(studies: Sequence[Study], kept: Path, folder: Path) -> Iterator[str]:
+    """A section for each study, in Markdown.
+
+    Args:
+        studies: that were made.
+        kept: the folder that has their folders.
+        folder: of the report, into which their figures go.
+
+    """
+    if not studies:
+        yield _WITHOUT
+    for study in studies:
+        title = plain(study.title or study.name)
+        yield f"### {title}"
+        figures = Path("figures", "studies", study.stem)
+        (folder / figures).mkdir(parents=True)
+        for figure in study.figures:
+            file = kept / study.stem / f"{file_name(figure)}.png"
+            if file.is_file():
+                shutil.copy(file, folder / figures)
+                yield picture(f"{title}: {figure}", (figures / file.name).as_posix())
+        if study.remark:
+            yield study.remark.strip()
+        yield f"- `auv-fmu sweep {study.name}`"

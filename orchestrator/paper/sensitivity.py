@@ -22,12 +22,13 @@ from orchestrator.paper.choices import (
     Choice,
     options_of,
 )
-from orchestrator.paper.measures import Way, sum_without_step
-from orchestrator.paper.published import (
+from orchestrator.paper.measures import (
     EFFORT_PD,
     EFFORT_PROPOSED,
     FINAL_ERROR_PD,
     FINAL_ERROR_PROPOSED,
+    Way,
+    sum_without_step,
 )
 from orchestrator.studies.engine import REACHED
 

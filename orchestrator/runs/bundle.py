@@ -1,4 +1,4 @@
-"""The bundle: every FMU and the SSP of the closed loop, built when missing or stale.
+"""The FMUs of the installed sources, built when they are needed, and their bill of materials.
 
 `auv-fmu build` writes it where the user wants it. Runs use FMUs of their own in the user's cache
 folder, one folder for each version of the sources and each kind of FMU, so that nothing appears
@@ -10,25 +10,77 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+from collections.abc import Sequence
 from functools import cache
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.machine.cache import folder_of, keep, kept, users_folder
 from orchestrator.machine.children import run_module
 from orchestrator.machine.errors import InputError, last_line, reason
+from orchestrator.machine.ledger import digest_of
 from orchestrator.machine.locks import claimed, process_folder
-from orchestrator.runs.bill_of_materials import (
-    BILL,
-    CHECKSUMS,
-    bill,
-    checksums,
-)
 from orchestrator.runs.folder import replaced
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import WRITABLE
+
+CHECKSUMS, BILL = "SHA256SUMS", "bom.cdx.json"
+
+
+def checksums(files: Sequence[Path]) -> bytes:
+    """Checksums as `sha256sum --check` reads them."""
+    return "".join(f"{digest_of(path)}  {path.name}\n" for path in files).encode()
+
+
+def bill(files: Sequence[Path], contained: Sequence[str]) -> bytes:
+    """CycloneDX 1.5: the files of the bundle and the packages whose code they contain.
+
+    Without time and serial number: the same bundle has the same bill.
+
+    Args:
+        files: of the bundle.
+        contained: the packages, besides ours.
+
+    """
+    ours, *others = map(_package, ("auv-fmu", *contained))
+    content = {
+        "bomFormat": "CycloneDX",
+        "specVersion": "1.5",
+        "version": 1,
+        "metadata": {"component": ours},
+        "components": [
+            *others,
+            *(
+                {
+                    "type": "file",
+                    "name": path.name,
+                    "hashes": [{"alg": "SHA-256", "content": digest_of(path)}],
+                }
+                for path in files
+            ),
+        ],
+        "dependencies": [
+            {"ref": ours["bom-ref"], "dependsOn": [package["bom-ref"] for package in others]}
+        ],
+    }
+    return (json.dumps(content, indent=2) + "\n").encode()
+
+
+def _package(name: str) -> dict[str, Any]:
+    reference = f"pkg:pypi/{name}@{version(name)}"
+    return {
+        "type": "library",
+        "bom-ref": reference,
+        "name": name,
+        "version": version(name),
+        "licenses": [{"license": {"id": "MIT"}}],
+        "purl": reference,
+    }
+
 
 #: The kinds of FMU that a component comes as: Python sources, or their translation to C.
 KINDS = PYTHON, NATIVE = "python", "native"

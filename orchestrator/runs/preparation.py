@@ -17,11 +17,19 @@ from orchestrator.formats.osp import STRUCTURE as OSP
 from orchestrator.formats.osp import read_osp
 from orchestrator.formats.ssp import STRUCTURE as SSD
 from orchestrator.formats.ssp.reader import read_ssp
-from orchestrator.machine.errors import InputError
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.reading import is_folder
-from orchestrator.master.decimation import paces, step_of, with_common_step
-from orchestrator.master.experiment import GAUSS_SEIDEL, LINEAR, ORDERS, SOLVE, Experiment, Order
+from orchestrator.master.experiment import (
+    GAUSS_SEIDEL,
+    LINEAR,
+    ORDERS,
+    SOLVE,
+    Experiment,
+    Order,
+    paces,
+    step_of,
+    with_common_step,
+)
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.clock import check_factor
 from orchestrator.master.hooks.events import Alter, Event, Events, Set

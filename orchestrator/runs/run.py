@@ -34,10 +34,15 @@ from orchestrator.runs.resume import FOLDER, checkpoints_of, leave
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import file_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.cautions import WATCHED, cautions, cautions_after, cautions_beside
+from orchestrator.vehicle.cautions import (
+    WATCHED,
+    cautions,
+    cautions_after,
+    cautions_beside,
+    velocities_reaching,
+)
 from orchestrator.vehicle.certificates import CertificatesFile
 from orchestrator.vehicle.metrics import Metrics
-from orchestrator.vehicle.sensors import velocities_reaching
 from orchestrator.vehicle.signals import CONTROLLER
 
 #: The table of the certificates.

@@ -11,8 +11,7 @@ from sys import float_info
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, plain, splits
-from orchestrator.system.transformation import Linear, Mapped, Transformation
-from orchestrator.system.units import conversion, unit_of_port
+from orchestrator.system.units import Linear, Mapped, Transformation, conversion, unit_of_port
 from orchestrator.system.values import INTEGERS, Value, type_of, typed, unit_of
 
 #: What can be fed from another type, besides from its own: no value is lost on the way.

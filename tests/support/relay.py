@@ -10,7 +10,7 @@ from zipfile import ZipFile
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.transformation import Linear, Mapped, Transformation
+from orchestrator.system.units import Linear, Mapped, Transformation
 from support.compiled import library_of
 
 _SOURCE = Path(__file__).with_name("relay.c")

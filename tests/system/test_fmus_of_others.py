@@ -14,15 +14,14 @@ import pytest
 
 from orchestrator.commands.main import main
 from orchestrator.formats.ssp.writer import write_ssp
-from orchestrator.machine.errors import InputError
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings, InputError
 from orchestrator.master.hooks.playback import Playback
 from orchestrator.runs.inputs import Inputs, read_inputs
 from orchestrator.runs.stored import read_result
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.transformation import Linear
+from orchestrator.system.units import Linear
 from support.others import WAYS, build, run, system_of
 
 #: Outputs by the inputs that they repeat.

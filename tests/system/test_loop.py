@@ -25,7 +25,7 @@ from orchestrator.master.simulation import simulate
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from orchestrator.system.transformation import Linear
+from orchestrator.system.units import Linear
 from support.machine import LOOPS
 from support.mixed import ACTS, CALLS, Shape, altered, system_of, systems
 

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 
 from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
-from orchestrator.master.decimation import paces
-from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.experiment import ORDERS, Experiment, paces
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
@@ -28,7 +27,7 @@ from orchestrator.runs.scenario import Scenario
 from orchestrator.system.graph import delayed
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from orchestrator.system.transformation import Linear, Mapped
+from orchestrator.system.units import Linear, Mapped
 from support.machine import LOOPS
 from support.relay import Clock, Wire, expected, relay, system_of
 

@@ -10,7 +10,7 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.paper import table
+from orchestrator.paper import printed_table as table
 from orchestrator.paper.choices import OF_RUNS, OF_RUNS_OF_FIVE, PD, PROPOSED, Choice
 from orchestrator.paper.measures import way_of
 from orchestrator.paper.printed_table import NUMBERS

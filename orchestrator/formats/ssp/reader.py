@@ -1,10 +1,11 @@
-"""An SSP archive as a system."""
+"""An SSP archive as a system, and the experiment that it states."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 from orchestrator.formats.ssp import LEFT_OPEN
@@ -12,17 +13,66 @@ from orchestrator.formats.ssp.archive import Archive, listed
 from orchestrator.formats.ssp.bindings import Bindings, Values
 from orchestrator.formats.ssp.building import Builder
 from orchestrator.formats.ssp.definitions import definitions_of
-from orchestrator.formats.ssp.experiment import annotated, step_of, times_of
 from orchestrator.formats.ssp.hierarchy import Leaf, Node, Way
 from orchestrator.formats.ssp.wires import Course, Wires
-from orchestrator.machine.errors import InputError, shortened
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings, InputError, shortened
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.transformation import Transformation, chained
-from orchestrator.system.units import Unit
+from orchestrator.system.units import Transformation, Unit, chained
 from orchestrator.system.values import BOOLEANS, Value, real, typed
+
+#: Elements and attributes of annotations that hold the step of a whole system: those of libcosim
+#: and ecos, of Vico, and of OMSimulator.
+_STEPS = (
+    ("FixedStepAlgorithm", "baseStepSize"),
+    ("FixedStepMaster", "baseStepSize"),
+    ("FixedStepMaster", "stepSize"),
+    ("SimulationInformation", "fixedStepSize"),
+)
+
+#: That of a component.
+_STEP_OF_A_COMPONENT = ("StepSizeHint", "value")
+
+
+class Times(NamedTuple):
+    """The experiment of a description [s]; None: it does not say."""
+
+    start_time: float | None
+    stop_time: float | None
+    step: float | None
+
+
+def times_of(archive: Archive, root: Element) -> Times:
+    """The experiment that a description asks for."""
+    experiment = root.find("DefaultExperiment")
+    stated = (
+        archive.number(element, attribute, None)
+        for name, attribute in _STEPS
+        for place in (experiment, root.find("System"), root)
+        for element in annotated(place, name)
+    )
+    return Times(
+        archive.number(experiment, "startTime", None),
+        archive.number(experiment, "stopTime", None),
+        next((step for step in stated if step is not None), None),
+    )
+
+
+def step_of(archive: Archive, leaf: Leaf) -> float | None:
+    """The step that a component asks for [s]; None, as zero does: it has no wish."""
+    name, attribute = _STEP_OF_A_COMPONENT
+    for element in annotated(leaf.content, name):
+        return archive.number(element, attribute, None) or None
+    return None
+
+
+def annotated(element: Element | None, name: str) -> Iterator[Element]:
+    """Elements of a name in the annotations of an element itself."""
+    if element is not None:
+        for annotations in element.findall("Annotations"):
+            yield from annotations.iter(name)
+
 
 _ROOT = "SystemStructureDescription"
 

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 from orchestrator.formats.ssp.archive import Archive
+from orchestrator.formats.ssp.definitions import converts_units, transformation_of
 from orchestrator.formats.ssp.hierarchy import GIVES, TAKES, Bus, Connector, Group, Leaf, Node
-from orchestrator.formats.ssp.transformations import converts_units, transformation_of
 from orchestrator.machine.errors import InputError, did_you_mean
-from orchestrator.system.transformation import Linear, Transformation, chained
-from orchestrator.system.units import Unit
+from orchestrator.system.units import Linear, Transformation, Unit, chained
 
 #: Parts of arrays and the like, which FMI 2.0 does not have.
 _UNSUPPORTED = ("startIndices", "endIndices")

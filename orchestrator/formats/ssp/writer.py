@@ -12,8 +12,7 @@ from orchestrator.formats.ssp import LEFT_OPEN, OMS, OSP, SSC, SSD, SSV, STRUCTU
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, file_name, plain
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.transformation import Linear, Mapped
-from orchestrator.system.units import BASES
+from orchestrator.system.units import BASES, Linear, Mapped
 from orchestrator.system.values import Value, literal, type_of
 
 #: Name of every parameter set: ecos applies the sets of the one name that it is given.

@@ -10,8 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from orchestrator.master import stepper_types as layout
-from orchestrator.master.fmi.string_table import Texts
-from orchestrator.system.values import Value
+from orchestrator.system.values import Texts, Value
 
 #: What a component is asked for in every step, one after the other.
 CALLS = SET_INPUTS, DO_STEP, GET_OUTPUTS = "setting inputs", "fmi2DoStep", "getting outputs"

@@ -28,10 +28,9 @@ from orchestrator.master import stepper_types as layout
 from orchestrator.master.fmi.channel import LONGEST_NOTE, LONGEST_STATE, Channel, sizes
 from orchestrator.master.fmi.instance import ComponentFailed, Ended, Instance, Part
 from orchestrator.master.fmi.log import Log
-from orchestrator.master.fmi.string_table import Texts
 from orchestrator.master.fmi.supervisor import END
 from orchestrator.system.component import Component
-from orchestrator.system.values import Value, is_integer, is_of
+from orchestrator.system.values import Texts, Value, is_integer, is_of
 
 #: How long a call may take by default [s]: an FMU may fetch a licence or read maps first.
 STEP_TIMEOUT = 60.0

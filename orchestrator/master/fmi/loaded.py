@@ -44,11 +44,10 @@ from orchestrator.master import stepper_types as layout
 from orchestrator.master.fmi.binary import Library, library_of, named
 from orchestrator.master.fmi.instance import DO_STEP, ComponentFailed, Ended, Instance, Part
 from orchestrator.master.fmi.log import Listener
-from orchestrator.master.fmi.mode import put_back
-from orchestrator.master.fmi.string_table import Texts
+from orchestrator.master.fmi.surroundings import put_back
 from orchestrator.master.fmi.transfer import Block, text_of
 from orchestrator.system.component import Component
-from orchestrator.system.values import Value
+from orchestrator.system.values import Texts, Value
 
 #: FMI's categories of messages about what goes wrong (FMI 2.0.4, section 2.2.4).
 _LOGGED = {f"logStatus{status}" for status in ("Warning", "Discard", "Error", "Fatal")}

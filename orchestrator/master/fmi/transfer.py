@@ -19,7 +19,7 @@ from fmpy.fmi2 import (
 )
 
 from orchestrator.master import stepper_types as layout
-from orchestrator.master.fmi.string_table import Texts
+from orchestrator.system.values import Texts
 
 #: Kinds of values that can be connected and recorded, with FMI's functions for them and the types
 #: that they are moved in: for a String moves the number of its text.

@@ -18,13 +18,13 @@ from orchestrator.master.fmi.channel import Channel, sizes
 from orchestrator.master.fmi.instance import ComponentFailed, Ended
 from orchestrator.master.fmi.loaded import LoadedInstance, loaded
 from orchestrator.master.fmi.log import Letters
-from orchestrator.master.fmi.string_table import Texts
 from orchestrator.master.fmi.surroundings import Surroundings
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import member, step
 from orchestrator.system.component import Component
 from orchestrator.system.description import read_description
 from orchestrator.system.structure import System
+from orchestrator.system.values import Texts
 
 
 @np.errstate(all="ignore")

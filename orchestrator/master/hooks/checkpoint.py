@@ -24,10 +24,9 @@ from uuid import uuid4
 
 import numpy as np
 
-from orchestrator.machine.atomic import write_whole
+from orchestrator.machine.atomic import sealed, unsealed, write_whole
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.ledger import moved_aside
-from orchestrator.machine.sealed import sealed, unsealed
 from orchestrator.master.fmi.log import Log
 from orchestrator.master.hooks.hook import NEVER, Lasting, Run
 from orchestrator.master.hooks.row_log import Spool, begins

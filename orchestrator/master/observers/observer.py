@@ -17,8 +17,8 @@ import numpy as np
 from orchestrator.machine.errors import unforeseen
 from orchestrator.master import stepper_types as layout
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.fmi.string_table import Texts
 from orchestrator.system.names import PortName
+from orchestrator.system.values import Texts
 
 #: Rows in a block, and the longest time until observers are told of them [s].
 _ROWS, _PATIENCE = 512, 0.2

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from orchestrator.machine import locks as leftovers
+from orchestrator.machine.atomic import sealed
 from orchestrator.machine.locks import claimed, process_folder
-from orchestrator.machine.sealed import sealed
 from support.machine import contents, ended, eventually, forked
 
 

@@ -89,7 +89,7 @@ def test_a_compiler_that_fails_is_quoted(tmp_path, cache, monkeypatch, said, hea
 @pytest.mark.parametrize("length", [0, 100, 3000, -1])
 def test_a_library_that_was_cut_is_never_loaded_but_made_anew(cache, length, monkeypatch):
     # In another process: this one would hold on to the library.
-    code = "from orchestrator.master import library; print(library.made()._name)"
+    code = "from orchestrator.master import compiled; print(compiled.made()._name)"
     [place] = map(Path, subprocess.check_output([sys.executable, "-c", code]).decode().split())
     content = place.read_bytes()
     place.write_bytes(content[:length])
@@ -142,7 +142,7 @@ def test_processes_that_compile_at_once_do_so_once(tmp_path, cache):
         f'#!/bin/sh\necho compiled >> {tmp_path}/log\nexec {shutil.which("cc")} "$@"\n'
     )
     (tmp_path / "cc").chmod(0o755)
-    code = "from orchestrator.master import library; library.made().advance"
+    code = "from orchestrator.master import compiled; compiled.made().advance"
     environment = {**os.environ, "PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
     processes = [
         subprocess.Popen([sys.executable, "-P", "-c", code], env=environment) for _ in range(4)

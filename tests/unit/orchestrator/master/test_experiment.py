@@ -12,8 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from orchestrator.machine.errors import InputError
-from orchestrator.master.decimation import paces
-from orchestrator.master.experiment import MOST_STEPS, Experiment
+from orchestrator.master.experiment import MOST_STEPS, Experiment, paces
 from orchestrator.runs.preparation import load
 
 

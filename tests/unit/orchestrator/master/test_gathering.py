@@ -11,7 +11,7 @@ import pytest
 from orchestrator.master.gathering import Gathering, Signals
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection
-from orchestrator.system.transformation import Linear, Mapped
+from orchestrator.system.units import Linear, Mapped
 
 OUT, FED, ALSO, FREE = (PortName("a", name) for name in ("out", "fed", "also", "free"))
 

@@ -24,7 +24,7 @@ from orchestrator.master.loop import chosen
 from orchestrator.runs.preparation import Prepared, Request
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from orchestrator.system.transformation import Linear
+from orchestrator.system.units import Linear
 from support.runs import prepared
 
 

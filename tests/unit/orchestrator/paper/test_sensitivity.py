@@ -22,9 +22,8 @@ from orchestrator.paper.choices import (
     runs,
 )
 from orchestrator.paper.measures import Way
-from orchestrator.paper.printed_table import section
+from orchestrator.paper.printed_table import section, write_variants
 from orchestrator.paper.sensitivity import PUBLISHED, as_read
-from orchestrator.paper.table import write_variants
 from orchestrator.paper.variants import errors, moved, numbers_of
 from orchestrator.runs.preparation import Request, loaded, prepare
 from orchestrator.studies.batch_engine import BatchEngine

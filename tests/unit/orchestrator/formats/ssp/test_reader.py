@@ -12,10 +12,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from orchestrator.formats.ssp.reader import read_ssp
-from orchestrator.machine.errors import InputError
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings, InputError
 from orchestrator.system.structure import System
-from orchestrator.system.transformation import Linear, Mapped
+from orchestrator.system.units import Linear, Mapped
 from support.archives import (
     archive,
     binding,

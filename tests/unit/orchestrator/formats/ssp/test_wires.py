@@ -12,11 +12,10 @@ from hypothesis import strategies as st
 
 from orchestrator.formats.ssp import reader as reading
 from orchestrator.formats.ssp.hierarchy import Node
-from orchestrator.machine.errors import InputError
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings, InputError
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection
-from orchestrator.system.transformation import chained
+from orchestrator.system.units import chained
 from support.archives import (
     archive,
     binding,
