@@ -17,11 +17,11 @@ from time import perf_counter
 
 import numpy as np
 
-from orchestrator.master.compiled import made
 from orchestrator.master.experiment import COUPLINGS, Experiment
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
+from orchestrator.master.stepper import made
 from orchestrator.system.structure import System
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))

@@ -14,12 +14,11 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from orchestrator.machine.errors import InputError
-from orchestrator.master.compiled import kept, made
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.hook import Run
 from orchestrator.master.schedule import step
-from orchestrator.master.stepper import stepped
+from orchestrator.master.stepper import kept, made, stepped
 
 #: Loops that can be asked for; the first is the default.
 LOOPS = ("auto", "python", "compiled")

@@ -15,8 +15,8 @@ from typing import Any
 
 from tqdm import tqdm
 
+from orchestrator.machine.compiler import machines_compiler
 from orchestrator.machine.errors import InputError
-from orchestrator.master.compiled import machines_compiler
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import PACKAGES, digest_of
 from orchestrator.master.loop import LOOPS

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from orchestrator.machine.errors import InputError
-from orchestrator.master.compiled import made
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.instance import ComponentFailed
 from orchestrator.master.fmi.isolated import Isolation
@@ -18,6 +17,7 @@ from orchestrator.master.hooks.hook import Run
 from orchestrator.master.loop import PYTHON_LOOP, Loop, chosen
 from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
+from orchestrator.master.stepper import made
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from support.linear import QUARTER_TRUCK, SINE, TWO_MASSES, Model, Part, error, linear, system_of

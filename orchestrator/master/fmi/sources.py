@@ -15,9 +15,9 @@ import fmpy
 from fmpy.model_description import read_build_description
 
 from orchestrator.machine import cache as user_cache
+from orchestrator.machine.compiler import compiler
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.machine.locks import claimed, process_folder
-from orchestrator.master.compiled import compiler
 from orchestrator.system.component import Component
 
 #: As the standard of C has it: no product is contracted with a sum, nothing is reordered.
