@@ -165,7 +165,7 @@ def _animate(options: argparse.Namespace) -> int:
             prepared.experiment,
             observers,
             loop=prepared.loop,
-            attendants=prepared.attendants(),
+            hooks=prepared.hooks(),
         )
         if missing := seen.missing(*CONTROL_POINT):
             raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")

@@ -16,7 +16,7 @@ from orchestrator.master.experiment import (
     SOLVE,
     Exchange,
     Experiment,
-    paces,
+    decimations,
 )
 from orchestrator.master.fmi.instance import Instance
 from orchestrator.master.fmi.log import Log
@@ -25,7 +25,7 @@ from orchestrator.master.linear import LinearSteps
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import Action, Stage, delays, schedule, stages
+from orchestrator.master.schedule import Stage, StageCall, delays, schedule, stages
 from orchestrator.master.settling import Settling
 from orchestrator.system.graph import has_feedthrough, rings
 from orchestrator.system.names import PortName
@@ -156,7 +156,7 @@ class Coupling:
         if self._experiment.coupling == LINEAR:
             settling = self._settling(self._solved)
             steps = LinearSteps(system, instances, row, settling)
-            stage = Stage(Gathering.along(row, ()), [Action(steps.step).member])
+            stage = Stage(Gathering.along(row, ()), [StageCall(steps.step).member])
             return [stage], settling.gatherings
         found = schedule(
             system,
@@ -195,7 +195,7 @@ class Coupling:
         else:
             for ring in self._rings:
                 reasons |= ring.unsolved()
-            for name, n in paces(system, self._experiment.step).items():
+            for name, n in decimations(system, self._experiment.step).items():
                 if n > 1:
                     reasons[name] = f"{name} takes longer steps"
         solved = rings(system, system.components.keys() - reasons.keys())

@@ -181,7 +181,7 @@ def _rounded(n: float) -> float:
 _MOST_PARTS = 1000
 
 
-def paces(system: System, step: float) -> dict[str, int]:
+def decimations(system: System, step: float) -> dict[str, int]:
     """How many communication steps each component takes in one of its own.
 
     Args:

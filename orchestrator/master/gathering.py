@@ -71,7 +71,7 @@ class Gathering:
         self.is_plain = bool(plain.all()) and not self.mapped
 
 
-class Signals:
+class Overrides:
     """All that is gathered in a step, and what somebody does to it for some time."""
 
     def __init__(

@@ -13,7 +13,7 @@ from orchestrator.master.fmi.transfer import KINDS, are_integers
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.values import Texts, Value
+from orchestrator.system.values import StringTable, Value
 
 #: A change so small, or so small a share of the value, is a rounding error.
 _ROUNDING = 1e-12
@@ -61,7 +61,7 @@ class Row:
         self.values = np.zeros(n + more)
         self.shown = self.values[:n]
         self.columns: dict[PortName, int] = {}
-        self.texts, self.text_ports = Texts(), set[PortName]()
+        self.strings, self.text_ports = StringTable(), set[PortName]()
         self._hidden: dict[PortName, int] = {}
         self._sources = {c.target: c.source for c in system.connections}
         self._ports: dict[str, list[tuple[PortName, str, str]]] = {name: [] for name in instances}
@@ -90,7 +90,7 @@ class Row:
                 self.values[i] = self.number(system.components[component].starts.get(port.name, 0))
         for component, instance in instances.items():
             part = self.values[firsts.get(component, 0) :]
-            instance.tie(part, parts[component], self.texts)
+            instance.tie(part, parts[component], self.strings)
         self._hiding = {name: self.hidden(self._outputs(name)) for name in hidden}
         self.enter(system.parameters)
 
@@ -105,7 +105,7 @@ class Row:
 
     def number(self, value: Value) -> float:
         """What stands for a value in the row."""
-        return self.texts.number(value) if isinstance(value, str) else float(value)
+        return self.strings.number(value) if isinstance(value, str) else float(value)
 
     def wrong(self, components: Iterable[str]) -> str | None:
         """The first value that is no number, infinite, or none of an input's type, in words.

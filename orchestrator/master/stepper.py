@@ -16,10 +16,19 @@ from orchestrator.machine import cache as user_cache
 from orchestrator.machine.compiler import Compiler, compiler, of_the_machine
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.machine.locks import claimed, process_folder
-from orchestrator.master import stepper_types as layout
 from orchestrator.master.fmi.instance import CALLS
 from orchestrator.master.hooks.hook import Run
-from orchestrator.master.schedule import Pace, Stage
+from orchestrator.master.schedule import Decimation, Stage
+from orchestrator.master.stepper_types import (
+    DUE,
+    FAILED,
+    CBlock,
+    CFailure,
+    CMapping,
+    CMember,
+    CRun,
+    CStage,
+)
 
 _SOURCE = Path(__file__).with_name("stepper.c")
 
@@ -41,13 +50,13 @@ def stepped(library: CDLL, run: Run) -> Iterator[None]:
     advance = library.advance
     advance.restype = c_int
     advance.argtypes = (
-        POINTER(layout.Run), c_size_t, c_size_t, c_double, POINTER(layout.Block),
-        POINTER(layout.Failure),
+        POINTER(CRun), c_size_t, c_size_t, c_double, POINTER(CBlock),
+        POINTER(CFailure),
     )  # fmt: skip
     stages, row, experiment, blocks = run.stages, run.row, run.experiment, run.blocks
     steps = experiment.rows - 1
-    plan = layout.Run(
-        (layout.Stage * len(stages))(*map(_laid_out, stages)),
+    plan = CRun(
+        (CStage * len(stages))(*map(_laid_out, stages)),
         row.values.ctypes.data,
         len(stages),
         len(row.shown),
@@ -57,38 +66,38 @@ def stepped(library: CDLL, run: Run) -> Iterator[None]:
         experiment.full_steps,
         steps,
     )
-    block, failure = blocks.block, layout.Failure()
-    outcome = layout.DUE
-    while outcome == layout.DUE and run.made < steps:
+    block, failure = blocks.block, CFailure()
+    outcome = DUE
+    while outcome == DUE and run.made < steps:
         if block.n == block.most:
             blocks.hand_over()
         before = block.n
         outcome = advance(plan, run.made, min(run.due, steps), _GLANCE, block, failure)
         run.made += block.n - before
         yield
-    if outcome == layout.FAILED:
+    if outcome == FAILED:
         member = stages[failure.stage].members[failure.member]
         raise member.instance.failed(failure.status, CALLS[failure.call])
 
 
-def _laid_out(stage: Stage) -> layout.Stage:
+def _laid_out(stage: Stage) -> CStage:
     gather, members = stage.gather, [member.instance.pointers() for member in stage.members]
     mappings = [_mapping(place, gather.mapped[place]) for place in sorted(gather.mapped)]
-    return layout.Stage(
+    return CStage(
         *(array.ctypes.data for array in (gather.targets, gather.sources)),
         *(array.ctypes.data for array in (gather.factors, gather.offsets)),
-        (layout.Mapping * len(mappings))(*mappings),
-        (layout.Member * len(members))(*members),
+        (CMapping * len(mappings))(*mappings),
+        (CMember * len(members))(*members),
         len(gather.targets),
         len(mappings),
         len(members),
-        *(stage.pace or Pace(1)),
+        *(stage.decimation or Decimation(1)),
     )
 
 
-def _mapping(place: int, pairs: Mapping[float, float]) -> layout.Mapping:
+def _mapping(place: int, pairs: Mapping[float, float]) -> CMapping:
     n = len(pairs)
-    return layout.Mapping(place, n, (c_double * n)(*pairs), (c_double * n)(*pairs.values()))
+    return CMapping(place, n, (c_double * n)(*pairs), (c_double * n)(*pairs.values()))
 
 
 def kept() -> CDLL | None:

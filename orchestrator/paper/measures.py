@@ -33,7 +33,7 @@ def sum_without_step(l2: Any, duration: Any, h: float) -> Any:
     return l2 / np.sqrt(h * duration)
 
 
-class Way(NamedTuple):
+class Approach(NamedTuple):
     """The vehicle's way to the reference.
 
     Attributes:
@@ -62,7 +62,7 @@ class Way(NamedTuple):
         return (self.impulse / effort) ** 2
 
 
-def way_of(table: Table, error: np.ndarray | None = None) -> Way | None:
+def way_of(table: Table, error: np.ndarray | None = None) -> Approach | None:
     """The way of a run to its reference; None if it does not come there, or is there already.
 
     Args:
@@ -78,7 +78,7 @@ def way_of(table: Table, error: np.ndarray | None = None) -> Way | None:
         return None
     # A row holds what was applied in the step that ends there: the first one holds none.
     force = table[APPLIED[0]][1 : first + 1]
-    return Way(float(table.time[first]), float(force @ np.diff(table.time[: first + 1])))
+    return Approach(float(table.time[first]), float(force @ np.diff(table.time[: first + 1])))
 
 
 def turning_radius(table: Table) -> float:

@@ -22,14 +22,14 @@ from orchestrator.paper.sensitivity import (
     SAME,
     SEARCHED,
     SHOWN,
+    Bounds,
     Found,
-    Range,
     Sensitivity,
     Variant,
 )
 from orchestrator.paper.variants import all_variants
 from orchestrator.runs.folder import replaced
-from orchestrator.runs.record import PACKAGES, Clock, write_files
+from orchestrator.runs.record import PACKAGES, Stopwatch, write_files
 from orchestrator.studies.engine import REACHED
 from orchestrator.vehicle.signals import ACTUATORS, AXES
 
@@ -122,7 +122,7 @@ def _cell(variant: Variant, scenario: str, i: int) -> str:
     return f"{text} ({_number(low[i])} to {_number(high[i])})"
 
 
-def _range(span: Range, published: np.ndarray, i: int) -> str:
+def _range(span: Bounds, published: np.ndarray, i: int) -> str:
     """From the smallest to the largest; bold if what is printed lies outside."""
     text = f"{_number(span.low[i])} to {_number(span.high[i])}"
     return text if span.low[i] <= published[i] <= span.high[i] else f"**{text}**"
@@ -219,13 +219,13 @@ def _impulses(found: Sensitivity) -> str:
 
 def _impulse(found: Sensitivity, scenario: str) -> str:
     """What the way to the reference asks of the effort of the surge force."""
-    ways, printed = found.ways_of(scenario), PUBLISHED[scenario][0]
+    approaches, printed = found.ways_of(scenario), PUBLISHED[scenario][0]
     duration, impulse, least = (
         (min(values), max(values))
-        for values in zip(*((*way, way.least_effort) for way in ways), strict=True)
+        for values in zip(*((*way, way.least_effort) for way in approaches), strict=True)
     )
-    soonest = min(way.soonest(printed) for way in ways)
-    free = min(way.contradicts_until(printed, STEP) for way in ways)
+    soonest = min(way.soonest(printed) for way in approaches)
+    free = min(way.contradicts_until(printed, STEP) for way in approaches)
     return (
         f"the {_CONTROLLERS[scenario]} controller brings the vehicle to the reference, to |e| of "
         f"{REACHED:g} m, in {duration[0]:.3g} to {duration[1]:.3g} s, with an impulse of tau_u of "
@@ -267,7 +267,7 @@ def write_table(folder: Path, command: Sequence[str], force: bool = False) -> tu
         KeyboardInterrupt: the user does not want to wait.
 
     """
-    clock = Clock()
+    clock = Stopwatch()
     with replaced(folder, (*_NAMES, RECORD), force=force) as unfinished:
         with workers() as crew:
             found = all_variants(crew)
@@ -278,7 +278,7 @@ def write_table(folder: Path, command: Sequence[str], force: bool = False) -> tu
     return folder / _TEXT, folder / _VARIANTS
 
 
-def _record(command: Sequence[str], clock: Clock) -> dict[str, object]:
+def _record(command: Sequence[str], clock: Stopwatch) -> dict[str, object]:
     return {
         "command": list(command),
         **clock.times(),

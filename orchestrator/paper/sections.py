@@ -12,9 +12,9 @@ from typing import Any
 
 from orchestrator.figures import FIGURES, Drawn, draw
 from orchestrator.machine.errors import InputError, did_you_mean
-from orchestrator.paper.kept_runs import Outcome, Outcomes
+from orchestrator.paper.kept_runs import KeptRun, KeptRuns
 from orchestrator.paper.page import actuator_values, numbers, picture, plain, table
-from orchestrator.paper.variations import Run
+from orchestrator.paper.variations import Variation
 from orchestrator.runs.bundle import PYTHON
 from orchestrator.runs.folder import inner
 from orchestrator.runs.scenario import Scenario, read_scenario
@@ -49,7 +49,7 @@ class Section:
 
     name: str
     scenario: Scenario
-    runs: Mapping[str, Run]
+    runs: Mapping[str, Variation]
 
     @property
     def title(self) -> str:
@@ -85,9 +85,9 @@ def _numbered(name: str) -> Iterator[str]:
         n += 1
 
 
-def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Run]:
+def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Variation]:
     """The run of a scenario and what it is drawn with: its companion, or its twin without noise."""
-    run = Run(reference, kind=kind)
+    run = Variation(reference, kind=kind)
     try:
         system = run.prepared().system
     except InputError:
@@ -104,7 +104,7 @@ def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Run]:
     return {scenario.legend: run}
 
 
-def draw_section(section: Section, outcomes: Sequence[Outcome], folder: Path) -> list[str]:
+def draw_section(section: Section, kept_runs: Sequence[KeptRun], folder: Path) -> list[str]:
     """Draw the figures of a section and give notes on what is left out; a task for a worker.
 
     Args:
@@ -117,9 +117,9 @@ def draw_section(section: Section, outcomes: Sequence[Outcome], folder: Path) ->
     if kind not in FIGURES:
         return [f"no figure: there is none of the name {kind!r}{did_you_mean(kind, FIGURES)}"]
     runs = [
-        Drawn(label, outcome.table, section.scenario.z_up)
-        for label, outcome in zip(section.runs, outcomes, strict=True)
-        if len(outcome.table)
+        Drawn(label, kept_run.table, section.scenario.z_up)
+        for label, kept_run in zip(section.runs, kept_runs, strict=True)
+        if len(kept_run.table)
     ]
     if not runs:
         return []
@@ -129,7 +129,7 @@ def draw_section(section: Section, outcomes: Sequence[Outcome], folder: Path) ->
 
 
 def written(
-    section: Section, outcomes: Outcomes, notes: Sequence[str], folder: Path
+    section: Section, kept_runs: KeptRuns, notes: Sequence[str], folder: Path
 ) -> Iterator[str]:
     """A section in Markdown.
 
@@ -140,7 +140,7 @@ def written(
         folder: of the report, in which its figures are.
 
     """
-    scenario, own = section.scenario, outcomes[next(iter(section.runs.values()))]
+    scenario, own = section.scenario, kept_runs[next(iter(section.runs.values()))]
     yield f"### {section.title}"
     # By their stems: `fig4` comes before `fig4-velocity`.
     files = Path(folder, "figures", section.name).glob("*.png")
@@ -149,19 +149,19 @@ def written(
     yield from (f"Note: {plain(note)}." for note in notes)
     if scenario.remark:
         yield scenario.remark
-    made = {label: outcomes[run] for label, run in section.runs.items()}
-    for label, outcome in made.items():
-        if outcome.failure is not None:
-            yield f"**The run {plain(label)} ended early:** {plain(outcome.failure)}"
-    if rows := list(_indices([outcome.metrics for outcome in made.values()])):
+    made = {label: kept_runs[run] for label, run in section.runs.items()}
+    for label, kept_run in made.items():
+        if kept_run.failure is not None:
+            yield f"**The run {plain(label)} ended early:** {plain(kept_run.failure)}"
+    if rows := list(_indices([kept_run.metrics for kept_run in made.values()])):
         yield table(["index", *map(plain, made)], rows)
     reaching = own.metrics.get("velocities_reaching_controller")
     if reaching is not None:
         names = ", ".join(f"`{name}`" for name in reaching) or "none"
         yield f"Velocities of the vehicle that reach the controller: {names}."
     yield "\n".join(
-        f"- {plain(label)}: `auv-fmu run {outcomes.label(run)}`"
-        + (f", until {time:g} s" if (time := outcomes[run].metrics.get("stop_time")) else "")
+        f"- {plain(label)}: `auv-fmu run {kept_runs.label(run)}`"
+        + (f", until {time:g} s" if (time := kept_runs[run].metrics.get("stop_time")) else "")
         for label, run in section.runs.items()
     )
     if scenario.ours:

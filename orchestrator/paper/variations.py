@@ -23,7 +23,7 @@ from orchestrator.system.values import Value, literal
 
 
 @dataclass(frozen=True)
-class Run:
+class Variation:
     """A scenario with changes.
 
     Attributes:
@@ -93,7 +93,7 @@ class Run:
         """
         return prepare(*loaded(self.scenario, self.kind), self.request)
 
-    def companions(self) -> list[Run]:
+    def companions(self) -> list[Variation]:
         """Runs that are drawn together with this one.
 
         Raises:
@@ -106,13 +106,13 @@ class Run:
             for companion in with_companion(prepared, self.request)[1:]
         ]
 
-    def _as_run(self, scenario: str, prepared: Prepared) -> Run:
+    def _as_run(self, scenario: str, prepared: Prepared) -> Variation:
         """What was prepared from a scenario as its companion, by the least changes to it."""
-        own = Run(scenario, kind=self.kind).prepared()
-        experiment, course = prepared.experiment, prepared.course
-        played = course.targets if course else ()
+        own = Variation(scenario, kind=self.kind).prepared()
+        experiment, input_table = prepared.experiment, prepared.input_table
+        played = input_table.targets if input_table else ()
         inputs = prepared.scenario.inputs
-        return Run(
+        return Variation(
             scenario,
             {
                 str(name): value

@@ -26,15 +26,15 @@ from orchestrator.master.experiment import (
     SOLVE,
     Experiment,
     Order,
-    paces,
+    decimations,
     step_of,
     with_common_step,
 )
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.clock import check_factor
 from orchestrator.master.hooks.events import Alter, Event, Events, Set
-from orchestrator.master.hooks.hook import Attendant
-from orchestrator.master.hooks.playback import Course, Playback
+from orchestrator.master.hooks.hook import Hook
+from orchestrator.master.hooks.playback import InputTable, Playback
 from orchestrator.master.identity import Identity, identity
 from orchestrator.master.linear import check_linear
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
@@ -112,12 +112,12 @@ class Prepared:
     loop: Loop = PYTHON_LOOP
     real_time: float | None = None
     events: tuple[Event, ...] = ()
-    course: Course | None = None
+    input_table: InputTable | None = None
 
     def doubts(self) -> list[str]:
         """What may have been forgotten, in lines: inputs without a source, a part of a vehicle."""
         actions = [event.action for event in self.events]
-        given = {*(self.course.targets if self.course else ())}
+        given = {*(self.input_table.targets if self.input_table else ())}
         given |= {port for one in actions if isinstance(one, Alter) for port, _ in one.values}
         given |= {port for one in actions if isinstance(one, Set) for port, _ in one.inputs}
         return _doubts(self.system, given)
@@ -125,11 +125,11 @@ class Prepared:
     @property
     def identity(self) -> Identity:
         """All that its rows depend on."""
-        return identity(self.system, self.experiment, self.events, self.course)
+        return identity(self.system, self.experiment, self.events, self.input_table)
 
-    def attendants(self) -> list[Attendant]:
+    def hooks(self) -> list[Hook]:
         """Who acts on one run of it between its steps."""
-        playing: list[Attendant] = [] if self.course is None else [Playback(self.course)]
+        playing: list[Hook] = [] if self.input_table is None else [Playback(self.input_table)]
         return playing + ([Events(self.events)] if self.events else [])
 
     def missed(self, ending: Ending) -> list[Event]:
@@ -283,13 +283,13 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     """
     findings = Findings(request.strict)
     system = system.with_parameters(request.parameters)
-    course, inputs = None, _first_given(request.inputs, scenario.inputs)
+    input_table, inputs = None, _first_given(request.inputs, scenario.inputs)
     if inputs is not None:
         given = set(request.parameters)
         if request.inputs is None:
             given |= set(scenario.parameters)
         with findings.collecting():
-            system, course = read_inputs(inputs, system, given)
+            system, input_table = read_inputs(inputs, system, given)
     system.check()
     events = scenario.events
     if request.events is not None:
@@ -311,7 +311,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     experiment = Experiment(stop_time, step, order, system.start_time or 0.0, coupling)
     if coupling == LINEAR:
         check_linear(system)
-    paces(system, step)
+    decimations(system, step)
     stages(system, order)
     with findings.collecting():
         happening = read_events(scenario.name, events, replace(system, step=step))
@@ -327,7 +327,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
         loop,
         request.real_time,
         happening,
-        course,
+        input_table,
     )
 
 
@@ -347,7 +347,7 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     companion, system = loaded(scenario.compare, request.kind)
     if scenario.digest and companion.digest:
         companion, system = _beside(scenario, prepared.system, companion, system, request.kind)
-    played = prepared.course.targets if prepared.course else ()
+    played = prepared.input_table.targets if prepared.input_table else ()
     shared = {
         target: value
         for target, value in {**scenario.parameters, **request.parameters}.items()

@@ -34,7 +34,7 @@ from orchestrator.runs.preparation import (
     prepare,
     warned,
 )
-from orchestrator.runs.record import METRICS, Clock, write_metrics, write_record
+from orchestrator.runs.record import METRICS, Stopwatch, write_metrics, write_record
 from orchestrator.runs.resume import checkpoints_of, leave
 from orchestrator.runs.run import metrics_json
 from orchestrator.runs.scenario import Scenario
@@ -94,7 +94,7 @@ class Result(Table):
         """Take the rows of what is run."""
         super().__init__()
         self._prepared = prepared
-        self._clock = Clock()
+        self._clock = Stopwatch()
         self.resumed_at: float | None = None
 
     def __repr__(self) -> str:
@@ -306,7 +306,7 @@ def simulate(
             [*observers, *kept],
             prepared.isolation,
             prepared.loop,
-            [*kept, *prepared.attendants()],
+            [*kept, *prepared.hooks()],
         )
         leave(kept, ending.failure is None)
     for number in ending.signals:

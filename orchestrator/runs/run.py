@@ -21,7 +21,7 @@ from orchestrator.machine.locks import process_folder
 from orchestrator.master.fmi.transfer import KINDS
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.clock import RealTime
-from orchestrator.master.hooks.hook import Attendant
+from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Ending, Observer
 from orchestrator.master.observers.progress import Progress
@@ -29,7 +29,7 @@ from orchestrator.master.observers.selection import Selection, check_interval, m
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.folder import INCOMPLETE, inner, place_of, publish, replaced
 from orchestrator.runs.preparation import Prepared
-from orchestrator.runs.record import METRICS, Clock, write_metrics, write_record
+from orchestrator.runs.record import METRICS, Stopwatch, write_metrics, write_record
 from orchestrator.runs.resume import FOLDER, checkpoints_of, leave
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import file_name
@@ -158,7 +158,7 @@ def run_into(
     # The library of numpy's algebra ends the process if there is no memory for it: not later, when
     # there are rows to lose.
     np.linalg.inv(np.eye(1))
-    clock = Clock()
+    clock = Stopwatch()
     done: list[_Done] = []
     figures = figure_files(runs[0].scenario.figure, runs[0].scenario.stem)
     folders = _folders(runs, figures)
@@ -197,7 +197,7 @@ def run_into(
                         run.observers,
                         prepared.isolation,
                         prepared.loop,
-                        run.attendants,
+                        run.hooks,
                     )
                 done.append(run.ended(ending))
                 missed = [] if ending.failure else prepared.missed(ending)
@@ -257,16 +257,16 @@ class _Running:
             self._seen,
             Progress(prepared.scenario.name),
         ]
-        self.attendants: list[Attendant] = []
+        self.hooks: list[Hook] = []
         self._resumed_at = None
         if checkpoints is not None:
             self.observers.append(checkpoints)
-            self.attendants.append(checkpoints)
+            self.hooks.append(checkpoints)
             self._resumed_at = checkpoints.time
         self._real_time = None if prepared.real_time is None else RealTime(prepared.real_time)
         if self._real_time is not None:
-            self.attendants.append(self._real_time)
-        self.attendants += prepared.attendants()
+            self.hooks.append(self._real_time)
+        self.hooks += prepared.hooks()
 
     def ended(self, ending: Ending) -> _Done:
         """When its observers have been told the end."""
@@ -298,7 +298,7 @@ def _give_up(
     unfinished: Path,
     folder: Path,
     command: Sequence[str],
-    clock: Clock,
+    clock: Stopwatch,
     say: Callable[[str], None],
 ) -> None:
     """Keep what is there and end the process; the thread that steps the FMUs never will."""
@@ -314,7 +314,7 @@ def _give_up(
         os._exit(_FAILED)
 
 
-def _write_ends(done: Sequence[_Done], command: Sequence[str], clock: Clock) -> None:
+def _write_ends(done: Sequence[_Done], command: Sequence[str], clock: Stopwatch) -> None:
     """Write what is written last; the record of the first names the files of all."""
     for run in reversed(done):
         write_metrics(run.folder, run.metrics)

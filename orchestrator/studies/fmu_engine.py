@@ -14,7 +14,7 @@ from orchestrator.master.identity import code_of
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, chosen
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.preparation import Prepared
-from orchestrator.studies.engine import Outcome, Run
+from orchestrator.studies.engine import Outcome, Point
 from orchestrator.studies.indices import Indices
 from orchestrator.system.names import port_name
 
@@ -39,7 +39,7 @@ class FmuEngine:
         """Of the code that says what comes out of rows."""
         return code_of("orchestrator.vehicle", "orchestrator.studies")
 
-    def outcomes(self, runs: Sequence[Run]) -> Iterator[Outcome]:
+    def outcomes(self, runs: Sequence[Point]) -> Iterator[Outcome]:
         """Make some runs, in their order.
 
         Raises:
@@ -52,7 +52,7 @@ class FmuEngine:
             except InputError as error:
                 yield Outcome(run.number, {}, str(error))
 
-    def _outcome(self, run: Run) -> Outcome:
+    def _outcome(self, run: Point) -> Outcome:
         prepared = self._prepared[run.scenario]
         system = prepared.system.with_parameters(
             {port_name(name): value for name, value in run.parameters.items()}
@@ -66,7 +66,7 @@ class FmuEngine:
             experiment,
             [indices],
             loop=chosen(self._loop, experiment),
-            attendants=prepared.attendants(),
+            hooks=prepared.hooks(),
         )
         if ending.signals:
             raise KeyboardInterrupt

@@ -179,7 +179,7 @@ def _engine(name: str, prepared: Mapping[str, Prepared], means: Means) -> Engine
     if name not in ENGINES:
         raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
     for scenario, one in prepared.items():
-        if one.course is not None:
+        if one.input_table is not None:
             raise InputError(f"{scenario}: has a table of inputs, which no study can follow")
         if name == BATCH and one.events:
             raise InputError(f"{scenario}: has events, which engine {BATCH!r} cannot have happen")

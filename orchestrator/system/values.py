@@ -171,7 +171,7 @@ def unit_of(variable: ModelVariable) -> str | None:
     return unit
 
 
-class Texts:
+class StringTable:
     """Texts by their numbers, which they keep: the first is empty, and the next one takes the next.
 
     What FMUs say is not forgotten, so that a run in which one has a new text in every step takes

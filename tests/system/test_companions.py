@@ -33,7 +33,7 @@ def runs_of(text, stop_time=1.0):
     tables = []
     for prepared in pair_of(f"stop_time = {stop_time}\n{text}"):
         table = Table()
-        simulate(prepared.system, prepared.experiment, [table], attendants=prepared.attendants())
+        simulate(prepared.system, prepared.experiment, [table], hooks=prepared.hooks())
         tables.append(table)
     return tables
 

@@ -285,7 +285,7 @@ def test_what_is_said_of_the_scenarios_is_so(name):
         table = Table()
         run(
             prepared.system, prepared.experiment, [table],
-            loop=prepared.loop, attendants=prepared.attendants(),
+            loop=prepared.loop, hooks=prepared.hooks(),
         )  # fmt: skip
         error = np.linalg.norm(tracking_error(table), axis=1)
         time, after = table.time, table.time >= begin

@@ -378,7 +378,7 @@ def test_real_inputs_follow_a_table_as_their_variability_says(tmp_path, variabil
     file = tmp_path / "inputs.csv"
     file.write_text("time,a.u\n" + "".join(f"{t},{u}\n" for t, u in rows))
     system, course = read_inputs(Inputs(file), system_of(fmu), ())
-    table = run(system, attendants=[Playback(course)], **way)
+    table = run(system, hooks=[Playback(course)], **way)
     told = np.array(rows, dtype=[("time", float), ("u", float)])
     theirs = fmpy.simulate_fmu(
         str(fmu), stop_time=1.0, output_interval=0.1, input=told, output=["y"], validate=False

@@ -161,9 +161,9 @@ def test_what_grows_as_it_should_is_let_grow(folder, growth):
 
 
 class _Broken:
-    """An attendant that ends a run after some steps."""
+    """A hook that ends a run after some steps."""
 
-    def attend(self, run: Run) -> int:
+    def act(self, run: Run) -> int:
         if run.made == 21:
             raise ComponentFailed("broken off")
         return 21
@@ -174,10 +174,10 @@ def test_a_run_with_a_solved_ring_goes_on_where_it_was(folder, tmp_path, couplin
     system, experiment = ring(folder, 1.0, -2.0), Experiment(3.0, H, coupling=coupling)
     whole, again = run(system, experiment), Table()
     kept = Checkpoints(tmp_path, {}, 1.0, resume=False)
-    ending = simulate(system, experiment, [kept], attendants=[kept, _Broken()])
+    ending = simulate(system, experiment, [kept], hooks=[kept, _Broken()])
     assert ending.failure == "stopped at t = 2.1 s: broken off"
     kept = Checkpoints(tmp_path, {}, 1.0, resume=True)
-    simulate(system, experiment, [again, kept], attendants=[kept])
+    simulate(system, experiment, [again, kept], hooks=[kept])
     assert kept.time == 3.0
     assert again.rows.tobytes() == whole.rows.tobytes()
 

@@ -14,7 +14,7 @@ from orchestrator.formats.ssp.bindings import Bindings, Values
 from orchestrator.formats.ssp.building import Builder
 from orchestrator.formats.ssp.definitions import definitions_of
 from orchestrator.formats.ssp.hierarchy import Leaf, Node, Way
-from orchestrator.formats.ssp.wires import Course, Wires
+from orchestrator.formats.ssp.wires import Route, Wires
 from orchestrator.machine.errors import Findings, InputError, shortened
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
@@ -181,57 +181,57 @@ class _Ports:
             if leaf is not None and leaf.component is not None:
                 port = PortName(leaf.component.name, node.port)
                 try:
-                    self._enter(port, wires.course(node), leaf)
+                    self._enter(port, wires.route(node), leaf)
                 except InputError as error:
                     archive.problem(error)
         lost = [str(node) for node in given if node not in self._used]
         if lost:
             archive.note(f"values that are given to {listed(lost)} reach no component")
 
-    def _enter(self, port: PortName, course: Course, leaf: Leaf) -> None:
+    def _enter(self, port: PortName, route: Route, leaf: Leaf) -> None:
         """Enter what arrives at a port: another's value, or the outermost that is given."""
-        origin = self._leaves.get(course.origin.way) if course.wire else None
-        arrival = self._arrival(course) if course.wire else self._given_to(course.node)
+        origin = self._leaves.get(route.origin.way) if route.wire else None
+        arrival = self._arrival(route) if route.wire else self._given_to(route.node)
         if origin is None:
             self._set(port, leaf, arrival)
         elif origin.component is not None:
-            source = PortName(origin.component.name, course.origin.port)
+            source = PortName(origin.component.name, route.origin.port)
             if arrival.error is not None:
                 raise InputError(f"{source} -> {port}: {arrival.error}")
             self.connections.append(Connection(source, port, arrival.whole))
 
-    def _arrival(self, course: Course) -> _Arrival:
+    def _arrival(self, route: Route) -> _Arrival:
         """What is known of a value at the end of a course, of which each wire is looked at once."""
-        ahead: list[Course] = []
-        at: Course | None = course
+        ahead: list[Route] = []
+        at: Route | None = route
         while at is not None and at.node not in self._arrivals:
             ahead.append(at)
             at = at.before
         for one in reversed(ahead):
             self._arrivals[one.node] = self._arrival_by(one)
-        return self._arrivals[course.node]
+        return self._arrivals[route.node]
 
-    def _arrival_by(self, course: Course) -> _Arrival:
+    def _arrival_by(self, route: Route) -> _Arrival:
         """The same, where it is known of the course before."""
-        origin = self._leaves.get(course.origin.way)
-        if course.before is None or course.wire is None:
+        origin = self._leaves.get(route.origin.way)
+        if route.before is None or route.wire is None:
             if origin is None:
-                return self._given_to(course.node)
-            connector = None if origin.component is None else origin.connector(course.node.port)
-            return _Arrival(course.node, unit=connector.unit if connector else None)
-        before = self._arrivals[course.before.node]
+                return self._given_to(route.node)
+            connector = None if origin.component is None else origin.connector(route.node.port)
+            return _Arrival(route.node, unit=connector.unit if connector else None)
+        before = self._arrivals[route.before.node]
         if before.start is None:
-            return self._given_to(course.node)
-        self._used.add(course.node)
-        if origin is not None and course.node in self._given:
+            return self._given_to(route.node)
+        self._used.add(route.node)
+        if origin is not None and route.node in self._given:
             self._archive.note(
-                f"{course.node}: is fed by {course.origin}, and the value that is given to it has "
+                f"{route.node}: is fed by {route.origin}, and the value that is given to it has "
                 "no effect"
             )
         if before.error is not None or (origin is not None and origin.component is None):
             return before
         try:
-            whole, unit = course.wire.carry(self._archive, before.whole, before.unit)
+            whole, unit = route.wire.carry(self._archive, before.whole, before.unit)
         except InputError as error:
             return _Arrival(before.start, error=error)
         return _Arrival(before.start, whole, unit)

@@ -59,7 +59,7 @@ class Wire:
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class Route:
     """How a value comes to a node; courses share what they have in common.
 
     Attributes:
@@ -72,7 +72,7 @@ class Course:
 
     node: Node
     origin: Node
-    before: Course | None = None
+    before: Route | None = None
     wire: Wire | None = None
 
 
@@ -83,7 +83,7 @@ class Wires:
         """Read them; what is wrong with them becomes problems of the archive."""
         self._archive = archive
         self._wires: dict[Node, Wire] = {}
-        self._courses: dict[Node, Course] = {}
+        self._routes: dict[Node, Route] = {}
         self._circling: set[Node] = set()
         self._read(top)
 
@@ -91,7 +91,7 @@ class Wires:
         """All nodes that are fed, in the order in which the file has their connections."""
         yield from self._wires
 
-    def course(self, node: Node) -> Course:
+    def route(self, node: Node) -> Route:
         """Follow a port upstream.
 
         Raises:
@@ -101,16 +101,16 @@ class Wires:
         # What another port has been followed through is known: all of them take linear time.
         upstream: dict[Node, Wire] = {}
         at = node
-        while at not in self._courses and (wire := self._wires.get(at)) is not None:
+        while at not in self._routes and (wire := self._wires.get(at)) is not None:
             if at in upstream or wire.source in self._circling:
                 self._circling.update(upstream, [at])
                 raise InputError(f"{node}: the connections that feed it lead in a circle")
             upstream[at] = wire
             at = wire.source
-        course = self._courses.setdefault(at, Course(at, at))
+        route = self._routes.setdefault(at, Route(at, at))
         for target, wire in reversed(upstream.items()):
-            course = self._courses[target] = Course(target, course.origin, course, wire)
-        return course
+            route = self._routes[target] = Route(target, route.origin, route, wire)
+        return route
 
     def _read(self, group: Group) -> None:
         for connection in group.content.findall("Connections/Connection"):

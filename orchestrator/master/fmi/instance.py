@@ -9,8 +9,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from orchestrator.master import stepper_types as layout
-from orchestrator.system.values import Texts, Value
+from orchestrator.master.stepper_types import CMember
+from orchestrator.system.values import StringTable, Value
 
 #: What a component is asked for in every step, one after the other.
 CALLS = SET_INPUTS, DO_STEP, GET_OUTPUTS = "setting inputs", "fmi2DoStep", "getting outputs"
@@ -86,7 +86,7 @@ class Instance(Protocol):
     def do_step(self) -> Callable[[c_double, c_double, int], int]:
         """FMI's doStep, to be called with time, step size and one."""
 
-    def pointers(self) -> layout.Member:
+    def pointers(self) -> CMember:
         """The same calls as pointers, for an FMU in this process."""
 
     def failed(self, status: int, function: str) -> ComponentFailed | Ended:
@@ -98,7 +98,7 @@ class Instance(Protocol):
 
         """
 
-    def tie(self, values: np.ndarray, parts: Sequence[Part], texts: Texts) -> None:
+    def tie(self, values: np.ndarray, parts: Sequence[Part], strings: StringTable) -> None:
         """Say where its values are: a view of the row, with the inputs first, and its parts.
 
         Args:

@@ -18,8 +18,8 @@ from fmpy.fmi2 import (
     fmi2ValueReference,
 )
 
-from orchestrator.master import stepper_types as layout
-from orchestrator.system.values import Texts
+from orchestrator.master.stepper_types import CMove
+from orchestrator.system.values import StringTable
 
 #: Kinds of values that can be connected and recorded, with FMI's functions for them and the types
 #: that they are moved in: for a String moves the number of its text.
@@ -35,7 +35,7 @@ KINDS = {
 _CALLBACK = CFUNCTYPE(fmi2Status, fmi2Component, c_void_p, c_size_t, c_void_p)
 
 
-class Block:
+class PortBlock:
     """Values of one kind, side by side in the row of all values, moved by one FMI call.
 
     Attributes:
@@ -49,7 +49,7 @@ class Block:
         kind: str,
         references: Sequence[int],
         row: np.ndarray,
-        texts: Texts,
+        strings: StringTable,
     ) -> None:
         """Prepare the arrays that every call uses.
 
@@ -62,7 +62,7 @@ class Block:
 
         """
         self._kind, c_type = KINDS[kind]
-        self._texts = texts
+        self._strings = strings
         self.function = f"{'Set' if causality == 'input' else 'Get'}{self._kind}"
         self._row = row
         n = len(references)
@@ -110,13 +110,13 @@ class Block:
         # Most components have one such output, and an array of one costs twice as much.
         return get_one if len(row) == 1 else get_converted
 
-    def move(self, address: int | None) -> layout.Move:
+    def move(self, address: int | None) -> CMove:
         """The same for the compiled loop, by the address of the FMU's function of this block."""
         integers = None if self._kind == "Real" else addressof(self._values)
         if self._kind == "String":
             address = cast(self._called_back, c_void_p).value
         references, row = addressof(self._references), self._row.ctypes.data
-        return layout.Move(address, references, self._n, row, integers)
+        return CMove(address, references, self._n, row, integers)
 
     def _call(self, function: Callable[..., int]) -> Callable[[], int]:
         if self._kind == "String":
@@ -128,14 +128,14 @@ class Block:
         return partial(function, self._references, self._n, self._values)
 
     def _set_texts(self, function: Callable[..., int]) -> int:
-        texts = [self._texts.text(number).encode() for number in self._values]
-        return function(self._references, self._n, (fmi2String * len(texts))(*texts))
+        strings = [self._strings.text(number).encode() for number in self._values]
+        return function(self._references, self._n, (fmi2String * len(strings))(*strings))
 
     def _get_texts(self, function: Callable[..., int]) -> int:
-        texts = (fmi2String * len(self._values))()
-        status = function(self._references, self._n, texts)
-        for i, text in enumerate(texts):
-            self._values[i] = self._texts.number(text_of(text))
+        strings = (fmi2String * len(self._values))()
+        status = function(self._references, self._n, strings)
+        for i, text in enumerate(strings):
+            self._values[i] = self._strings.number(text_of(text))
         return status
 
 

@@ -10,7 +10,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from orchestrator.studies.figures.bins import Bins, bins_of, grouped, is_logarithmic
-from orchestrator.studies.figures.entries import Plan
+from orchestrator.studies.figures.entries import FigureEntry
 from orchestrator.studies.figures.panels import paneled, spread
 from orchestrator.studies.figures.values import VERDICTS, Values
 
@@ -26,7 +26,7 @@ _COLOURS, _EMPTY = "cividis", "lightgrey"
 _HEIGHT = 2.3
 
 
-def maps(plan: Plan, title: str, runs: Values) -> Figure:
+def maps(plan: FigureEntry, title: str, runs: Values) -> Figure:
     """Panels for each value that is shown, with one scale of colours.
 
     The last column that tells runs apart has its values side by side, the others below each other.

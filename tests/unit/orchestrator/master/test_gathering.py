@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.master.gathering import Gathering, Signals
+from orchestrator.master.gathering import Gathering, Overrides
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection
 from orchestrator.system.units import Linear, Mapped
@@ -31,7 +31,7 @@ def made(out: float, free: float = 7.0, transformation=None):
     row = Row(out, free)
     connections = tuple(Connection(OUT, target, transformation) for target in (FED, ALSO))
     gather = Gathering.along(row, connections)
-    signals = Signals(row, [gather], connections)
+    signals = Overrides(row, [gather], connections)
     gather(row.values)
     return row, gather, signals
 

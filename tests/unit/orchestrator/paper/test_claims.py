@@ -14,9 +14,9 @@ from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
 from orchestrator.paper import claims
 from orchestrator.paper.claims import CLAIMS, Claim
-from orchestrator.paper.kept_runs import Outcome
+from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.measures import (
-    Way,
+    Approach,
     largest_error_after,
     total_variation_until,
     turning_radius,
@@ -38,7 +38,7 @@ def table_of(time, parameters=None, **columns):
 
 
 def outcome(table=None, **metrics):
-    return Outcome(metrics, table or Table())
+    return KeptRun(metrics, table or Table())
 
 
 def claim_of(judge) -> Claim:
@@ -241,8 +241,8 @@ def test_a_way_against_damping_takes_an_impulse_of_its_own(forces):
     impulse, duration = h * sum(forces), h * len(forces)
     assert impulse == pytest.approx(vehicle.d11 * x + vehicle.m11 * u)
     effort = np.sqrt(h * np.sum(np.square(forces)))
-    assert Way(duration, vehicle.d11 * x).least_effort <= effort * (1.0 + 1e-12) + 1e-12
-    assert Way(0.0, vehicle.d11 * 31.0).soonest(130.0) == pytest.approx(51.0, abs=0.5)
+    assert Approach(duration, vehicle.d11 * x).least_effort <= effort * (1.0 + 1e-12) + 1e-12
+    assert Approach(0.0, vehicle.d11 * 31.0).soonest(130.0) == pytest.approx(51.0, abs=0.5)
 
 
 def test_efforts_are_held_against_the_impulse_of_the_way():

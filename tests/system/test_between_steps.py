@@ -27,7 +27,7 @@ class Pushes:
         self._acts = {begin: self._begin, end: self._end, stop: self._stop}
         self.times: list[int] = []
 
-    def attend(self, run: Run) -> int:
+    def act(self, run: Run) -> int:
         self.times.append(run.made)
         if act := self._acts.pop(run.made, None):
             act(run)
@@ -45,12 +45,10 @@ class Pushes:
 
 @pytest.mark.parametrize("loop", LOOPS)
 @pytest.mark.parametrize("order", ORDERS)
-def test_an_attendant_acts_on_the_steps_that_it_names(loop, order):
+def test_a_hook_acts_on_the_steps_that_it_names(loop, order):
     system, experiment = load("fig4", NATIVE), Experiment(14.0, 0.02, order)
     table, pushes = Table(), Pushes(10, 620, 650)
-    ending = simulate(
-        system, experiment, [table], None, chosen(loop, experiment), attendants=[pushes]
-    )
+    ending = simulate(system, experiment, [table], None, chosen(loop, experiment), hooks=[pushes])
     assert pushes.times == [0, 10, 620, 650]
     assert (ending.failure, ending.remark) == (None, "ended at t = 13 s: enough")
     assert len(table) == 651
