@@ -24,12 +24,12 @@ from orchestrator.paper.measures import (
     FINAL_ERROR_PD,
     FINAL_ERROR_PROPOSED,
     TURNING_RADIUS,
+    approach_of,
     largest_error_after,
     largest_estimate,
     sum_without_step,
     total_variation_until,
     turning_radius,
-    way_of,
 )
 from orchestrator.paper.page import actuator_values, numbers
 from orchestrator.paper.variations import Variation
@@ -221,17 +221,18 @@ def effort_as_a_sum(five: KeptRun, pd: KeptRun) -> Finding:
 )
 def effort_of_the_way(five: KeptRun, pd: KeptRun) -> Finding:
     """No course of the force gives that impulse in that time with the printed L2 norm."""
-    ways = [found for run in (five, pd) if (found := way_of(run.table))]
+    approaches = [found for run in (five, pd) if (found := approach_of(run.table))]
     published = EFFORT_PROPOSED[0], EFFORT_PD[0]
     if len(approaches) < len(published):
         return Finding(f"|e| does not come to {REACHED:g} m", "none")
-    least = [found.least_effort for found in ways]
-    soonest = [found.soonest(effort) for found, effort in zip(ways, published, strict=True)]
-    took = ", and ".join(f"{found.impulse:.4g} N·s in {found.duration:.3g} s" for found in ways)
+    least = [found.least_effort for found in approaches]
+    pairs = list(zip(approaches, published, strict=True))
+    soonest = [found.soonest(effort) for found, effort in pairs]
+    took = ", and ".join(
+        f"{found.impulse:.4g} N·s in {found.duration:.3g} s" for found in approaches
+    )
     step = five.table.header.experiment.step
-    free = [
-        found.contradicts_until(effort, step) for found, effort in zip(ways, published, strict=True)
-    ]
+    free = [found.contradicts_until(effort, step) for found, effort in pairs]
     return Finding(
         f"{took}, until |e| is {REACHED:g} m: not below {numbers(least)} N{_SQUARED} (Cauchy and "
         "Schwarz)",

@@ -62,7 +62,7 @@ class Approach(NamedTuple):
         return (self.impulse / effort) ** 2
 
 
-def way_of(table: Table, error: np.ndarray | None = None) -> Approach | None:
+def approach_of(table: Table, error: np.ndarray | None = None) -> Approach | None:
     """The way of a run to its reference; None if it does not come there, or is there already.
 
     Args:

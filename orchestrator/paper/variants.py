@@ -18,7 +18,7 @@ from orchestrator.paper.choices import (
     options_of,
     runs,
 )
-from orchestrator.paper.measures import Approach, way_of
+from orchestrator.paper.measures import Approach, approach_of
 from orchestrator.paper.sensitivity import (
     FARTHEST,
     PUBLISHED,
@@ -151,7 +151,7 @@ def taken_of(engine: BatchEngine, block: Sequence[Point]) -> tuple[np.ndarray, n
     Those of a run that has failed are not numbers, nor is the way of one that has not arrived.
     """
     tables = [engine.table(run) for run in block]
-    approaches = [way_of(table, errors(table)) or (np.nan, np.nan) for table in tables]
+    approaches = [approach_of(table, errors(table)) or (np.nan, np.nan) for table in tables]
     return np.stack([numbers_of(table) for table in tables]), np.array(approaches)
 
 

@@ -315,7 +315,7 @@ class IsolatedInstance:
     def _send(self, note: dict[str, Any]) -> None:
         """Send a note, with the texts that are new there."""
         if news := self._theirs.since(self._told):
-            note["texts"] = news
+            note["strings"] = news
             self._told += len(news)
         try:
             self._channel.send(note or None)

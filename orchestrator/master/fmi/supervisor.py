@@ -22,7 +22,7 @@ from typing import Any
 from orchestrator.machine.errors import plain
 from orchestrator.master.fmi.worker import serve
 
-#: What is written to the supervisor to have all ended; the end of its input says that nobody is there.
+#: Written to the supervisor to end all processes; so does the end of its input.
 END = b"."
 
 #: What an FMU may write to its standard output and error [bytes]; more is not shown.

@@ -81,7 +81,7 @@ class _Served:
         going_on = self._answered(lambda: None)
         while going_on:
             request = self._channel.receive() or {}
-            for text in request.get("texts", ()):
+            for text in request.get("strings", ()):
                 self._strings.number(text)
             self._told = len(self._strings)
             self._inputs[:] = self._channel.incoming[2:]
@@ -115,7 +115,7 @@ class _Served:
         if messages := self._messages.handed_over():
             note["messages"] = messages
         if news := self._strings.since(self._told):
-            note["texts"] = news
+            note["strings"] = news
         self._channel.outgoing[:] = self._outputs
         self._channel.send(note or None)
         return not note.get("fatal")

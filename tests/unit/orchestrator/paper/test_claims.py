@@ -17,10 +17,10 @@ from orchestrator.paper.claims import CLAIMS, Claim
 from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.measures import (
     Approach,
+    approach_of,
     largest_error_after,
     total_variation_until,
     turning_radius,
-    way_of,
 )
 from orchestrator.system.names import PortName
 from orchestrator.vehicle.signals import APPLIED, THETA_HAT, Y_D
@@ -210,7 +210,7 @@ def arriving(force, steps=10):
 @given(arrays(float, 11, elements=st.floats(-80.0, 80.0)))
 def test_no_force_has_less_effort_than_its_impulse_takes(force):
     """The effort by its definition, (59) without 1/T_f; the first row ends no step."""
-    found = way_of(arriving(force))
+    found = approach_of(arriving(force))
     assert found.duration == 200.0
     effort = np.sqrt(20.0 * np.sum(force[1:] ** 2))
     assert found.least_effort <= effort * (1.0 + 1e-12) + 1e-12
@@ -222,7 +222,7 @@ def test_no_force_has_less_effort_than_its_impulse_takes(force):
 
 def test_a_constant_force_has_the_least_effort():
     """5 N for 200 s: 1,000 N.s, 5 sqrt(200) N.s^0.5; half the effort takes four times as long."""
-    found = way_of(arriving(5.0))
+    found = approach_of(arriving(5.0))
     assert found.impulse == pytest.approx(1000.0)
     assert found.least_effort == pytest.approx(5.0 * np.sqrt(200.0))
     assert found.soonest(found.least_effort / 2.0) == pytest.approx(800.0)

@@ -82,7 +82,7 @@ def test_a_value_beside_the_table_is_refused(tmp_path):
     inputs = Inputs(tmp_path / "inputs.csv")
     prepared = prepare(*loaded("fig3a", "native"), Request(kind="native", inputs=inputs))
     assert prepared.system.parameters[U] == 1.0
-    assert np.array_equal(prepared.course.values, [[1.0]])
+    assert np.array_equal(prepared.input_table.values, [[1.0]])
 
 
 @pytest.mark.parametrize(
