@@ -34,10 +34,10 @@ class Pushes:
         return min(self._acts, default=NEVER)
 
     def _begin(self, run: Run) -> None:
-        run.signals.override(port_name("plant.tau.u"), 0.0)
+        run.overrides.override(port_name("plant.tau.u"), 0.0)
 
     def _end(self, run: Run) -> None:
-        run.signals.release(port_name("plant.tau.u"))
+        run.overrides.release(port_name("plant.tau.u"))
 
     def _stop(self, run: Run) -> None:
         raise Ended("enough")

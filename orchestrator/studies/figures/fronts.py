@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 
 from orchestrator.figures.style import COLOURS, STYLES
 from orchestrator.studies.figures.bins import is_logarithmic
-from orchestrator.studies.figures.entries import FigureEntry
-from orchestrator.studies.figures.panels import legend, paneled, spread
-from orchestrator.studies.figures.values import Values
+from orchestrator.studies.figures.figure_entries import FigureEntry
+from orchestrator.studies.figures.grid import legend, paneled, spread
+from orchestrator.studies.figures.study_data import Values
 
 _HEIGHT = 4.0
 

@@ -10,9 +10,9 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from orchestrator.studies.figures.bins import Bins, bins_of, grouped, is_logarithmic
-from orchestrator.studies.figures.entries import FigureEntry
-from orchestrator.studies.figures.panels import paneled, spread
-from orchestrator.studies.figures.values import VERDICTS, Values
+from orchestrator.studies.figures.figure_entries import FigureEntry
+from orchestrator.studies.figures.grid import paneled, spread
+from orchestrator.studies.figures.study_data import VERDICTS, Values
 
 #: Cells along each axis of runs that are no grid.
 _CELLS = 24

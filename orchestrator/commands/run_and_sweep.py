@@ -1,4 +1,4 @@
-"""`auv-fmu run`."""
+"""Commands that make runs: run one, sweep many."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from typing import Any
 import numpy as np
 
 from orchestrator.commands.options import (
+    INTERRUPTED,
+    OK,
     add_experiment,
     add_force,
+    add_kind,
     add_loop,
     add_out,
     add_set,
@@ -33,11 +36,13 @@ from orchestrator.runs.inputs import inputs_of
 from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.run import Files, run_into
 from orchestrator.runs.scenario import read_scenario
+from orchestrator.studies.study import ENGINES, read_study, ready_studies
+from orchestrator.studies.sweep import Means, folder_of, swept
 from orchestrator.vehicle.metrics import LAST_SECONDS
 
 
 def add_to(commands: Any) -> None:
-    """Add this command to the parser."""
+    """Add these commands to the parser."""
     run = commands.add_parser("run", help="run a scenario, a scenario file or an SSP")
     add_system(run)
     add_experiment(run)
@@ -109,6 +114,7 @@ def add_to(commands: Any) -> None:
         help="a table in CSV or Parquet of inputs that nothing feeds, over time",
     )
     run.set_defaults(action=_run)
+    _add_sweep(commands)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -184,3 +190,52 @@ def _number(value: float) -> str:
     if value and not 1e-4 <= abs(value) < 1e7:
         return f"{value:.3e}"
     return np.format_float_positional(value, precision=4, unique=False, fractional=False, trim="-")
+
+
+def _add_sweep(commands: Any) -> None:
+    sweep = commands.add_parser("sweep", help="make the runs of a study, or those that are missing")
+    ready = ", ".join(ready_studies())
+    sweep.add_argument(
+        "study", metavar="STUDY.toml|NAME", help=f"a study file, or a ready study: {ready}"
+    )
+    sweep.add_argument(
+        "--engine",
+        choices=ENGINES,
+        help="that makes the runs: the FMUs, or the compiled equations, with the same numbers; "
+        "default: the study's own",
+    )
+    add_kind(sweep)
+    add_loop(sweep)
+    sweep.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="of a Dask scheduler whose workers make the runs, for example tcp://10.0.0.1:8786; "
+        "default: processes on this machine",
+    )
+    sweep.add_argument(
+        "--workers", type=int, metavar="N", help="processes on this machine; default: its cores"
+    )
+    add_out(sweep, None, "results/NAME/")
+    add_force(sweep)
+    sweep.set_defaults(action=_sweep)
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    study = read_study(options.study)
+    folder = folder_of(study, options.out)
+    means = Means(
+        options.engine,
+        options.kind,
+        options.loop,
+        options.scheduler,
+        options.workers,
+        options.force,
+    )
+    try:
+        result = swept(study, means, folder, options.command, say, progress=True)
+    except KeyboardInterrupt:
+        say(f"interrupted; {folder} keeps what is done: the same command goes on from there")
+        return INTERRUPTED
+    show(f"{study.name}: {result.runs:,} runs, of which {result.failed:,} failed")
+    show(f"written to {folder}{os.sep}")
+    return OK

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 
 from orchestrator.figures.style import save, styled
 from orchestrator.studies.figures.bands import bands
-from orchestrator.studies.figures.entries import BANDS, FRONT, INFLUENCE, MAPS, FigureEntry
+from orchestrator.studies.figures.figure_entries import BANDS, FRONT, INFLUENCE, MAPS, FigureEntry
 from orchestrator.studies.figures.fronts import front
 from orchestrator.studies.figures.influence import influence
 from orchestrator.studies.figures.maps import maps
-from orchestrator.studies.figures.values import Columns, Values
+from orchestrator.studies.figures.study_data import Columns, Values
 from orchestrator.system.names import file_name
 
 _DRAW: Mapping[str, Callable[[FigureEntry, str, Values], Figure]] = {
