@@ -18,7 +18,7 @@ from orchestrator.master.experiment import (
     Order,
     written_order,
 )
-from orchestrator.master.fmi.transfer import KINDS
+from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.schedule import stages
 from orchestrator.master.simulation import completed
@@ -87,7 +87,7 @@ def verify(
         str(PortName(component.name, variable.name)): variable.type
         for component in system.components.values()
         for variable in component.having("output")
-        if variable.type in KINDS
+        if variable.type in FMI_TYPES
     }
     known = {
         str(PortName(component.name, variable.name))

@@ -76,8 +76,8 @@ def write_osp(system: System, folder: Path) -> list[Path]:
             values = ElementTree.SubElement(simulator, "InitialValues")
             for name, value in parameters.items():
                 element = ElementTree.SubElement(values, "InitialValue", variable=name)
-                kind = component.variable(name).type
-                ElementTree.SubElement(element, kind, value=literal(value))
+                fmi_type = component.variable(name).type
+                ElementTree.SubElement(element, fmi_type, value=literal(value))
     connections = ElementTree.SubElement(root, "Connections")
     for connection in system.connections:
         element = ElementTree.SubElement(connections, "VariableConnection")

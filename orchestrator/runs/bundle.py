@@ -95,7 +95,7 @@ DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "n
 ARCHIVE, MANIFEST = "auv.ssp", "build.json"
 
 #: What the FMUs of runs are in the user's cache folder.
-_KIND = "fmus"
+_CATEGORY = "fmus"
 
 #: Packages that the FMUs of each kind are made of.
 _SOURCES = {PYTHON: ("auv_fmu", "fmus", "pythonfmu"), NATIVE: ("auv_fmu", "fmus")}
@@ -199,7 +199,7 @@ def current_fmus(kind: str = PYTHON, fmi: str = FMI[0]) -> Path:
     if found := _kept(key):
         return found
     try:
-        with claimed(folder_of(_KIND), wait=True):
+        with claimed(folder_of(_CATEGORY), wait=True):
             # Another process may have been first.
             return _kept(key) or _built(key, "--kind", kind, "--fmi", fmi)
     except OSError as error:
@@ -211,7 +211,7 @@ def current_fmus(kind: str = PYTHON, fmi: str = FMI[0]) -> Path:
 
 def _kept(key: str) -> Path | None:
     """The folder of FMUs that were built earlier."""
-    return next((path.parent for path in kept(_KIND, key)), None)
+    return next((path.parent for path in kept(_CATEGORY, key)), None)
 
 
 def _built(key: str, *options: str) -> Path:
@@ -219,7 +219,7 @@ def _built(key: str, *options: str) -> Path:
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
         run_fmus("packaging.build", Path(temporary), *options)
         files = {path.name: path.read_bytes() for path in sorted(Path(temporary).iterdir())}
-    return keep(_KIND, key, files)[0].parent
+    return keep(_CATEGORY, key, files)[0].parent
 
 
 def _fingerprint(kind: str, fmi: str) -> str:

@@ -18,7 +18,7 @@ from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.machine.ledger import LEDGER, RECORD, Ledger
 from orchestrator.machine.locks import process_folder
-from orchestrator.master.fmi.transfer import KINDS
+from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.clock import RealTime
 from orchestrator.master.hooks.hook import Hook
@@ -376,7 +376,7 @@ def selected_columns(system: System, wanted: str, is_companion: bool = False) ->
         for component in system.components.values()
         for causality in (("output",) if outputs else ("input", "output"))
         for variable in component.having(causality)
-        if variable.type in KINDS
+        if variable.type in FMI_TYPES
     ]
     if outputs:
         return names

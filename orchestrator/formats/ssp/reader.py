@@ -261,8 +261,8 @@ class _Ports:
             return
         if not component.is_settable(port.port):
             self._archive.note(
-                f"{port}: is of causality {connector.kind} and cannot be set; the value that is "
-                "given to it has no effect"
+                f"{port}: is of causality {connector.causality} and cannot be set; the value that "
+                "is given to it has no effect"
             )
             return
         items = {**connector.items, **given.items}

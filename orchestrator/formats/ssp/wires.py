@@ -185,7 +185,7 @@ class _End:
                 f"a connection to {Node(element.way, port)}, which is not there"
                 f"{did_you_mean(port, element.connectors)}"
             )
-        outwards, inwards = connector.kind in GIVES, connector.kind in TAKES
+        outwards, inwards = connector.causality in GIVES, connector.causality in TAKES
         # Seen from within, a system's inputs give and its outputs take.
         gives, takes = (inwards, outwards) if element is group else (outwards, inwards)
         return cls(Node(element.way, port), connector, gives, takes)
