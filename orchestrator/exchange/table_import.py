@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.machine.reading import explained, lines_of
+from orchestrator.machine.user_files import explained, lines_of
 from orchestrator.master.experiment import ROUNDING
 from orchestrator.system.values import BOOLEANS, finite
 

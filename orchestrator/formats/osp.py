@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 from orchestrator.formats.ssp.archive import Archive
 from orchestrator.machine.errors import Findings, InputError, reason
-from orchestrator.machine.reading import check_file, is_folder
+from orchestrator.machine.user_files import check_file, is_folder
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System

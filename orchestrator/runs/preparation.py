@@ -18,7 +18,7 @@ from orchestrator.formats.osp import read_osp
 from orchestrator.formats.ssp import STRUCTURE as SSD
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.machine.reading import is_folder
+from orchestrator.machine.user_files import is_folder
 from orchestrator.master.experiment import (
     GAUSS_SEIDEL,
     LINEAR,

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.machine.reading import explained, text_of
+from orchestrator.machine.user_files import explained, text_of
 from orchestrator.master.experiment import COUPLINGS, Order
 from orchestrator.runs.entries import (
     Entry,

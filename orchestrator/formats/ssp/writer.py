@@ -232,7 +232,7 @@ def _add_component(
         left_out = is_text or PortName(component.name, variable.name) in left_open
         if variable.causality in ("input", "output", "parameter") and not left_out:
             connector = ElementTree.SubElement(
-                connectors, _ssd("Connector"), name=variable.name, fmi_type=variable.causality
+                connectors, _ssd("Connector"), name=variable.name, kind=variable.causality
             )
             stated = {"unit": variable.unit} if variable.unit else {}
             if type_of(variable) == "Enumeration" and variable.declaredType is not None:

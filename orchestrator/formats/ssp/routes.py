@@ -17,7 +17,7 @@ _UNSUPPORTED = ("startIndices", "endIndices")
 
 
 @dataclass(frozen=True)
-class Wire:
+class Segment:
     """One connection of a file, which ends in a node.
 
     Attributes:
@@ -36,7 +36,7 @@ class Wire:
     def carry(
         self, archive: Archive, whole: Transformation | None, unit: Unit | None
     ) -> tuple[Transformation | None, Unit | None]:
-        """What has happened to a value at the wire's end, and the unit that it has there.
+        """What has happened to a value at the segment's end, and the unit that it has there.
 
         Args:
             archive: whose connection it is.
@@ -60,36 +60,36 @@ class Wire:
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """How a value comes to a node; courses share what they have in common.
+    """How a value comes to a node; routes share what they have in common.
 
     Attributes:
         node: where it comes to.
         origin: where it comes from: the node itself, if nothing feeds that.
-        before: how it comes to the end of the last wire; None: nothing feeds the node.
-        wire: the last one.
+        before: how it comes to the end of the last segment; None: nothing feeds the node.
+        segment: the last one.
 
     """
 
     node: Node
     origin: Node
     before: Route | None = None
-    wire: Wire | None = None
+    segment: Segment | None = None
 
 
-class Wires:
+class Routes:
     """All connections of a system and of those in it, by their targets."""
 
     def __init__(self, archive: Archive, top: Group) -> None:
         """Read them; what is wrong with them becomes problems of the archive."""
         self._archive = archive
-        self._wires: dict[Node, Wire] = {}
+        self._segments: dict[Node, Segment] = {}
         self._routes: dict[Node, Route] = {}
         self._circling: set[Node] = set()
         self._read(top)
 
     def targets(self) -> Iterator[Node]:
         """All nodes that are fed, in the order in which the file has their connections."""
-        yield from self._wires
+        yield from self._segments
 
     def route(self, node: Node) -> Route:
         """Follow a port upstream.
@@ -99,17 +99,17 @@ class Wires:
 
         """
         # What another port has been followed through is known: all of them take linear time.
-        upstream: dict[Node, Wire] = {}
+        upstream: dict[Node, Segment] = {}
         at = node
-        while at not in self._routes and (wire := self._wires.get(at)) is not None:
-            if at in upstream or wire.source in self._circling:
+        while at not in self._routes and (segment := self._segments.get(at)) is not None:
+            if at in upstream or segment.source in self._circling:
                 self._circling.update(upstream, [at])
                 raise InputError(f"{node}: the connections that feed it lead in a circle")
-            upstream[at] = wire
-            at = wire.source
+            upstream[at] = segment
+            at = segment.source
         route = self._routes.setdefault(at, Route(at, at))
-        for target, wire in reversed(upstream.items()):
-            route = self._routes[target] = Route(target, route.origin, route, wire)
+        for target, segment in reversed(upstream.items()):
+            route = self._routes[target] = Route(target, route.origin, route, segment)
         return route
 
     def _read(self, group: Group) -> None:
@@ -133,7 +133,7 @@ class Wires:
             both = "take their value from elsewhere" if start.takes else "give one"
             raise InputError(f"{named}: cannot be connected, as both {both}")
         source, target = (end, start) if backwards else (start, end)
-        before = self._wires.get(target.node)
+        before = self._segments.get(target.node)
         if before is not None:
             raise InputError(
                 f"{target.node} is fed by {before.source} and by {source.node}; an input takes one "
@@ -143,7 +143,7 @@ class Wires:
             stated = transformation_of(connection, source.connector.items, target.connector.items)
         except InputError as error:
             raise InputError(f"{named}: {error}") from None
-        self._wires[target.node] = Wire(
+        self._segments[target.node] = Segment(
             source.node, target.connector.unit, stated, converts_units(connection)
         )
 
