@@ -203,7 +203,7 @@ class _Ports:
             self.connections.append(Connection(source, port, arrival.whole))
 
     def _arrival(self, route: Route) -> _Arrival:
-        """What is known of a value at the end of a route, of which each segment is looked at once."""
+        """What is known of a value at the end of a route; each segment is looked at once."""
         ahead: list[Route] = []
         at: Route | None = route
         while at is not None and at.node not in self._arrivals:

@@ -62,7 +62,7 @@ class OneByOne(reading._Ports):
 
     def _follow(self, port, node, leaf, routes, used) -> None:
         nodes, ways = [node], []
-        while (segment := routes._wires.get(nodes[0])) is not None:
+        while (segment := routes._segments.get(nodes[0])) is not None:
             if segment.source in nodes:
                 raise InputError(f"{node}: the connections that feed it lead in a circle")
             nodes.insert(0, segment.source)
