@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 
 from orchestrator.commands.options import (
-    INTERRUPTED,
-    OK,
     add_experiment,
     add_force,
     add_kind,
@@ -26,7 +24,7 @@ from orchestrator.commands.options import (
     request,
     status,
 )
-from orchestrator.commands.streams import say, show
+from orchestrator.commands.streams import INTERRUPTED, OK, say, show
 from orchestrator.machine.errors import Findings
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.master.experiment import COUPLINGS
@@ -41,80 +39,78 @@ from orchestrator.studies.sweep import Means, folder_of, swept
 from orchestrator.vehicle.metrics import LAST_SECONDS
 
 
-def add_to(commands: Any) -> None:
-    """Add these commands to the parser."""
-    run = commands.add_parser("run", help="run a scenario, a scenario file or an SSP")
-    add_system(run)
-    add_experiment(run)
-    add_set(run)
-    add_out(run, None, "results/SCENARIO/")
-    add_force(run)
-    run.add_argument(
+def add_run(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu run`."""
+    add_system(parser)
+    add_experiment(parser)
+    add_set(parser)
+    add_out(parser, None, "results/SCENARIO/")
+    add_force(parser)
+    parser.add_argument(
         "--interval",
         type=float,
         metavar="S",
         help="rows kept in the table, one for each interval [s]; default: one a step",
     )
-    run.add_argument(
+    parser.add_argument(
         "--columns",
         default="all",
         metavar="outputs|all|PATTERN,...",
         help="columns kept in the table, for example plant.y.*,controller.tau; default: all",
     )
-    run.add_argument(
+    parser.add_argument(
         "--format", choices=tuple(FORMATS), default="csv", help="of the table; default: csv"
     )
-    run.add_argument(
+    parser.add_argument(
         "--no-figures", dest="figures", action="store_false", help="draw none; default: draw"
     )
-    run.add_argument(
+    parser.add_argument(
         "--isolate",
         action="store_true",
         help="run each FMU in a process of its own, where it can crash or hang",
     )
-    run.add_argument(
+    parser.add_argument(
         "--step-timeout",
         type=float,
         metavar="S",
         help="how long an isolated FMU may take for one call [s]; "
         f"default: {STEP_TIMEOUT:g}; needs --isolate",
     )
-    run.add_argument(
+    parser.add_argument(
         "--checkpoint-every",
         type=float,
         metavar="S",
         help="keep what it takes to go on, every so many simulated seconds, in DIR/checkpoint",
     )
-    run.add_argument(
+    parser.add_argument(
         "--resume", action="store_true", help="go on from the last checkpoint in DIR/checkpoint"
     )
-    run.add_argument(
+    parser.add_argument(
         "--real-time",
         type=float,
         metavar="FACTOR",
         help="go no faster than FACTOR simulated seconds in a second",
     )
-    run.add_argument(
+    parser.add_argument(
         "--coupling",
         choices=COUPLINGS,
         help="how rings of direct feedthroughs are closed: solved, delayed by a step, or solved "
         "with inputs that change linearly during a step; default: the scenario's, else solved "
         "where the FMUs allow it",
     )
-    add_loop(run)
-    run.add_argument(
+    add_loop(parser)
+    parser.add_argument(
         "--events",
         metavar="SCENARIO|FILE.toml",
         help="what happens during the run: the events of another scenario, for this one or an SSP",
     )
-    run.add_argument(
+    parser.add_argument(
         "--inputs",
         type=Path,
         metavar="FILE",
         help="a table in CSV or Parquet of inputs that nothing feeds, over time",
     )
-    run.set_defaults(action=_run)
-    _add_sweep(commands)
+    parser.set_defaults(action=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -192,32 +188,32 @@ def _number(value: float) -> str:
     return np.format_float_positional(value, precision=4, unique=False, fractional=False, trim="-")
 
 
-def _add_sweep(commands: Any) -> None:
-    sweep = commands.add_parser("sweep", help="make the runs of a study, or those that are missing")
+def add_sweep(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu sweep`."""
     ready = ", ".join(ready_studies())
-    sweep.add_argument(
+    parser.add_argument(
         "study", metavar="STUDY.toml|NAME", help=f"a study file, or a ready study: {ready}"
     )
-    sweep.add_argument(
+    parser.add_argument(
         "--engine",
         choices=ENGINES,
         help="that makes the runs: the FMUs, or the compiled equations, with the same numbers; "
         "default: the study's own",
     )
-    add_kind(sweep)
-    add_loop(sweep)
-    sweep.add_argument(
+    add_kind(parser)
+    add_loop(parser)
+    parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
         help="of a Dask scheduler whose workers make the runs, for example tcp://10.0.0.1:8786; "
         "default: processes on this machine",
     )
-    sweep.add_argument(
+    parser.add_argument(
         "--workers", type=int, metavar="N", help="processes on this machine; default: its cores"
     )
-    add_out(sweep, None, "results/NAME/")
-    add_force(sweep)
-    sweep.set_defaults(action=_sweep)
+    add_out(parser, None, "results/NAME/")
+    add_force(parser)
+    parser.set_defaults(action=_sweep)
 
 
 def _sweep(options: argparse.Namespace) -> int:
