@@ -69,7 +69,7 @@ def ours(system: System, order: str) -> tuple[Run, float]:
         prepared, table = prepare(Scenario(system.name), system, request), Table()
         loop = chosen("auto", prepared.experiment)
         start = perf_counter()
-        ending = simulate(prepared.system, prepared.experiment, [table], loop=loop)
+        ending = simulate(prepared.plan, [table], loop=loop)
         seconds = perf_counter() - start
         if ending.failure is not None or len(table) != steps + 1:
             raise InputError(f"{ending.failure or ending.remark}")

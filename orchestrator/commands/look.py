@@ -27,7 +27,6 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.observer import Observer
 from orchestrator.master.observers.progress import Progress
 from orchestrator.master.observers.table import Table
-from orchestrator.master.simulation import simulate
 from orchestrator.runs.folder import VIEW, replaced
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.stored import changed_files, read_record, read_result, table_in
@@ -162,13 +161,7 @@ def _animate(options: argparse.Namespace) -> int:
     observers: list[Observer] = [seen, Progress(scenario.name)]
     title = scenario.title or scenario.name
     with _written(out, options.force) as file:
-        ending = simulate(
-            prepared.system,
-            prepared.experiment,
-            observers,
-            loop=prepared.loop,
-            hooks=prepared.hooks(),
-        )
+        ending = prepared.run(observers)
         if missing := seen.missing(*CONTROL_POINT):
             raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
         animate(title, seen, file, options.fps, scenario.z_up)

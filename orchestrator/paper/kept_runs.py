@@ -19,7 +19,6 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.identity import code_of, digest_of
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.master.observers.table import Table
-from orchestrator.master.simulation import simulate
 from orchestrator.paper.variations import Variation
 from orchestrator.runs.bundle import PYTHON
 from orchestrator.runs.folder import opened
@@ -149,13 +148,7 @@ def _make(run: Variation, key: str) -> KeptRun:
         if key_of(prepared) != key:
             raise InputError("FMUs have changed while the report was made; make it anew")
         metrics, seen = Metrics(), VisibleRows()
-        simulate(
-            prepared.system,
-            prepared.experiment,
-            [metrics, seen],
-            loop=prepared.loop,
-            hooks=prepared.hooks(),
-        )
+        prepared.run([metrics, seen])
     except InputError as error:
         return KeptRun({"failure": str(error)}, Table())
     return KeptRun(metrics_json(metrics, prepared), Table.of(seen.header, seen.rows, seen.ending))

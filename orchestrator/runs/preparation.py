@@ -21,12 +21,10 @@ from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.user_files import is_folder
 from orchestrator.master.experiment import (
     GAUSS_SEIDEL,
-    LINEAR,
     ORDERS,
     SOLVE,
     Experiment,
     Order,
-    decimations,
     step_of,
     with_common_step,
 )
@@ -36,10 +34,10 @@ from orchestrator.master.hooks.events import Alter, Event, Events, Set
 from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.hooks.playback import InputTable, Playback
 from orchestrator.master.identity import Identity, identity
-from orchestrator.master.linear import check_linear
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
-from orchestrator.master.observers.observer import Ending
-from orchestrator.master.schedule import stages
+from orchestrator.master.observers.observer import Ending, Observer
+from orchestrator.master.plan import Plan, planned
+from orchestrator.master.simulation import simulate
 from orchestrator.runs.bundle import FMI, PYTHON, current_fmus
 from orchestrator.runs.inputs import Inputs, read_inputs
 from orchestrator.runs.scenario import Scenario, names, read_scenario
@@ -97,22 +95,49 @@ class Request:
 
 @dataclass(frozen=True)
 class Prepared:
-    """A system that is ready to be run, the scenario that it comes from, and how it is stepped.
+    """A run that is ready to be made, and the scenario that it comes from.
 
     Attributes:
+        scenario: as its file has it.
+        plan: the system, and its steps.
+        isolation: of the FMUs in processes of their own; None: they run in this one.
+        loop: that makes the steps.
+        real_time: simulated seconds in a second; None: as many as can be had.
         events: that happen to it.
-        course: of inputs over time; None: they keep their values.
+        input_table: values of inputs over time; None: they keep their values.
 
     """
 
     scenario: Scenario
-    system: System
-    experiment: Experiment
+    plan: Plan
     isolation: Isolation | None = None
     loop: Loop = PYTHON_LOOP
     real_time: float | None = None
     events: tuple[Event, ...] = ()
     input_table: InputTable | None = None
+
+    @property
+    def system(self) -> System:
+        """What is run."""
+        return self.plan.system
+
+    @property
+    def experiment(self) -> Experiment:
+        """Until when it is run, in which steps and which order."""
+        return self.plan.experiment
+
+    def run(self, observers: Sequence[Observer], hooks: Sequence[Hook] = ()) -> Ending:
+        """Make the run.
+
+        Args:
+            observers: take its rows.
+            hooks: act on it before its own do.
+
+        Raises:
+            InputError: an FMU or a parameter is not usable; nothing was stepped.
+
+        """
+        return simulate(self.plan, observers, self.isolation, self.loop, [*hooks, *self._hooks()])
 
     def doubts(self) -> list[str]:
         """What may have been forgotten, in lines: inputs without a source, a part of a vehicle."""
@@ -127,8 +152,7 @@ class Prepared:
         """All that its rows depend on."""
         return identity(self.system, self.experiment, self.events, self.input_table)
 
-    def hooks(self) -> list[Hook]:
-        """Who acts on one run of it between its steps."""
+    def _hooks(self) -> list[Hook]:
         playing: list[Hook] = [] if self.input_table is None else [Playback(self.input_table)]
         return playing + ([Events(self.events)] if self.events else [])
 
@@ -309,10 +333,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     if request.strict and coupling is None and order == GAUSS_SEIDEL:
         coupling = SOLVE
     experiment = Experiment(stop_time, step, order, system.start_time or 0.0, coupling)
-    if coupling == LINEAR:
-        check_linear(system)
-    decimations(system, step)
-    stages(system, order)
+    plan = planned(system, experiment)
     with findings.collecting():
         happening = read_events(scenario.name, events, replace(system, step=step))
     findings.refuse()
@@ -321,8 +342,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
         check_factor(request.real_time)
     return Prepared(
         scenario,
-        system,
-        experiment,
+        plan,
         request.isolation,
         loop,
         request.real_time,

@@ -22,7 +22,6 @@ from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Observer, Occurrence
 from orchestrator.master.observers.progress import Progress
 from orchestrator.master.observers.table import Table
-from orchestrator.master.simulation import simulate as run
 from orchestrator.runs.bundle import PYTHON
 from orchestrator.runs.folder import locked, replaced
 from orchestrator.runs.inputs import inputs_of
@@ -300,14 +299,7 @@ def simulate(
     observers: list[Observer] = [result, *([Progress(scenario.name)] * progress)]
     with _checkpoints(prepared, checkpoint, checkpoint_every, resume) as kept:
         result.resumed_at = next((checkpoints.time for checkpoints in kept), None)
-        ending = run(
-            prepared.system,
-            prepared.experiment,
-            [*observers, *kept],
-            prepared.isolation,
-            prepared.loop,
-            [*kept, *prepared.hooks()],
-        )
+        ending = prepared.run([*observers, *kept], kept)
         leave(kept, ending.failure is None)
     for number in ending.signals:
         # Held back while the FMUs computed; now it does what it does elsewhere.

@@ -26,7 +26,6 @@ from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Ending, Observer
 from orchestrator.master.observers.progress import Progress
 from orchestrator.master.observers.selection import Selection, check_interval, matches, matching
-from orchestrator.master.simulation import simulate
 from orchestrator.runs.folder import INCOMPLETE, inner, place_of, publish, replaced
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.record import METRICS, Stopwatch, write_metrics, write_record
@@ -191,14 +190,7 @@ def run_into(
                     _give_up(run, done, unfinished, folder, command, clock, say)
 
                 with interrupts.insistence(give_up):
-                    ending = simulate(
-                        prepared.system,
-                        prepared.experiment,
-                        run.observers,
-                        prepared.isolation,
-                        prepared.loop,
-                        run.hooks,
-                    )
+                    ending = prepared.run(run.observers, run.hooks)
                 done.append(run.ended(ending))
                 missed = [] if ending.failure else prepared.missed(ending)
                 said = [f"did not happen: {event}" for event in missed]
@@ -266,7 +258,6 @@ class _Running:
         self._real_time = None if prepared.real_time is None else RealTime(prepared.real_time)
         if self._real_time is not None:
             self.hooks.append(self._real_time)
-        self.hooks += prepared.hooks()
 
     def ended(self, ending: Ending) -> _Done:
         """When its observers have been told the end."""

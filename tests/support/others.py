@@ -11,6 +11,7 @@ from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
@@ -114,5 +115,5 @@ def run(
     """All rows of a run."""
     table, experiment = Table(), Experiment(stop_time, step, order)
     how = chosen(loop, experiment, isolation)
-    simulate(system, experiment, [table], isolation, how, hooks)
+    simulate(planned(system, experiment), [table], isolation, how, hooks)
     return table

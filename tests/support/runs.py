@@ -10,6 +10,7 @@ from orchestrator.master.experiment import Experiment, Order
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.preparation import Prepared, Request, loaded, prepare
 from orchestrator.system.structure import System
@@ -25,7 +26,7 @@ def run(
 ) -> Table:
     """All rows of a run."""
     table, experiment = Table(), Experiment(stop_time, step, order)
-    simulate(system, experiment, [table], loop=chosen(loop, experiment))
+    simulate(planned(system, experiment), [table], loop=chosen(loop, experiment))
     return table
 
 
