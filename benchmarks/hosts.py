@@ -38,7 +38,8 @@ from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
 from orchestrator.runs import bundle
 from orchestrator.runs.bundle import NATIVE
-from orchestrator.runs.preparation import Request, prepare
+from orchestrator.runs.preparation import prepare
+from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.component import read_component
 from orchestrator.system.structure import System

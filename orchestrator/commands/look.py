@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.commands.options import (
-    add_experiment,
-    add_force,
+    add_options,
     add_set,
     add_system,
     read,
@@ -29,6 +28,8 @@ from orchestrator.master.observers.progress import Progress
 from orchestrator.master.observers.table import Table
 from orchestrator.runs.folder import VIEW, replaced
 from orchestrator.runs.preparation import prepare
+from orchestrator.runs.request import Request
+from orchestrator.runs.run import Files
 from orchestrator.runs.stored import changed_files, read_record, read_result, table_in
 from orchestrator.system.names import PortName
 from orchestrator.vehicle.signals import CONTROL_POINT
@@ -63,7 +64,7 @@ def add_view(parser: argparse.ArgumentParser) -> None:
 def add_animate(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu animate`."""
     add_system(parser)
-    add_experiment(parser)
+    add_options(parser, Request, "strict", "stop_time", "step", "order", "kind")
     add_set(parser)
     parser.add_argument(
         "--fps",
@@ -78,7 +79,7 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
 
 def _add_file(parser: argparse.ArgumentParser, text: str, default: Path | None = None) -> None:
     parser.add_argument("--out", type=Path, metavar="FILE", default=default, help=text)
-    add_force(parser)
+    add_options(parser, Files, "force")
 
 
 def _plot(options: argparse.Namespace) -> int:

@@ -6,7 +6,7 @@ import re
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,22 +24,22 @@ from orchestrator.master.experiment import (
     ORDERS,
     SOLVE,
     Experiment,
-    Order,
     step_of,
     with_common_step,
 )
-from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.fmi.isolated import Isolation, isolation_of
 from orchestrator.master.hooks.clock import check_factor
 from orchestrator.master.hooks.events import Alter, Event, Events, Set
 from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.hooks.playback import InputTable, Playback
 from orchestrator.master.identity import Identity, identity
-from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Loop, chosen
+from orchestrator.master.loop import PYTHON_LOOP, Loop, chosen
 from orchestrator.master.observers.observer import Ending, Observer
 from orchestrator.master.plan import Plan, planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.bundle import FMI, PYTHON, current_fmus
 from orchestrator.runs.inputs import Inputs, read_inputs
+from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.runs.scenario_events import check_events, read_events, shared_events
 from orchestrator.runs.wiring import closed_loop, read_wiring
@@ -56,41 +56,6 @@ DEFAULT_STEP = STEP
 
 #: Stop time of a system that names none, where it is only checked or exported [s].
 SOME_TIME = 1.0
-
-
-@dataclass(frozen=True)
-class Request:
-    """What the user asks for beyond the scenario.
-
-    Attributes:
-        stop_time, step: experiment [s]; None: the scenario's or the system's own.
-        order: of evaluation; None: the scenario's own, or else the first of :data:`ORDERS`.
-        parameters: values that win over the scenario's.
-        kind: of the bundle's FMUs, one of :data:`orchestrator.runs.bundle.KINDS`.
-        isolation: of the FMUs in processes of their own; None: they run in this one.
-        loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
-        strict: whether what is not as it should be is refused, even if it is harmless.
-        steps: of components that take longer ones of their own [s]; they win over the scenario's.
-        real_time: simulated seconds in a second; None: as many as can be had.
-        events: in the place of the scenario's, as a scenario file writes them; None: its own.
-        inputs: in the place of the scenario's.
-        coupling: one of :data:`orchestrator.master.experiment.COUPLINGS`; None: the scenario's.
-
-    """
-
-    stop_time: float | None = None
-    step: float | None = None
-    order: Order | None = None
-    parameters: Mapping[PortName, object] = field(default_factory=dict)
-    isolation: Isolation | None = None
-    kind: str = PYTHON
-    loop: str = LOOPS[0]
-    strict: bool = False
-    steps: Mapping[str, float] = field(default_factory=dict)
-    real_time: float | None = None
-    events: Sequence[Mapping[str, Any]] | None = None
-    inputs: Inputs | None = None
-    coupling: str | None = None
 
 
 @dataclass(frozen=True)
@@ -298,6 +263,16 @@ def check_brings_its_own(name: str, kind: str, fmi: str = FMI[0]) -> None:
         raise InputError(f"{name}: comes with its FMUs; kind and fmi are for the bundle's own")
 
 
+def prepared_of(request: Request) -> Prepared:
+    """What a request asks for.
+
+    Raises:
+        InputError: there is no such scenario, or something about the request cannot be done.
+
+    """
+    return prepare(*loaded(request.scenario, request.kind), request)
+
+
 def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     """A scenario with the user's changes.
 
@@ -305,19 +280,22 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
         InputError: something about the request cannot be done.
 
     """
-    findings = Findings(request.strict)
-    system = system.with_parameters(request.parameters)
-    input_table, inputs = None, _first_given(request.inputs, scenario.inputs)
+    findings, values = Findings(request.strict), request.values
+    system = system.with_parameters(values)
+    input_table, inputs = None, scenario.inputs
+    if request.inputs is not None:
+        inputs = Inputs(Path(request.inputs))
     if inputs is not None:
-        given = set(request.parameters)
+        given = set(values)
         if request.inputs is None:
             given |= set(scenario.parameters)
         with findings.collecting():
             system, input_table = read_inputs(inputs, system, given)
     system.check()
-    events = scenario.events
-    if request.events is not None:
-        events = request.events
+    events = _events(request)
+    if events is None:
+        events = scenario.events
+    else:
         check_events("events", events)
     stop_time = _first_given(request.stop_time, scenario.stop_time, system.stop_time)
     if stop_time is None:
@@ -337,13 +315,14 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     with findings.collecting():
         happening = read_events(scenario.name, events, replace(system, step=step))
     findings.refuse()
-    loop = chosen(request.loop, experiment, request.isolation)
+    isolation = isolation_of(request.isolate, request.step_timeout)
+    loop = chosen(request.loop, experiment, isolation)
     if request.real_time is not None:
         check_factor(request.real_time)
     return Prepared(
         scenario,
         plan,
-        request.isolation,
+        isolation,
         loop,
         request.real_time,
         happening,
@@ -370,7 +349,7 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     played = prepared.input_table.targets if prepared.input_table else ()
     shared = {
         target: value
-        for target, value in {**scenario.parameters, **request.parameters}.items()
+        for target, value in {**scenario.parameters, **request.values}.items()
         if system.has(target) and target not in played
     }
     steps = {
@@ -378,7 +357,7 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         for name, step in {**scenario.steps, **request.steps}.items()
         if name in system.components
     }
-    events = request.events
+    events = _events(request)
     if events is None:
         events = companion.events or scenario.events
     same = replace(
@@ -462,6 +441,13 @@ def _doubts(system: System, given: Collection[PortName] = ()) -> list[str]:
         return []
     found = open_inputs(system, given), differing_vehicle(system)
     return [text for text in found if text is not None]
+
+
+def _events(request: Request) -> Sequence[Mapping[str, Any]] | None:
+    """The events that a request has in the place of the scenario's; None: the scenario's own."""
+    if isinstance(request.events, str):
+        return read_scenario(request.events).events
+    return request.events
 
 
 def _first_given(*values: T | None) -> T | None:

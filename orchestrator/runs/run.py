@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
 from shutil import rmtree
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from orchestrator.master.observers.selection import Selection, check_interval, m
 from orchestrator.runs.folder import INCOMPLETE, inner, place_of, publish, replaced
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.record import METRICS, Stopwatch, write_metrics, write_record
+from orchestrator.runs.request import Force, Option
 from orchestrator.runs.resume import FOLDER, checkpoints_of, leave
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import file_name
@@ -60,26 +61,37 @@ _FAILED = 1
 
 @dataclass(frozen=True)
 class Files:
-    """What is kept of a run.
+    """What is kept of a run."""
 
-    Attributes:
-        interval: of the rows in the table [s]; None: every step.
-        columns: of the table: `all`, `outputs`, or patterns with commas between them.
-        format: of the table, a key of :data:`orchestrator.master.observers.files.FORMATS`.
-        figures: whether to draw them.
-        checkpoint_every: a checkpoint for so many simulated seconds [s]; None: none.
-        resume: go on from the one that an earlier process has left.
-        force: move aside files of the user's that have names of these.
-
-    """
-
-    interval: float | None = None
-    columns: str = "all"
-    format: str = "csv"
-    figures: bool = True
-    checkpoint_every: float | None = None
-    resume: bool = False
-    force: bool = False
+    interval: Annotated[
+        float | None,
+        Option(
+            "rows kept in the table, one for each interval [s]; default: one a step",
+            type=float,
+            metavar="S",
+        ),
+    ] = None
+    columns: Annotated[
+        str,
+        Option(
+            "columns kept in the table, for example plant.y.*,controller.tau; default: all",
+            metavar="outputs|all|PATTERN,...",
+        ),
+    ] = "all"
+    format: Annotated[str, Option("of the table; default: csv", choices=tuple(FORMATS))] = "csv"
+    no_figures: Annotated[bool, Option("draw none; default: draw", action="store_true")] = False
+    checkpoint_every: Annotated[
+        float | None,
+        Option(
+            "keep what it takes to go on, every so many simulated seconds, in DIR/checkpoint",
+            type=float,
+            metavar="S",
+        ),
+    ] = None
+    resume: Annotated[
+        bool, Option("go on from the last checkpoint in DIR/checkpoint", action="store_true")
+    ] = False
+    force: Force = False
 
 
 @dataclass(frozen=True)
@@ -200,7 +212,7 @@ def run_into(
                 if interrupts:
                     break
             ended_at_once = done[0].ending.failure is not None and len(done[0].seen.rows) == 1
-            if files.figures and not interrupts.urgent and not ended_at_once:
+            if not files.no_figures and not interrupts.urgent and not ended_at_once:
                 for note in _draw(runs[0].scenario, done, unfinished, interrupts):
                     say(note)
         except (OSError, MemoryError) as error:
@@ -240,7 +252,7 @@ class _Running:
         self._folder, self._prepared = folder, prepared
         self._metrics = Metrics()
         # Without figures the cautions alone look at what was seen.
-        self._seen = VisibleRows() if files.figures else VisibleRows(WATCHED)
+        self._seen = VisibleRows(WATCHED) if files.no_figures else VisibleRows()
         self._table = FORMATS[files.format](folder / f"result.{files.format}")
         self.observers: list[Observer] = [
             Selection(self._table, files.interval, columns),

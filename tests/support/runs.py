@@ -12,7 +12,8 @@ from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.preparation import Prepared, Request, loaded, prepare
+from orchestrator.runs.preparation import Prepared, loaded, prepare
+from orchestrator.runs.request import Request
 from orchestrator.system.structure import System
 from orchestrator.vehicle.metrics import indices
 

@@ -21,7 +21,8 @@ from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import delays, planned, stages
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.bundle import NATIVE
-from orchestrator.runs.preparation import Request, load, prepare
+from orchestrator.runs.preparation import load, prepare
+from orchestrator.runs.request import Request
 from orchestrator.runs.result import simulate as simulated
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.graph import delayed
