@@ -80,7 +80,7 @@ def test_a_value_beside_the_table_is_refused(tmp_path):
     with pytest.raises(InputError, match="beside the table"):
         read(tmp_path, "time,plant.tau.u\n0,1\n", given=[U])
     # On the command line it wins over what the scenario has.
-    inputs = Inputs(tmp_path / "inputs.csv")
+    inputs = tmp_path / "inputs.csv"
     prepared = prepare(*loaded("fig3a", "native"), Request(kind="native", inputs=inputs))
     assert prepared.system.parameters[U] == 1.0
     assert np.array_equal(prepared.input_table.values, [[1.0]])
