@@ -11,8 +11,8 @@ from orchestrator.paper.choices import (
     PD,
     PROPOSED,
     SIGNALS,
-    Choice,
     Alternative,
+    Choice,
 )
 from orchestrator.paper.sensitivity import PUBLISHED, Found, Sensitivity
 
