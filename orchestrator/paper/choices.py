@@ -28,7 +28,7 @@ END_TIMES = tuple(map(float, range(20, 201)))
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
-class Alternative(NamedTuple):
+class Option(NamedTuple):
     """One way to fill something in.
 
     Attributes:
@@ -57,7 +57,7 @@ class Choice(NamedTuple):
     """
 
     name: str
-    options: tuple[Alternative, ...]
+    options: tuple[Option, ...]
     ours: int = 0
     of_proposed: bool = False
 
@@ -73,35 +73,35 @@ VEHICLE = "vehicle"
 OF_RUNS = (
     Choice(
         "eps_t of the proposed controller",
-        (Alternative("10, as for PD"), Alternative("1, as for Fig. 4", {"controller.eps_t": 1.0})),
+        (Option("10, as for PD"), Option("1, as for Fig. 4", {"controller.eps_t": 1.0})),
         of_proposed=True,
     ),
     Choice(
         "observer",
-        (Alternative("(51)"), Alternative("(24), integral from zero", {"controller.observer": "integral"})),
+        (Option("(51)"), Option("(24), integral from zero", {"controller.observer": "integral"})),
         of_proposed=True,
     ),
     Choice(
         "start",
         (
-            Alternative("(2, 6, 0), the reference at z = -30 m"),
-            Alternative("the origin", {"plant.eta0.x": 0.0, "plant.eta0.y": 0.0}, "4.1: (2, 6, 0)"),
-            Alternative("the reference at z = +30 m", {"planner.eta0.z": 30.0}, "4.2: z_d(0) = -30"),
+            Option("(2, 6, 0), the reference at z = -30 m"),
+            Option("the origin", {"plant.eta0.x": 0.0, "plant.eta0.y": 0.0}, "4.1: (2, 6, 0)"),
+            Option("the reference at z = +30 m", {"planner.eta0.z": 30.0}, "4.2: z_d(0) = -30"),
         ),
     ),
     Choice(
         "noise",
         (
-            Alternative("none"),
-            Alternative("1 mm", {"plant.noise.std": 1e-3}),
-            Alternative("1 cm", {"plant.noise.std": 1e-2}, "Fig. 4: no saturation"),
+            Option("none"),
+            Option("1 mm", {"plant.noise.std": 1e-3}),
+            Option("1 cm", {"plant.noise.std": 1e-2}, "Fig. 4: no saturation"),
         ),
     ),
     Choice(
         "Jacobian",
         (
-            Alternative("of the whole attitude"),
-            Alternative(
+            Option("of the whole attitude"),
+            Option(
                 "(11) as printed",
                 {"controller.printed_jacobian": True},
                 "Fig. 5: feasible commands",
@@ -111,35 +111,35 @@ OF_RUNS = (
     Choice(
         VEHICLE,
         (
-            Alternative("six degrees of freedom, 5 N·m rights the roll"),
-            Alternative("six, nothing rights the roll", {"plant.righting.roll": 0.0}),
+            Option("six degrees of freedom, 5 N·m rights the roll"),
+            Option("six, nothing rights the roll", {"plant.righting.roll": 0.0}),
         ),
     ),
     Choice(
         "plant",
         (
-            Alternative("Euler's scheme"),
-            Alternative("Runge-Kutta, fourth order", {"plant.integrator": "rk4"}, "4.1: Euler, 20 ms"),
+            Option("Euler's scheme"),
+            Option("Runge-Kutta, fourth order", {"plant.integrator": "rk4"}, "4.1: Euler, 20 ms"),
         ),
     ),
     Choice(
         "disturbance",
         (
-            Alternative("tau_w as in (2)"),
-            Alternative(
+            Option("tau_w as in (2)"),
+            Option(
                 "-tau_w",
                 {"disturbance.A_f": -_WAVES.A_f, "disturbance.A_d": -_WAVES.A_d},
                 _SIGN,
             ),
-            Alternative("its friction reversed", {"disturbance.A_f": -_WAVES.A_f}, _SIGN),
-            Alternative("its waves reversed", {"disturbance.A_d": -_WAVES.A_d}, _SIGN),
+            Option("its friction reversed", {"disturbance.A_f": -_WAVES.A_f}, _SIGN),
+            Option("its waves reversed", {"disturbance.A_d": -_WAVES.A_d}, _SIGN),
         ),
     ),
     Choice(
         "theta_hat(0)",
         (
-            Alternative("0"),
-            Alternative(
+            Option("0"),
+            Option(
                 "1, and theta_0",
                 {f"controller.theta_0[{i}]": 1.0 for i in range(1, 5)},
                 "4.1: theta_0 = 0",
@@ -149,22 +149,22 @@ OF_RUNS = (
     Choice(
         "order",
         (
-            Alternative("everything at t_k"),
-            Alternative("Jacobi, 20 ms late", order=ORDERS[1]),
+            Option("everything at t_k"),
+            Option("Jacobi, 20 ms late", order=ORDERS[1]),
         ),
     ),
     Choice(
         "reference at t = 0",
         (
-            Alternative("at rest"),
-            Alternative("under way, tau_ud / d11", {"planner.nu0.u": _UNDER_WAY}),
+            Option("at rest"),
+            Option("under way, tau_ud / d11", {"planner.nu0.u": _UNDER_WAY}),
         ),
     ),
 )
 
 #: The vehicle of (1) and (2), and what it contradicts. From 30 m away it passes the pole of (1),
 #: and no single run says what it gives then.
-FIVE, AGAINST_FIVE = Alternative("five degrees of freedom", {"plant.roll": False}), "4.1: 6-DOF"
+FIVE, AGAINST_FIVE = Option("five degrees of freedom", {"plant.roll": False}), "4.1: 6-DOF"
 
 #: What a run of five depends on, of what contradicts nothing else.
 OF_RUNS_OF_FIVE = tuple(
@@ -175,19 +175,19 @@ OF_RUNS_OF_FIVE = tuple(
 )
 
 #: What the efforts are taken of: (59) speaks of "the control input".
-SIGNALS = (Alternative("applied"), Alternative("commanded"))
+SIGNALS = (Option("applied"), Option("commanded"))
 
 #: The order in which they are printed.
 ORDERS_OF_EFFORTS = (
-    Alternative("(u, q, r)"),
-    Alternative("(u, r, q)", against="below (6): tau_a = (tau_u, tau_q, tau_r)"),
+    Option("(u, q, r)"),
+    Option("(u, r, q)", against="below (6): tau_a = (tau_u, tau_q, tau_r)"),
 )
 
 #: What they are: with signals within 80, (59) as printed cannot be 130.
 FORMULAS = (
-    Alternative("L2 norm, (59) without 1/T_f"),
-    Alternative("(59) as a sum over steps, without the step"),
-    Alternative("mean square, (59) without the root"),
+    Option("L2 norm, (59) without 1/T_f"),
+    Option("(59) as a sum over steps, without the step"),
+    Option("mean square, (59) without the root"),
 )
 
 #: Choices that are left when a run is done.
@@ -197,13 +197,13 @@ OF_READING = (
     Choice("formula of the efforts", FORMULAS),
     Choice(
         "T_f",
-        tuple(Alternative(f"{time:g} s") for time in END_TIMES),
+        tuple(Option(f"{time:g} s") for time in END_TIMES),
         ours=END_TIMES.index(100.0),
     ),
 )
 
 
-def options_of(choice: Choice, scenario: str) -> tuple[Alternative, ...]:
+def options_of(choice: Choice, scenario: str) -> tuple[Option, ...]:
     """The options of a choice in a scenario: one where it has none."""
     if choice.of_proposed and scenario != PROPOSED:
         return (choice.options[choice.ours],)

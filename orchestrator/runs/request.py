@@ -20,7 +20,7 @@ from orchestrator.system.names import PortName, port_name
 from orchestrator.system.values import literal
 
 
-class Option:
+class CliOption:
     """What the command line says of a field that is an option there, and how it reads it."""
 
     def __init__(self, help: str, **how: Any) -> None:  # noqa: A002
@@ -28,14 +28,14 @@ class Option:
         self.help, self.how = help, how
 
 
-def options_of(declared: type[Any]) -> dict[str, Option]:
+def options_of(declared: type[Any]) -> dict[str, CliOption]:
     """The fields of a dataclass that are options."""
     hints = get_type_hints(declared, include_extras=True)
     return {
         name: one
         for name, hint in hints.items()
         for one in getattr(hint, "__metadata__", ())
-        if isinstance(one, Option)
+        if isinstance(one, CliOption)
     }
 
 
@@ -47,7 +47,7 @@ def flag(name: str) -> str:
 #: Which FMUs of the bundle.
 Kind = Annotated[
     str,
-    Option(
+    CliOption(
         "of the bundle's FMUs: Python sources, or their translation to C, with the same numbers; "
         f"default: {PYTHON}",
         choices=KINDS,
@@ -57,7 +57,7 @@ Kind = Annotated[
 #: What makes the steps.
 LoopName = Annotated[
     str,
-    Option(
+    CliOption(
         "what makes the steps: Python, or a loop in C; the rows are the same; default: auto, the "
         "compiled one where it is to be had",
         choices=LOOPS,
@@ -67,7 +67,7 @@ LoopName = Annotated[
 #: What becomes of files of the user's that are in the way.
 Force = Annotated[
     bool,
-    Option(
+    CliOption(
         "move files of yours aside that have names of files that are written, to NAME.~1~; "
         "otherwise they stay, and nothing is written",
         action="store_true",
@@ -91,17 +91,17 @@ class Request:
     parameters: Mapping[Any, Any] = field(default_factory=dict, hash=False)
     stop_time: Annotated[
         float | None,
-        Option("end of the run [s]; default: the scenario's", type=float, metavar="S"),
+        CliOption("end of the run [s]; default: the scenario's", type=float, metavar="S"),
     ] = None
     step: Annotated[
         float | None,
-        Option(
+        CliOption(
             "communication step [s]; default: the scenario's, else 0.02", type=float, metavar="S"
         ),
     ] = None
     order: Annotated[
         Order | None,
-        Option(
+        CliOption(
             "order in which the components are stepped, or the names of all of them; default: "
             f"the scenario's, else {ORDERS[0]}",
             type=order_of,
@@ -110,7 +110,7 @@ class Request:
     ] = None
     coupling: Annotated[
         str | None,
-        Option(
+        CliOption(
             "how rings of direct feedthroughs are closed: solved, delayed by a step, or solved "
             "with inputs that change linearly during a step; default: the scenario's, else solved "
             "where the FMUs allow it",
@@ -120,14 +120,14 @@ class Request:
     kind: Kind = PYTHON
     events: Annotated[
         str | Sequence[Mapping[str, Any]] | None,
-        Option(
+        CliOption(
             "what happens during the run: the events of another scenario, for this one or an SSP",
             metavar="SCENARIO|FILE.toml",
         ),
     ] = field(default=None, hash=False)
     inputs: Annotated[
         str | Path | None,
-        Option(
+        CliOption(
             "a table in CSV or Parquet of inputs that nothing feeds, over time",
             type=Path,
             metavar="FILE",
@@ -136,14 +136,14 @@ class Request:
     loop: LoopName = LOOPS[0]
     isolate: Annotated[
         bool,
-        Option(
+        CliOption(
             "run each FMU in a process of its own, where it can crash or hang",
             action="store_true",
         ),
     ] = False
     step_timeout: Annotated[
         float | None,
-        Option(
+        CliOption(
             "how long an isolated FMU may take for one call [s]; "
             f"default: {STEP_TIMEOUT:g}; needs --isolate",
             type=float,
@@ -152,13 +152,13 @@ class Request:
     ] = None
     real_time: Annotated[
         float | None,
-        Option(
+        CliOption(
             "go no faster than FACTOR simulated seconds in a second", type=float, metavar="FACTOR"
         ),
     ] = None
-    strict: Annotated[bool, Option("refuse what otherwise is a warning", action="store_true")] = (
-        False
-    )
+    strict: Annotated[
+        bool, CliOption("refuse what otherwise is a warning", action="store_true")
+    ] = False
     steps: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     @property

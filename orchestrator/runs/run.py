@@ -29,7 +29,7 @@ from orchestrator.master.observers.selection import Selection, check_interval, m
 from orchestrator.runs.folder import INCOMPLETE, inner, place_of, publish, replaced
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.record import METRICS, Stopwatch, write_metrics, write_record
-from orchestrator.runs.request import Force, Option
+from orchestrator.runs.request import CliOption, Force
 from orchestrator.runs.resume import FOLDER, checkpoints_of, leave
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import file_name
@@ -65,7 +65,7 @@ class Files:
 
     interval: Annotated[
         float | None,
-        Option(
+        CliOption(
             "rows kept in the table, one for each interval [s]; default: one a step",
             type=float,
             metavar="S",
@@ -73,23 +73,23 @@ class Files:
     ] = None
     columns: Annotated[
         str,
-        Option(
+        CliOption(
             "columns kept in the table, for example plant.y.*,controller.tau; default: all",
             metavar="outputs|all|PATTERN,...",
         ),
     ] = "all"
-    format: Annotated[str, Option("of the table; default: csv", choices=tuple(FORMATS))] = "csv"
-    no_figures: Annotated[bool, Option("draw none; default: draw", action="store_true")] = False
+    format: Annotated[str, CliOption("of the table; default: csv", choices=tuple(FORMATS))] = "csv"
+    no_figures: Annotated[bool, CliOption("draw none; default: draw", action="store_true")] = False
     checkpoint_every: Annotated[
         float | None,
-        Option(
+        CliOption(
             "keep what it takes to go on, every so many simulated seconds, in DIR/checkpoint",
             type=float,
             metavar="S",
         ),
     ] = None
     resume: Annotated[
-        bool, Option("go on from the last checkpoint in DIR/checkpoint", action="store_true")
+        bool, CliOption("go on from the last checkpoint in DIR/checkpoint", action="store_true")
     ] = False
     force: Force = False
 

@@ -22,7 +22,7 @@ from orchestrator.master.identity import PACKAGES, digest_of
 from orchestrator.master.loop import LOOPS
 from orchestrator.runs.bundle import PYTHON
 from orchestrator.runs.preparation import Prepared, loaded
-from orchestrator.runs.request import Force, Kind, LoopName, Option
+from orchestrator.runs.request import CliOption, Force, Kind, LoopName
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Engine
@@ -57,7 +57,7 @@ class Means:
 
     engine: Annotated[
         str | None,
-        Option(
+        CliOption(
             "that makes the runs: the FMUs, or the compiled equations, with the same numbers; "
             "default: the study's own",
             choices=ENGINES,
@@ -67,14 +67,15 @@ class Means:
     loop: LoopName = LOOPS[0]
     scheduler: Annotated[
         str | None,
-        Option(
+        CliOption(
             "of a Dask scheduler whose workers make the runs, for example tcp://10.0.0.1:8786; "
             "default: processes on this machine",
             metavar="ADDRESS",
         ),
     ] = None
     workers: Annotated[
-        int | None, Option("processes on this machine; default: its cores", type=int, metavar="N")
+        int | None,
+        CliOption("processes on this machine; default: its cores", type=int, metavar="N"),
     ] = None
     force: Force = False
 

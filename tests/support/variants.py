@@ -11,14 +11,14 @@ from orchestrator.paper.choices import (
     PD,
     PROPOSED,
     SIGNALS,
-    Alternative,
     Choice,
+    Option,
 )
 from orchestrator.paper.sensitivity import PUBLISHED, Found, Sensitivity
 
 #: A choice of both controllers, and one of the proposed alone.
-SEA = Choice("sea", (Alternative("calm"), Alternative("rough", against="4.1: calm")))
-OBSERVER = Choice("observer", (Alternative("slow"), Alternative("fast")), of_proposed=True)
+SEA = Choice("sea", (Option("calm"), Option("rough", against="4.1: calm")))
+OBSERVER = Choice("observer", (Option("slow"), Option("fast")), of_proposed=True)
 
 APPLIED, COMMANDED = range(len(SIGNALS))
 PRINTED_ORDER, EXCHANGED = range(len(ORDERS_OF_EFFORTS))
