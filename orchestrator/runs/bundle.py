@@ -1,4 +1,4 @@
-"""The bundle: every FMU and the SSP of the closed loop, built when missing or stale.
+"""The FMUs of the installed sources, built when they are needed, and their bill of materials.
 
 `auv-fmu build` writes it where the user wants it. Runs use FMUs of their own in the user's cache
 folder, one folder for each version of the sources and each kind of FMU, so that nothing appears
@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Sequence
 from functools import cache
 from hashlib import sha256
+from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from fmus.discovery import fingerprint
 from fmus.kinds import CONTAINED, FMI_VERSIONS, KINDS, NATIVE, PYTHON
@@ -20,16 +23,65 @@ from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.machine.cache import folder_of, keep, kept, users_folder
 from orchestrator.machine.children import run_module
 from orchestrator.machine.errors import InputError, last_line, reason
+from orchestrator.machine.ledger import digest_of
 from orchestrator.machine.locks import claimed, process_folder
-from orchestrator.runs.bill_of_materials import (
-    BILL,
-    CHECKSUMS,
-    bill,
-    checksums,
-)
 from orchestrator.runs.folder import replaced
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import WRITABLE
+
+CHECKSUMS, BILL = "SHA256SUMS", "bom.cdx.json"
+
+
+def checksums(files: Sequence[Path]) -> bytes:
+    """Checksums as `sha256sum --check` reads them."""
+    return "".join(f"{digest_of(path)}  {path.name}\n" for path in files).encode()
+
+
+def bill(files: Sequence[Path], contained: Sequence[str]) -> bytes:
+    """CycloneDX 1.5: the files of the bundle and the packages whose code they contain.
+
+    Without time and serial number: the same bundle has the same bill.
+
+    Args:
+        files: of the bundle.
+        contained: the packages, besides ours.
+
+    """
+    ours, *others = map(_package, ("auv-fmu", *contained))
+    content = {
+        "bomFormat": "CycloneDX",
+        "specVersion": "1.5",
+        "version": 1,
+        "metadata": {"component": ours},
+        "components": [
+            *others,
+            *(
+                {
+                    "type": "file",
+                    "name": path.name,
+                    "hashes": [{"alg": "SHA-256", "content": digest_of(path)}],
+                }
+                for path in files
+            ),
+        ],
+        "dependencies": [
+            {"ref": ours["bom-ref"], "dependsOn": [package["bom-ref"] for package in others]}
+        ],
+    }
+    return (json.dumps(content, indent=2) + "\n").encode()
+
+
+def _package(name: str) -> dict[str, Any]:
+    reference = f"pkg:pypi/{name}@{version(name)}"
+    return {
+        "type": "library",
+        "bom-ref": reference,
+        "name": name,
+        "version": version(name),
+        "licenses": [{"license": {"id": "MIT"}}],
+        "purl": reference,
+    }
+
 
 #: Where `auv-fmu build` writes each kind unless another folder is named.
 DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "native")}
@@ -38,7 +90,7 @@ DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "n
 ARCHIVE, MANIFEST = "auv.ssp", "build.json"
 
 #: What the FMUs of runs are in the user's cache folder.
-_KIND = "fmus"
+_CATEGORY = "fmus"
 
 
 def build(
@@ -136,7 +188,7 @@ def current_fmus(kind: str = PYTHON, fmi: str = FMI_VERSIONS[0]) -> Path:
     if found := _kept(key):
         return found
     try:
-        with claimed(folder_of(_KIND), wait=True):
+        with claimed(folder_of(_CATEGORY), wait=True):
             # Another process may have been first.
             return _kept(key) or _built(key, "--kind", kind, "--fmi", fmi)
     except OSError as error:
@@ -148,7 +200,7 @@ def current_fmus(kind: str = PYTHON, fmi: str = FMI_VERSIONS[0]) -> Path:
 
 def _kept(key: str) -> Path | None:
     """The folder of FMUs that were built earlier."""
-    return next((path.parent for path in kept(_KIND, key)), None)
+    return next((path.parent for path in kept(_CATEGORY, key)), None)
 
 
 def _built(key: str, *options: str) -> Path:
@@ -156,4 +208,4 @@ def _built(key: str, *options: str) -> Path:
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
         run_fmus("build", Path(temporary), *options)
         files = {path.name: path.read_bytes() for path in sorted(Path(temporary).iterdir())}
-    return keep(_KIND, key, files)[0].parent
+    return keep(_CATEGORY, key, files)[0].parent

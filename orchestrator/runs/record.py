@@ -29,7 +29,7 @@ METRICS = "metrics.json"
 PACKAGES = (*identity.PACKAGES, "matplotlib")
 
 
-class Clock:
+class Stopwatch:
     """When something has begun, and how long it has taken, even if somebody sets the time."""
 
     def __init__(self) -> None:
@@ -56,7 +56,7 @@ def write_record(
     header: Header,
     ending: Ending,
     command: Sequence[str],
-    clock: Clock,
+    clock: Stopwatch,
     remarks: Mapping[str, object] | None = None,
 ) -> None:
     """Write the record of a run into the folder of its files.
@@ -84,7 +84,7 @@ def write_record(
         "messages": list(ending.messages),
         "experiment": {**vars(header.experiment), "steps": dict(prepared.system.steps)},
         "loop": header.loop,
-        "texts": sorted(header.texts),
+        "texts": sorted(header.strings),
         **(remarks or {}),
         "events": [occurrence._asdict() for occurrence in ending.events],
         "fmus": {

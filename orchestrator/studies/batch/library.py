@@ -14,7 +14,7 @@ from typing import Any
 
 from auv_fmu.closed_loop import LAWS, Law
 from orchestrator.machine.cache import keep, kept
-from orchestrator.machine.imports import imported_apart
+from orchestrator.machine.children import imported_apart
 from orchestrator.master.identity import code_of
 from orchestrator.studies.batch import kernel
 from orchestrator.studies.batch.kernel import Moment

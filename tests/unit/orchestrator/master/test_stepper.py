@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from orchestrator.machine import cache as user_cache
+from orchestrator.machine import compiler
 from orchestrator.machine.errors import InputError
-from orchestrator.master import compiled as library
-from orchestrator.master import loop
+from orchestrator.master import loop, stepper
 from orchestrator.master.experiment import Experiment
 from support.machine import eventually, members
 
@@ -33,8 +33,8 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(library.shutil, "which", lambda _: None)
-    monkeypatch.setattr(library, "find_spec", lambda _: None)
+    monkeypatch.setattr(compiler.shutil, "which", lambda _: None)
+    monkeypatch.setattr(compiler, "find_spec", lambda _: None)
 
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
@@ -89,14 +89,14 @@ def test_a_compiler_that_fails_is_quoted(tmp_path, cache, monkeypatch, said, hea
 @pytest.mark.parametrize("length", [0, 100, 3000, -1])
 def test_a_library_that_was_cut_is_never_loaded_but_made_anew(cache, length, monkeypatch):
     # In another process: this one would hold on to the library.
-    code = "from orchestrator.master import library; print(library.made()._name)"
+    code = "from orchestrator.master import stepper; print(stepper.made()._name)"
     [place] = map(Path, subprocess.check_output([sys.executable, "-c", code]).decode().split())
     content = place.read_bytes()
     place.write_bytes(content[:length])
     loaded = []
-    monkeypatch.setattr(library, "CDLL", lambda path: loaded.append(path) or CDLL(path))
-    assert library.kept() is None
-    assert library.made().advance
+    monkeypatch.setattr(stepper, "CDLL", lambda path: loaded.append(path) or CDLL(path))
+    assert stepper.kept() is None
+    assert stepper.made().advance
     assert loaded and str(place) not in loaded
     # Whatever that is, it is not ours to overwrite.
     assert place.read_bytes() == content[:length]
@@ -108,9 +108,9 @@ def test_a_library_without_the_function_is_no_library(cache, tmp_path):
     source.write_text("int other(void) { return 0; }")
     other = tmp_path / "other.so"
     subprocess.run(["cc", "-shared", "-o", other, source], check=True)
-    user_cache.keep("loop", library._key(), {"stepper.so": other.read_bytes()})
-    assert library.kept() is None
-    assert library.made().advance
+    user_cache.keep("loop", stepper._key(), {"stepper.so": other.read_bytes()})
+    assert stepper.kept() is None
+    assert stepper.made().advance
 
 
 @needs_compiler
@@ -119,7 +119,7 @@ def test_what_others_have_in_the_cache_stays(cache):
     for path in own:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         path.write_text("mine")
-    library.made()
+    stepper.made()
     assert [path.read_text() for path in own] == ["mine"] * 3
 
 
@@ -129,9 +129,9 @@ def test_a_compiler_that_hangs_is_ended_with_what_it_has_started(tmp_path, monke
     compiler.write_text(f"#!/bin/sh\necho $$ > {tmp_path}/session\n{script}\necho\n")
     compiler.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
-    monkeypatch.setattr(library, "_LIMIT", 0.5)
+    monkeypatch.setattr("orchestrator.machine.compiler._LIMIT", 0.5)
     with pytest.raises(InputError, match=r"cannot be compiled: .*/cc has not ended after 0\.5 s$"):
-        library.made()
+        stepper.made()
     session = int((tmp_path / "session").read_text())
     assert eventually(lambda: not members(session))
 
@@ -142,7 +142,7 @@ def test_processes_that_compile_at_once_do_so_once(tmp_path, cache):
         f'#!/bin/sh\necho compiled >> {tmp_path}/log\nexec {shutil.which("cc")} "$@"\n'
     )
     (tmp_path / "cc").chmod(0o755)
-    code = "from orchestrator.master import library; library.made().advance"
+    code = "from orchestrator.master import stepper; stepper.made().advance"
     environment = {**os.environ, "PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
     processes = [
         subprocess.Popen([sys.executable, "-P", "-c", code], env=environment) for _ in range(4)
@@ -156,14 +156,14 @@ def test_processes_that_compile_at_once_do_so_once(tmp_path, cache):
 def test_compilers_have_nothing_to_say(tmp_path, command):
     if shutil.which(command) is None:
         pytest.skip(f"no {command}")
-    arguments = [*library._FLAGS, *STRICT, library._SOURCE, "-o", tmp_path / "library"]
+    arguments = [*stepper._FLAGS, *STRICT, stepper._SOURCE, "-o", tmp_path / "library"]
     subprocess.run([command, *arguments], check=True)
 
 
 def test_zig_compiles_it_where_there_is_no_other(tmp_path, cache, monkeypatch):
     pytest.importorskip("ziglang")
-    monkeypatch.setattr(library.shutil, "which", lambda _: None)
+    monkeypatch.setattr(compiler.shutil, "which", lambda _: None)
     with pytest.raises(InputError):
-        library.made(in_no_time=True)
-    assert library.made().advance
-    assert library.kept() is not None
+        stepper.made(in_no_time=True)
+    assert stepper.made().advance
+    assert stepper.kept() is not None

@@ -18,7 +18,7 @@ from orchestrator.runs.entries import (
     is_text,
 )
 from orchestrator.studies.engine import INDICES
-from orchestrator.studies.figures.values import SCENARIO, is_known
+from orchestrator.studies.figures.study_data import SCENARIO, is_known
 
 #: What a figure can be.
 BANDS, MAPS, FRONT, INFLUENCE = "bands", "maps", "front", "influence"
@@ -34,7 +34,7 @@ _USUAL = ("late_error", "peak_command", "lost")
 
 
 @dataclass(frozen=True)
-class Plan:
+class FigureEntry:
     """A figure that is to be drawn; :data:`ENTRIES` says what each entry means.
 
     Attributes:
@@ -106,7 +106,7 @@ ENTRIES: Mapping[str, Entry] = {
 
 def read_figures(
     where: str, figures: Mapping[str, Any], varied: Mapping[str, type], is_compared: bool
-) -> tuple[Plan, ...]:
+) -> tuple[FigureEntry, ...]:
     """The figures of a study.
 
     Args:
@@ -131,7 +131,7 @@ def read_figures(
             raise InputError(f"{where}: figures: {name!r} is no name of a file: letters, digits, -")
         _check(f"{where}: figures: {name}", table, (*numbers, *INDICES), (*varied, *by))
         plans.append(
-            Plan(
+            FigureEntry(
                 name,
                 table["kind"],
                 _listed(table.get("x", ())),

@@ -7,18 +7,17 @@ from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 from orchestrator.formats.ssp.archive import Archive
+from orchestrator.formats.ssp.definitions import converts_units, transformation_of
 from orchestrator.formats.ssp.hierarchy import GIVES, TAKES, Bus, Connector, Group, Leaf, Node
-from orchestrator.formats.ssp.transformations import converts_units, transformation_of
 from orchestrator.machine.errors import InputError, did_you_mean
-from orchestrator.system.transformation import Linear, Transformation, chained
-from orchestrator.system.units import Unit
+from orchestrator.system.units import Linear, Transformation, Unit, chained
 
 #: Parts of arrays and the like, which FMI 2.0 does not have.
 _UNSUPPORTED = ("startIndices", "endIndices")
 
 
 @dataclass(frozen=True)
-class Wire:
+class Segment:
     """One connection of a file, which ends in a node.
 
     Attributes:
@@ -37,7 +36,7 @@ class Wire:
     def carry(
         self, archive: Archive, whole: Transformation | None, unit: Unit | None
     ) -> tuple[Transformation | None, Unit | None]:
-        """What has happened to a value at the wire's end, and the unit that it has there.
+        """What has happened to a value at the segment's end, and the unit that it has there.
 
         Args:
             archive: whose connection it is.
@@ -60,39 +59,39 @@ class Wire:
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
-    """How a value comes to a node; courses share what they have in common.
+class Route:
+    """How a value comes to a node; routes share what they have in common.
 
     Attributes:
         node: where it comes to.
         origin: where it comes from: the node itself, if nothing feeds that.
-        before: how it comes to the end of the last wire; None: nothing feeds the node.
-        wire: the last one.
+        before: how it comes to the end of the last segment; None: nothing feeds the node.
+        segment: the last one.
 
     """
 
     node: Node
     origin: Node
-    before: Course | None = None
-    wire: Wire | None = None
+    before: Route | None = None
+    segment: Segment | None = None
 
 
-class Wires:
+class Routes:
     """All connections of a system and of those in it, by their targets."""
 
     def __init__(self, archive: Archive, top: Group) -> None:
         """Read them; what is wrong with them becomes problems of the archive."""
         self._archive = archive
-        self._wires: dict[Node, Wire] = {}
-        self._courses: dict[Node, Course] = {}
+        self._segments: dict[Node, Segment] = {}
+        self._routes: dict[Node, Route] = {}
         self._circling: set[Node] = set()
         self._read(top)
 
     def targets(self) -> Iterator[Node]:
         """All nodes that are fed, in the order in which the file has their connections."""
-        yield from self._wires
+        yield from self._segments
 
-    def course(self, node: Node) -> Course:
+    def route(self, node: Node) -> Route:
         """Follow a port upstream.
 
         Raises:
@@ -100,18 +99,18 @@ class Wires:
 
         """
         # What another port has been followed through is known: all of them take linear time.
-        upstream: dict[Node, Wire] = {}
+        upstream: dict[Node, Segment] = {}
         at = node
-        while at not in self._courses and (wire := self._wires.get(at)) is not None:
-            if at in upstream or wire.source in self._circling:
+        while at not in self._routes and (segment := self._segments.get(at)) is not None:
+            if at in upstream or segment.source in self._circling:
                 self._circling.update(upstream, [at])
                 raise InputError(f"{node}: the connections that feed it lead in a circle")
-            upstream[at] = wire
-            at = wire.source
-        course = self._courses.setdefault(at, Course(at, at))
-        for target, wire in reversed(upstream.items()):
-            course = self._courses[target] = Course(target, course.origin, course, wire)
-        return course
+            upstream[at] = segment
+            at = segment.source
+        route = self._routes.setdefault(at, Route(at, at))
+        for target, segment in reversed(upstream.items()):
+            route = self._routes[target] = Route(target, route.origin, route, segment)
+        return route
 
     def _read(self, group: Group) -> None:
         for connection in group.content.findall("Connections/Connection"):
@@ -134,7 +133,7 @@ class Wires:
             both = "take their value from elsewhere" if start.takes else "give one"
             raise InputError(f"{named}: cannot be connected, as both {both}")
         source, target = (end, start) if backwards else (start, end)
-        before = self._wires.get(target.node)
+        before = self._segments.get(target.node)
         if before is not None:
             raise InputError(
                 f"{target.node} is fed by {before.source} and by {source.node}; an input takes one "
@@ -144,7 +143,7 @@ class Wires:
             stated = transformation_of(connection, source.connector.items, target.connector.items)
         except InputError as error:
             raise InputError(f"{named}: {error}") from None
-        self._wires[target.node] = Wire(
+        self._segments[target.node] = Segment(
             source.node, target.connector.unit, stated, converts_units(connection)
         )
 
@@ -186,7 +185,7 @@ class _End:
                 f"a connection to {Node(element.way, port)}, which is not there"
                 f"{did_you_mean(port, element.connectors)}"
             )
-        outwards, inwards = connector.kind in GIVES, connector.kind in TAKES
+        outwards, inwards = connector.causality in GIVES, connector.causality in TAKES
         # Seen from within, a system's inputs give and its outputs take.
         gives, takes = (inwards, outwards) if element is group else (outwards, inwards)
         return cls(Node(element.way, port), connector, gives, takes)

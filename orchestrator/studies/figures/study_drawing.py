@@ -10,14 +10,14 @@ from matplotlib.figure import Figure
 
 from orchestrator.figures.style import save, styled
 from orchestrator.studies.figures.bands import bands
-from orchestrator.studies.figures.entries import BANDS, FRONT, INFLUENCE, MAPS, Plan
+from orchestrator.studies.figures.figure_entries import BANDS, FRONT, INFLUENCE, MAPS, FigureEntry
 from orchestrator.studies.figures.fronts import front
 from orchestrator.studies.figures.influence import influence
 from orchestrator.studies.figures.maps import maps
-from orchestrator.studies.figures.values import Columns, Values
+from orchestrator.studies.figures.study_data import Columns, Values
 from orchestrator.system.names import file_name
 
-_DRAW: Mapping[str, Callable[[Plan, str, Values], Figure]] = {
+_DRAW: Mapping[str, Callable[[FigureEntry, str, Values], Figure]] = {
     BANDS: bands,
     MAPS: maps,
     FRONT: front,
@@ -30,13 +30,13 @@ _FORMATS = ("png", "svg")
 _MOST_PARTS = 12
 
 
-def figure_files(plans: Sequence[Plan]) -> list[str]:
+def figure_files(plans: Sequence[FigureEntry]) -> list[str]:
     """The files that :func:`draw_figures` may write."""
     return [f"{file_name(plan.name)}.{ending}" for plan in plans for ending in _FORMATS]
 
 
 def draw_figures(
-    plans: Sequence[Plan], title: str, columns: Columns, folder: Path
+    plans: Sequence[FigureEntry], title: str, columns: Columns, folder: Path
 ) -> Iterator[str]:
     """Draw the figures of a study, as PNG and SVG.
 

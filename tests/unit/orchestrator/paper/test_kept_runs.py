@@ -11,9 +11,10 @@ import pytest
 from orchestrator.machine.errors import InputError
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
-from orchestrator.paper.kept_runs import Outcomes, key_of
-from orchestrator.paper.variations import Run
-from orchestrator.runs.preparation import with_companion
+from orchestrator.paper.kept_runs import KeptRuns, key_of
+from orchestrator.paper.sections import companions
+from orchestrator.runs.preparation import prepared_of, with_companion
+from orchestrator.runs.request import Request
 
 
 class InThisProcess:
@@ -28,35 +29,35 @@ class InThisProcess:
             yield key, task()
 
 
-QUIET = Run("fig4", {"plant.noise.std": 0.0})
+QUIET = Request("fig4", {"plant.noise.std": 0.0})
 
 
 @pytest.mark.parametrize(
     ("run", "label"),
     [
-        (Run("fig4"), "fig4"),
+        (Request("fig4"), "fig4"),
         (QUIET, "fig4 --set plant.noise.std=0"),
-        (Run("fig5", {"controller.printed_jacobian": True}),
+        (Request("fig5", {"controller.printed_jacobian": True}),
          "fig5 --set controller.printed_jacobian=true"),
-        (Run("fig4", {"plant.noise.std": 1.23456789e-05}),
+        (Request("fig4", {"plant.noise.std": 1.23456789e-05}),
          "fig4 --set plant.noise.std=1.23456789e-05"),
-        (Run("my file.toml", order="jacobi", stop_time=2.5, step=0.01),
+        (Request("my file.toml", order="jacobi", stop_time=2.5, step=0.01),
          "'my file.toml' --stop-time 2.5 --step 0.01 --order jacobi"),
     ],
 )  # fmt: skip
 def test_label_is_what_the_user_types(run, label):
-    assert run.label == label
+    assert run.command_line == label
 
 
 def test_a_companion_that_changes_nothing_is_the_scenario_itself():
-    assert Run("fig5").companions() == [Run("fig5-pd")]
-    assert Run("fig4").companions() == []
+    assert companions(Request("fig5")) == [Request("fig5-pd")]
+    assert companions(Request("fig4")) == []
 
 
 def test_what_is_set_goes_for_the_companion_too():
-    [companion] = Run("fig5", {"controller.eps_t": 1.0, "controller.k_d": 40.0}).companions()
-    assert companion == Run("fig5-pd", {"controller.eps_t": 1.0})
-    assert Run("fig5", order="jacobi").companions() == [Run("fig5-pd", order="jacobi")]
+    [companion] = companions(Request("fig5", {"controller.eps_t": 1.0, "controller.k_d": 40.0}))
+    assert companion == Request("fig5-pd", {"controller.eps_t": 1.0})
+    assert companions(Request("fig5", order="jacobi")) == [Request("fig5-pd", order="jacobi")]
 
 
 def test_a_scenario_and_its_companion_are_run_as_it_says(tmp_path):
@@ -64,14 +65,14 @@ def test_a_scenario_and_its_companion_are_run_as_it_says(tmp_path):
     own.write_text(
         'compare = "fig5-pd"\norder = "jacobi"\nstop_time = 1.0\n[steps]\ncontroller = 0.2\n'
     )
-    run = Run(str(own))
-    [companion] = run.companions()
-    for one in (run.prepared(), companion.prepared()):
+    run = Request(str(own))
+    [companion] = companions(run)
+    for one in (prepared_of(run), prepared_of(companion)):
         assert one.experiment.order == "jacobi"
         assert one.system.steps == {"controller": 0.2}
-    [as_one] = with_companion(run.prepared(), run.request)[1:]
-    assert companion.prepared().identity == as_one.identity
-    assert companion.label == (
+    [as_one] = with_companion(prepared_of(run), run)[1:]
+    assert prepared_of(companion).identity == as_one.identity
+    assert companion.command_line == (
         "fig5-pd --stop-time 1 --order jacobi --set planner.eta0.z=-2 (steps: controller = 0.2 s)"
     )
 
@@ -81,24 +82,24 @@ def test_keys_tell_what_is_run_and_not_how_it_is_called(tmp_path):
     copy.write_text('title = "Another"\nstop_time = 100.0\n')
     slow = tmp_path / "slow.toml"
     slow.write_text("stop_time = 100.0\n[steps]\ncontroller = 0.2\n")
-    key = key_of(Run("fig4").prepared())
-    assert key_of(Run("fig4", {"plant.noise.std": 0.001}).prepared()) == key
-    assert key_of(Run(str(copy), {"plant.noise.std": 0.001}).prepared()) == key
+    key = key_of(prepared_of(Request("fig4")))
+    assert key_of(prepared_of(Request("fig4", {"plant.noise.std": 0.001}))) == key
+    assert key_of(prepared_of(Request(str(copy), {"plant.noise.std": 0.001}))) == key
     others = [
         QUIET,
-        Run("fig4", order="jacobi"),
-        Run("fig4", stop_time=50.0),
-        Run("fig4", step=0.01),
-        Run("fig5"),
-        Run("fig5-pd"),
-        Run(str(slow)),
+        Request("fig4", order="jacobi"),
+        Request("fig4", stop_time=50.0),
+        Request("fig4", step=0.01),
+        Request("fig5"),
+        Request("fig5-pd"),
+        Request(str(slow)),
     ]
-    assert len({key, *(key_of(run.prepared()) for run in others)}) == 1 + len(others)
+    assert len({key, *(key_of(prepared_of(run)) for run in others)}) == 1 + len(others)
 
 
 def test_equal_runs_are_made_once_and_used_again(tmp_path):
-    runs = [QUIET, Run("fig4", {"plant.noise.std": 0.001}), Run("fig4"), QUIET]
-    first, crew = Outcomes(tmp_path / "runs", stop_time=0.1), InThisProcess()
+    runs = [QUIET, Request("fig4", {"plant.noise.std": 0.001}), Request("fig4"), QUIET]
+    first, crew = KeptRuns(tmp_path / "runs", stop_time=0.1), InThisProcess()
     first.make(runs, crew)
     assert len(crew.done) == 2
     assert first[runs[1]] is first[runs[2]]
@@ -106,7 +107,7 @@ def test_equal_runs_are_made_once_and_used_again(tmp_path):
     assert len(first[QUIET].table) == 6
     assert first[QUIET].metrics["stop_time"] == 0.1
 
-    again, idle = Outcomes(tmp_path / "runs", stop_time=0.1), InThisProcess()
+    again, idle = KeptRuns(tmp_path / "runs", stop_time=0.1), InThisProcess()
     again.make(runs, idle)
     assert idle.done == []
     made, read = first[QUIET], again[QUIET]
@@ -117,15 +118,15 @@ def test_equal_runs_are_made_once_and_used_again(tmp_path):
 
 
 def test_a_file_that_was_changed_is_refused(tmp_path):
-    Outcomes(tmp_path, 0.1).make([QUIET], InThisProcess())
+    KeptRuns(tmp_path, 0.1).make([QUIET], InThisProcess())
     [file] = tmp_path.glob("*.npz")
     before = file.read_bytes()
     file.write_bytes(before[:100])
     crew = InThisProcess()
     with pytest.raises(InputError, match=rf"{file.name} is not a file that auv-fmu wrote"):
-        Outcomes(tmp_path, 0.1).make([QUIET], crew)
+        KeptRuns(tmp_path, 0.1).make([QUIET], crew)
     assert file.read_bytes() == before[:100]
-    outcomes = Outcomes(tmp_path, 0.1, force=True)
+    outcomes = KeptRuns(tmp_path, 0.1, force=True)
     outcomes.make([QUIET], crew)
     assert len(crew.done) == 1
     assert outcomes[QUIET].failure is None
@@ -133,9 +134,9 @@ def test_a_file_that_was_changed_is_refused(tmp_path):
 
 
 def test_what_no_run_needs_is_forgotten(tmp_path):
-    Outcomes(tmp_path, 0.1).make([QUIET], InThisProcess())
+    KeptRuns(tmp_path, 0.1).make([QUIET], InThisProcess())
     (tmp_path / "0123.npz").write_bytes(b"mine")
-    outcomes = Outcomes(tmp_path, 0.2)
+    outcomes = KeptRuns(tmp_path, 0.2)
     outcomes.make([QUIET], InThisProcess())
     assert len(list(tmp_path.glob("*.npz"))) == 3
     outcomes.forget_others()
@@ -144,8 +145,8 @@ def test_what_no_run_needs_is_forgotten(tmp_path):
 
 
 def test_a_run_that_cannot_be_made_says_why(tmp_path):
-    broken = Run("fig4", {"plant.noise.sdt": 0.0})
-    outcomes, crew = Outcomes(tmp_path), InThisProcess()
+    broken = Request("fig4", {"plant.noise.sdt": 0.0})
+    outcomes, crew = KeptRuns(tmp_path), InThisProcess()
     outcomes.make([broken], crew)
     assert crew.done == []
     assert "did you mean noise.std" in outcomes[broken].failure
@@ -155,4 +156,4 @@ def test_a_run_that_cannot_be_made_says_why(tmp_path):
 
 def test_every_run_of_claims_and_effects_can_be_made():
     for run in {run for each in (*CLAIMS, *EFFECTS) for run in each.runs}:
-        run.prepared()
+        prepared_of(run)

@@ -12,11 +12,10 @@ from hypothesis import strategies as st
 
 from orchestrator.formats.ssp import reader as reading
 from orchestrator.formats.ssp.hierarchy import Node
-from orchestrator.machine.errors import InputError
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings, InputError
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection
-from orchestrator.system.transformation import chained
+from orchestrator.system.units import chained
 from support.archives import (
     archive,
     binding,
@@ -46,33 +45,33 @@ units = st.sampled_from(["", "m", "mm", "km", "K", "furlong"])
 class OneByOne(reading._Ports):
     """Each port followed upstream by itself, and its way transformed from its beginning."""
 
-    def __init__(self, archive, leaves, wires, given) -> None:
+    def __init__(self, archive, leaves, routes, given) -> None:
         self.connections, self.parameters = [], {}
         self._archive, self._leaves, self._given = archive, leaves, given
         used: set[Node] = set()
-        for node in dict.fromkeys((*wires.targets(), *given)):
+        for node in dict.fromkeys((*routes.targets(), *given)):
             leaf = leaves.get(node.way)
             if leaf is not None and leaf.component is not None:
                 try:
-                    self._follow(PortName(leaf.component.name, node.port), node, leaf, wires, used)
+                    self._follow(PortName(leaf.component.name, node.port), node, leaf, routes, used)
                 except InputError as error:
                     archive.problem(error)
         lost = [str(node) for node in given if node not in used]
         if lost:
             archive.note(f"values that are given to {reading.listed(lost)} reach no component")
 
-    def _follow(self, port, node, leaf, wires, used) -> None:
+    def _follow(self, port, node, leaf, routes, used) -> None:
         nodes, ways = [node], []
-        while (wire := wires._wires.get(nodes[0])) is not None:
-            if wire.source in nodes:
+        while (segment := routes._segments.get(nodes[0])) is not None:
+            if segment.source in nodes:
                 raise InputError(f"{node}: the connections that feed it lead in a circle")
-            nodes.insert(0, wire.source)
-            ways.insert(0, wire)
+            nodes.insert(0, segment.source)
+            ways.insert(0, segment)
 
         def carried(unit, first=0):
             whole = None
-            for wire in ways[first:]:
-                whole, unit = wire.carry(self._archive, whole, unit)
+            for segment in ways[first:]:
+                whole, unit = segment.carry(self._archive, whole, unit)
             return whole
 
         origin = self._leaves.get(nodes[0].way) if ways else None
@@ -117,13 +116,13 @@ def descriptions(draw) -> str:
     """A component in a system with connectors, any of which may feed any other once."""
     inner = [f"c{i}" for i in range(CONNECTORS)]
     ports = [f"a.u{i}" for i in range(PORTS)]
-    wires = []
+    routes = []
     for target in draw(st.permutations([*inner, *ports])):
         source = draw(st.sampled_from(["", *inner, *inner, "a.y0", "a.y1"]))
         if source:
             inside = draw(st.sampled_from(TRANSFORMATIONS[:1] * 4 + TRANSFORMATIONS))
             more = draw(st.sampled_from([{}, {}, {"suppressUnitConversion": "true"}]))
-            wires.append(connection(source, target, inside, **more))
+            routes.append(connection(source, target, inside, **more))
     values = dict.fromkeys(
         draw(st.lists(st.sampled_from([*inner, *ports]), max_size=5, unique=True)), 'Real value="3"'
     )
@@ -131,7 +130,7 @@ def descriptions(draw) -> str:
         system(
             system(
                 component("a"),
-                "".join(wires),
+                "".join(routes),
                 "".join(connector(name, "inout", draw(units)) for name in inner),
                 name="inner",
                 bindings=binding(values) if values else "",
@@ -158,15 +157,15 @@ def test_long_way_to_many_ports_is_gone_once(tmp_path: Path):
     n = 3000
     chain = [f"c{i}" for i in range(n)]
     ports = [f"a.u{i}" for i in range(n)]
-    wires = [connection("a.y", "c0"), *(connection(*pair) for pair in pairwise(chain))]
-    wires += [connection(chain[-1], port) for port in ports]
+    routes = [connection("a.y", "c0"), *(connection(*pair) for pair in pairwise(chain))]
+    routes += [connection(chain[-1], port) for port in ports]
     one = fmu(
         tmp_path / "a.fmu",
         variable("y", "output"),
         *(variable(f"u{i}", "input") for i in range(n)),
     )
     text = described(
-        system(component("a"), "".join(wires), "".join(connector(c, "inout") for c in chain))
+        system(component("a"), "".join(routes), "".join(connector(c, "inout") for c in chain))
     )
     found = reading.read_ssp(archive(tmp_path / "x.ssp", text, {"a.fmu": one}))
     assert found.connections == tuple(
@@ -184,13 +183,13 @@ def test_mapping_that_many_make_is_bounded(tmp_path: Path):
         entries = "".join(f'<ssc:MapEntry source="{a}" target="{b}"/>' for a, b in pairs)
         return f"<ssc:{tag}>{entries}</ssc:{tag}>"
 
-    wires = [connection("a.y", "c0"), connection(chain[-1], "a.u")]
-    wires += [connection(*pair, table(i)) for i, pair in enumerate(pairwise(chain))]
+    routes = [connection("a.y", "c0"), connection(chain[-1], "a.u")]
+    routes += [connection(*pair, table(i)) for i, pair in enumerate(pairwise(chain))]
     one = fmu(
         tmp_path / "a.fmu", variable("y", "output", "Integer"), variable("u", "input", "Integer")
     )
     connectors = "".join(connector(c, "inout", of="Integer") for c in chain)
-    text = described(system(component("a"), "".join(wires), connectors))
+    text = described(system(component("a"), "".join(routes), connectors))
     findings = Findings()
     with findings.collecting():
         reading.read_ssp(archive(tmp_path / "x.ssp", text, {"a.fmu": one}), findings=findings)

@@ -11,7 +11,7 @@ from orchestrator.studies.figures.bands import bands
 from orchestrator.studies.figures.fronts import best
 from orchestrator.studies.figures.influence import influence
 from orchestrator.studies.figures.maps import maps
-from orchestrator.studies.figures.values import Values
+from orchestrator.studies.figures.study_data import Values
 
 GRID = np.geomspace(1.0, 100.0, 5)
 VARIED = {"disturbance.A_f": float, "disturbance.A_d": float}

@@ -11,6 +11,7 @@ from orchestrator.master.fmi.instance import Ended
 from orchestrator.master.hooks.hook import NEVER, Run
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.preparation import load
 from orchestrator.system.names import port_name
@@ -27,17 +28,17 @@ class Pushes:
         self._acts = {begin: self._begin, end: self._end, stop: self._stop}
         self.times: list[int] = []
 
-    def attend(self, run: Run) -> int:
+    def act(self, run: Run) -> int:
         self.times.append(run.made)
         if act := self._acts.pop(run.made, None):
             act(run)
         return min(self._acts, default=NEVER)
 
     def _begin(self, run: Run) -> None:
-        run.signals.override(port_name("plant.tau.u"), 0.0)
+        run.overrides.override(port_name("plant.tau.u"), 0.0)
 
     def _end(self, run: Run) -> None:
-        run.signals.release(port_name("plant.tau.u"))
+        run.overrides.release(port_name("plant.tau.u"))
 
     def _stop(self, run: Run) -> None:
         raise Ended("enough")
@@ -45,11 +46,11 @@ class Pushes:
 
 @pytest.mark.parametrize("loop", LOOPS)
 @pytest.mark.parametrize("order", ORDERS)
-def test_an_attendant_acts_on_the_steps_that_it_names(loop, order):
+def test_a_hook_acts_on_the_steps_that_it_names(loop, order):
     system, experiment = load("fig4", NATIVE), Experiment(14.0, 0.02, order)
     table, pushes = Table(), Pushes(10, 620, 650)
     ending = simulate(
-        system, experiment, [table], None, chosen(loop, experiment), attendants=[pushes]
+        planned(system, experiment), [table], None, chosen(loop, experiment), hooks=[pushes]
     )
     assert pushes.times == [0, 10, 620, 650]
     assert (ending.failure, ending.remark) == (None, "ended at t = 13 s: enough")
