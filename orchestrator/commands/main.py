@@ -13,8 +13,8 @@ from typing import Any
 
 from orchestrator.commands import streams
 from orchestrator.commands.streams import say
+from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import reason
-from orchestrator.machine.imports import imported_apart
 from orchestrator.machine.interrupts import orderly_end
 
 

@@ -11,8 +11,7 @@ from fmpy.validation import validate_fmu
 
 from orchestrator.formats.ssp.archive import listed
 from orchestrator.machine.archives import unpacked
-from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings, InputError, reason
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System

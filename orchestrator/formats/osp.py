@@ -10,14 +10,12 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from orchestrator.formats.ssp.archive import Archive
-from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.findings import Findings
-from orchestrator.machine.reading import check_file, is_folder
+from orchestrator.machine.errors import Findings, InputError, reason
+from orchestrator.machine.user_files import check_file, is_folder
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.transformation import Linear
-from orchestrator.system.units import conversion, unit_of_port
+from orchestrator.system.units import Linear, conversion, unit_of_port
 from orchestrator.system.values import Value, literal, type_of, typed
 
 #: The versions of FMI that libcosim knows and we can write.
@@ -78,8 +76,8 @@ def write_osp(system: System, folder: Path) -> list[Path]:
             values = ElementTree.SubElement(simulator, "InitialValues")
             for name, value in parameters.items():
                 element = ElementTree.SubElement(values, "InitialValue", variable=name)
-                kind = component.variable(name).type
-                ElementTree.SubElement(element, kind, value=literal(value))
+                fmi_type = component.variable(name).type
+                ElementTree.SubElement(element, fmi_type, value=literal(value))
     connections = ElementTree.SubElement(root, "Connections")
     for connection in system.connections:
         element = ElementTree.SubElement(connections, "VariableConnection")

@@ -1,4 +1,4 @@
-"""Python modules run in processes that do not outlive this one, and leave nothing behind.
+"""Modules run in processes that do not outlive this one, none of them from the current folder.
 
 As a module it is what runs in such a process: `python -m orchestrator.machine.children MODULE ...`.
 """
@@ -10,10 +10,29 @@ import runpy
 import subprocess
 import sys
 import threading
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from orchestrator.machine.locks import process_folder
+
+
+def imported_apart(module: str, file: str) -> None:
+    """Import a module now, and elsewhere, if the current folder has a file that it would read.
+
+    Args:
+        module: to be imported.
+        file: that it looks for in the current folder.
+
+    """
+    if module in sys.modules or not os.path.lexists(file):
+        return
+    current = Path.cwd()
+    os.chdir(process_folder())
+    try:
+        import_module(module)
+    finally:
+        os.chdir(current)
 
 
 def run_module(

@@ -26,9 +26,8 @@ from stat import S_ISREG
 from typing import NamedTuple
 from uuid import uuid4
 
-from orchestrator.machine.atomic import to_disk, write_new, write_whole
+from orchestrator.machine.atomic import sealed, to_disk, unsealed, write_new, write_whole
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.sealed import sealed, unsealed
 
 #: The ledger of a folder; what is being written there begins with the same letters.
 LEDGER, _UNFINISHED = ".auv-fmu.json", ".auv-fmu-"

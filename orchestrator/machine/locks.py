@@ -15,7 +15,7 @@ from shutil import rmtree
 from tempfile import TemporaryDirectory, gettempdir
 from uuid import uuid4
 
-from orchestrator.machine.sealed import sealed, unsealed
+from orchestrator.machine.atomic import sealed, unsealed
 
 try:
     import fcntl

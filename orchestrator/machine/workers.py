@@ -19,8 +19,8 @@ from typing import Any, TypeVar
 
 from tqdm import tqdm
 
+from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.imports import imported_apart
 from orchestrator.machine.interrupts import Interrupts, held_interrupts, without_interrupt
 from orchestrator.machine.locks import process_folder
 

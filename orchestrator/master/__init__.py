@@ -5,7 +5,7 @@ The loop, in :func:`.simulation.simulate`::
     exchange initial values until they rest
     tell the observers the first row
     for every step from t to t + h:
-        let attendants act whose time has come
+        let hooks act whose time has come
         for every stage of the schedule:
             gather the inputs of its components
             step each of them, then read their outputs

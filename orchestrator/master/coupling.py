@@ -1,11 +1,13 @@
-"""How the components of a run are coupled: at its start, and in every step."""
+"""How components are coupled: at the start, in every step, and when a delay lets values grow."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from orchestrator.machine.errors import InputError, StartError
-from orchestrator.master.decimation import paces
 from orchestrator.master.experiment import (
     DELAY,
     GAUSS_SEIDEL,
@@ -13,33 +15,84 @@ from orchestrator.master.experiment import (
     OURS,
     SOLVE,
     Exchange,
-    Experiment,
 )
 from orchestrator.master.fmi.instance import Instance
 from orchestrator.master.fmi.log import Log
 from orchestrator.master.gathering import Gathering
 from orchestrator.master.linear import LinearSteps
+from orchestrator.master.observers.observer import Ending, Header
+from orchestrator.master.plan import Plan, delays, stages
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import Action, Stage, delays, schedule, stages
+from orchestrator.master.schedule import Stage, StageCall, schedule
 from orchestrator.master.settling import Settling
 from orchestrator.system.graph import has_feedthrough, rings
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
+
+#: A value grows without bound if it doubles at least so often in each of so many intervals, one
+#: after the other, and so often in all of them together. What grows with a power of time does not.
+_INTERVALS, _DOUBLINGS, _IN_ALL = 8, 1.0, 24.0
+
+#: Lengths of these intervals, in steps.
+_LENGTHS = tuple(2**i for i in range(9))
+
+
+class Growth:
+    """An observer that ends a run in which values of delayed rings grow without bound."""
+
+    def __init__(self, ports: Collection[PortName]) -> None:
+        """Watch some ports."""
+        self._names = list(map(str, ports))
+        self._columns: list[int] = []
+        self._rows = 0
+        self._last = {length: np.empty((0, len(self._names))) for length in _LENGTHS}
+
+    def begin(self, header: Header) -> None:
+        """Find the ports."""
+        places = {name: i for i, name in enumerate(header.columns, start=1)}
+        self._columns = [places[name] for name in self._names]
+
+    def take(self, rows: np.ndarray) -> None:
+        """Look at some rows.
+
+        Raises:
+            InputError: a value grows without bound.
+
+        """
+        sizes = np.log2(np.abs(rows[:, self._columns]))
+        # From zero, everything is infinitely far.
+        sizes[np.isinf(sizes)] = np.nan
+        for length in _LENGTHS:
+            new = sizes[-self._rows % length :: length]
+            known = np.concatenate([self._last[length], new])
+            self._last[length] = known[-_INTERVALS - 1 :]
+            if len(new) and len(known) > _INTERVALS:
+                doublings = sliding_window_view(np.diff(known, axis=0), _INTERVALS, axis=0)
+                grows = doublings.min(axis=-1) >= _DOUBLINGS
+                grows &= doublings.sum(axis=-1) >= _IN_ALL
+                if found := np.flatnonzero(grows.any(axis=0)).tolist():
+                    raise InputError(
+                        f"{self._names[found[0]]} grows without bound, in a ring of direct "
+                        "feedthroughs that is delayed by a step; --coupling solve, if its FMUs "
+                        "allow it, or another --order may help"
+                    )
+        self._rows += len(rows)
+
+    def end(self, ending: Ending) -> None:
+        """Nothing is kept."""
 
 
 class Coupling:
     """The rings of direct feedthroughs of a system, and what follows from them.
 
     Attributes:
-        plan: all components in stages, once they are initialised.
+        sequence: all components in stages, once they are initialised.
 
     """
 
     def __init__(
         self,
-        system: System,
-        experiment: Experiment,
+        plan: Plan,
         instances: Mapping[str, Instance],
         row: Row,
         log: Log,
@@ -48,19 +101,19 @@ class Coupling:
         """Find the rings.
 
         Args:
-            system: that is run.
-            experiment: says how rings are closed.
+            plan: what is run, and how rings are closed.
             instances: of its components.
             row: that they are tied to.
             log: takes where a ring is delayed.
             exchange: of values.
 
         """
-        self._system, self._experiment, self._exchange = system, experiment, exchange
+        self._plan, self._exchange = plan, exchange
+        self._system, self._experiment = plan.system, plan.experiment
         self._instances, self._row, self._log = instances, row, log
-        self._rings = [self._ring(names) for names in rings(system)]
+        self._rings = [self._ring(names) for names in rings(plan.system)]
         self._solved: list[Ring] = []
-        self.plan: list[list[str]] = []
+        self.sequence: list[list[str]] = []
 
     def initialise(self) -> None:
         """Set parameters, exchange values in initialisation mode until they rest, leave that mode.
@@ -83,7 +136,7 @@ class Coupling:
         for instance in instances.values():
             instance.exit_initialization()
         self._solved = self._solvable()
-        self.plan = self._plan(self._experiment.order, self._solved)
+        self.sequence = self._in_stages(self._experiment.order, self._solved)
         if self._rings:
             settling = self._settling(self._solved)
         if self._exchange.at_start:
@@ -100,12 +153,11 @@ class Coupling:
         if self._experiment.coupling == LINEAR:
             settling = self._settling(self._solved)
             steps = LinearSteps(system, instances, row, settling)
-            stage = Stage(Gathering.along(row, ()), [Action(steps.step).member])
+            stage = Stage(Gathering.along(row, ()), [StageCall(steps.step).member])
             return [stage], settling.gatherings
         found = schedule(
-            system,
-            self._experiment,
-            self.plan,
+            self._plan,
+            self.sequence,
             instances,
             row,
             self._solved,
@@ -139,7 +191,7 @@ class Coupling:
         else:
             for ring in self._rings:
                 reasons |= ring.unsolved()
-            for name, n in paces(system, self._experiment.step).items():
+            for name, n in self._plan.decimations.items():
                 if n > 1:
                     reasons[name] = f"{name} takes longer steps"
         solved = rings(system, system.components.keys() - reasons.keys())
@@ -153,14 +205,14 @@ class Coupling:
     def _ring(self, names: Sequence[str]) -> Ring:
         return Ring(names, self._system, self._instances, self._row)
 
-    def _plan(self, order: str | Sequence[str], solved: Sequence[Ring]) -> list[list[str]]:
+    def _in_stages(self, order: str | Sequence[str], solved: Sequence[Ring]) -> list[list[str]]:
         if self._exchange.latest and not isinstance(order, str):
             return [[name] for name in order]
         return stages(self._system, order, [ring.names for ring in solved])
 
     def _settling(self, solved: Sequence[Ring]) -> Settling:
-        plan = self._plan(GAUSS_SEIDEL, solved)
-        return Settling(self._system, self._instances, self._row, plan, solved)
+        sequence = self._in_stages(GAUSS_SEIDEL, solved)
+        return Settling(self._system, self._instances, self._row, sequence, solved)
 
     def _read_outputs(self) -> None:
         """Enter what components show whose inputs have not been set."""

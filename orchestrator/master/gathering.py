@@ -10,7 +10,7 @@ import numpy as np
 from orchestrator.master.row import Row
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection
-from orchestrator.system.transformation import Linear, Mapped
+from orchestrator.system.units import Linear, Mapped
 
 #: Times one, plus minus zero: every number stays what it is, minus zero, too.
 FACTOR, OFFSET = 1.0, -0.0
@@ -71,7 +71,7 @@ class Gathering:
         self.is_plain = bool(plain.all()) and not self.mapped
 
 
-class Signals:
+class Overrides:
     """All that is gathered in a step, and what somebody does to it for some time."""
 
     def __init__(

@@ -17,7 +17,7 @@ from platform import python_version
 
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.hooks.events import Event
-from orchestrator.master.hooks.playback import Course
+from orchestrator.master.hooks.playback import InputTable
 from orchestrator.system.structure import System
 
 #: Packages whose versions the rows depend on.
@@ -34,7 +34,7 @@ def identity(
     system: System,
     experiment: Experiment,
     events: Sequence[Event] = (),
-    course: Course | None = None,
+    input_table: InputTable | None = None,
 ) -> Identity:
     """All that the rows of a run depend on.
 
@@ -60,7 +60,7 @@ def identity(
         **_parameters(system),
         **{name: repr(value) for name, value in vars(experiment).items()},
         "the events": repr(tuple(events)),
-        "the inputs": "" if course is None else course.digest,
+        "the inputs": "" if input_table is None else input_table.digest,
     }
 
 

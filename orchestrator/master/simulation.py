@@ -4,32 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import replace
-from math import lcm
 from time import monotonic
 
 import numpy as np
 
 from orchestrator.machine.errors import InputError, StartError, reason, unforeseen
 from orchestrator.machine.interrupts import held_interrupts
-from orchestrator.master.coupling import Coupling
-from orchestrator.master.decimation import paces
+from orchestrator.master.coupling import Coupling, Growth
 from orchestrator.master.ends import to_its_end
-from orchestrator.master.experiment import LINEAR, OURS, Exchange, Experiment
+from orchestrator.master.experiment import OURS, Exchange
 from orchestrator.master.fmi.instance import ComponentFailed, Ended, Instance
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.fmi.log import Log
-from orchestrator.master.fmi.mode import default_mode
 from orchestrator.master.fmi.placement import placed
-from orchestrator.master.fmi.surroundings import Surroundings
-from orchestrator.master.gathering import Signals
-from orchestrator.master.growth import Growth
-from orchestrator.master.hooks.hook import Attendance, Attendant, Run
-from orchestrator.master.linear import check_linear
+from orchestrator.master.fmi.surroundings import Surroundings, default_mode
+from orchestrator.master.gathering import Overrides
+from orchestrator.master.hooks.hook import Hook, Hooks, Run
 from orchestrator.master.loop import PYTHON_LOOP, Loop
 from orchestrator.master.observers.observer import Blocks, Ending, Header, NotKept, Observer
+from orchestrator.master.plan import Plan
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import stages
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import literal, same
@@ -39,40 +33,36 @@ from orchestrator.system.values import literal, same
 @np.errstate(all="ignore")
 @default_mode()
 def simulate(
-    system: System,
-    experiment: Experiment,
+    plan: Plan,
     observers: Sequence[Observer] = (),
     isolation: Isolation | None = None,
     loop: Loop = PYTHON_LOOP,
-    attendants: Sequence[Attendant] = (),
+    hooks: Sequence[Hook] = (),
     exchange: Exchange = OURS,
 ) -> Ending:
     """Run a system.
 
     Args:
-        system: what to run.
-        experiment: until when, in which steps and which order.
+        plan: what to run, as :func:`.plan.planned` gives it.
         observers: take the rows.
         isolation: run each FMU in a process of its own; None: all in this one.
         loop: makes the steps.
-        attendants: act between them, in this order.
+        hooks: act between them, in this order.
         exchange: of values.
 
     Returns:
         How the run has ended: after a failure the observers have the rows before it.
 
     Raises:
-        InputError: system or parameters are not usable; nothing was stepped.
+        InputError: an FMU or a parameter is not usable; nothing was stepped.
         KeyboardInterrupt: somebody wants it to stop, and an FMU does not come to its first step.
 
     """
-    system.check()
-    stages(system, experiment.order)
-    if experiment.coupling == LINEAR:
-        check_linear(system)
-    slow = {name for name, n in paces(system, experiment.step).items() if n > 1}
+    system, experiment = plan.system, plan.experiment
+    slow = {name for name, n in plan.decimations.items() if n > 1}
     log = Log()
-    experiment = _whole_steps(system, experiment, log)
+    for line in plan.remarks:
+        log.remark(line)
     with held_interrupts() as interrupts, Surroundings() as surroundings, ExitStack() as stack:
         with _explained():
             instances = stack.enter_context(placed(system.components, log, isolation, interrupts))
@@ -80,12 +70,12 @@ def simulate(
             stack.enter_context(surroundings)
             loop = _possible_loop(loop, instances, log)
             row = Row(system, instances, slow)
-            coupling = Coupling(system, experiment, instances, row, log, exchange)
+            coupling = Coupling(plan, instances, row, log, exchange)
             coupling.initialise()
             names = tuple(map(str, row.columns))
             parameters = _parameters(system, instances, log)
-            texts = dict.fromkeys(map(str, row.text_ports), row.texts)
-            header = Header(names, experiment, parameters, loop.name, texts)
+            strings = dict.fromkeys(map(str, row.text_ports), row.strings)
+            header = Header(names, experiment, parameters, loop.name, strings)
         scheduled, gatherings = coupling.schedule()
         if watched := coupling.delayed_ports():
             observers = [*observers, Growth(watched)]
@@ -93,23 +83,23 @@ def simulate(
             blocks = Blocks(len(row.shown), observers, surroundings.ours)
             interrupts.hand_over = blocks.hand_over
             blocks.append(experiment.start_time, row.shown)
-            signals = Signals(row, gatherings, system.connections)
+            overrides = Overrides(row, gatherings, system.connections)
             run = Run(
                 system,
                 experiment,
                 instances,
                 row,
                 scheduled,
-                signals,
+                overrides,
                 blocks,
                 log,
                 interrupts,
-                attendants,
+                hooks,
             )
-            order = [name for names in coupling.plan for name in names]
+            order = [name for names in coupling.sequence for name in names]
             remark = None
             try:
-                failure = _advance(run, loop, Attendance(run), order, surroundings)
+                failure = _advance(run, loop, Hooks(run), order, surroundings)
             except NotKept as error:
                 # Rows that cannot be kept need not be computed.
                 failure = str(error)
@@ -124,12 +114,7 @@ def simulate(
         return ending
 
 
-def completed(
-    system: System,
-    experiment: Experiment,
-    observers: Sequence[Observer] = (),
-    exchange: Exchange = OURS,
-) -> None:
+def completed(plan: Plan, observers: Sequence[Observer] = (), exchange: Exchange = OURS) -> None:
     """Run a system of which nothing less than all rows will do.
 
     Raises:
@@ -137,33 +122,11 @@ def completed(
         KeyboardInterrupt: somebody wants it to stop.
 
     """
-    ending = simulate(system, experiment, observers, exchange=exchange)
+    ending = simulate(plan, observers, exchange=exchange)
     if ending.signals:
         raise KeyboardInterrupt
     if ending.failure is not None:
-        raise InputError(f"{system.name} {ending.failure}")
-
-
-def _whole_steps(system: System, experiment: Experiment, log: Log) -> Experiment:
-    """An experiment without its last, shorter step where an FMU takes none of another length.
-
-    Raises:
-        InputError: no step is left.
-
-    """
-    rigid = [name for name, component in system.components.items() if not component.takes_any_step]
-    pace = paces(system, experiment.step)
-    period = lcm(*(pace[name] for name in rigid))
-    whole = experiment.full_steps // period * period
-    if not rigid or whole == experiment.rows - 1:
-        return experiment
-    why = f"{', '.join(rigid)}: takes steps of one length alone, so"
-    if whole == 0:
-        shortest = period * experiment.step
-        raise InputError(f"{why} the run must last at least one step, {shortest:g} s")
-    end = experiment.time(whole)
-    log.remark(f"{why} the run ends with the last whole step, at t = {end:.12g} s")
-    return replace(experiment, stop_time=end)
+        raise InputError(f"{plan.system.name} {ending.failure}")
 
 
 def _possible_loop(loop: Loop, instances: Mapping[str, Instance], log: Log) -> Loop:
@@ -211,17 +174,17 @@ def _terminate(instances: Mapping[str, Instance]) -> None:
 def _advance(
     run: Run,
     loop: Loop,
-    attendance: Attendance,
+    hooks: Hooks,
     order: Sequence[str],
     surroundings: Surroundings,
 ) -> str | None:
     """Step to the end, or to the first failure, and say what it was."""
     blocks, failure = run.blocks, None
     try:
-        attendance.attend()
+        hooks.act()
         for _ in to_its_end(loop.steps, run):
             if run.made >= run.due:
-                attendance.attend()
+                hooks.act()
             if monotonic() > blocks.due:
                 blocks.hand_over()
             if run.interrupts.signals:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from ctypes import POINTER, Structure, c_double, c_int, c_size_t, c_void_p
 
 
-class Move(Structure):
-    """Values of one kind that are neighbours in the row, and FMI's function that moves them."""
+class CMove(Structure):
+    """Values of one type that are neighbours in the row, and FMI's function that moves them."""
 
     _fields_ = (
         ("call", c_void_p),
@@ -17,20 +17,20 @@ class Move(Structure):
     )
 
 
-class Member(Structure):
+class CMember(Structure):
     """A component: how it is stepped, and how its inputs and outputs are moved."""
 
     _fields_ = (
         ("component", c_void_p),
         ("do_step", c_void_p),
-        ("inputs", POINTER(Move)),
-        ("outputs", POINTER(Move)),
+        ("inputs", POINTER(CMove)),
+        ("outputs", POINTER(CMove)),
         ("n_inputs", c_size_t),
         ("n_outputs", c_size_t),
     )
 
 
-class Mapping(Structure):
+class CMapping(Structure):
     """Values that become others on their way through one connection."""
 
     _fields_ = (
@@ -41,7 +41,7 @@ class Mapping(Structure):
     )
 
 
-class Stage(Structure):
+class CStage(Structure):
     """Inputs to gather, and the components to step then."""
 
     _fields_ = (
@@ -49,8 +49,8 @@ class Stage(Structure):
         ("sources", c_void_p),
         ("factors", c_void_p),
         ("offsets", c_void_p),
-        ("mappings", POINTER(Mapping)),
-        ("members", POINTER(Member)),
+        ("mappings", POINTER(CMapping)),
+        ("members", POINTER(CMember)),
         ("n_connections", c_size_t),
         ("n_mappings", c_size_t),
         ("n_members", c_size_t),
@@ -59,11 +59,11 @@ class Stage(Structure):
     )
 
 
-class Run(Structure):
+class CRun(Structure):
     """What the steps of a run are made of."""
 
     _fields_ = (
-        ("stages", POINTER(Stage)),
+        ("stages", POINTER(CStage)),
         ("values", c_void_p),
         ("n_stages", c_size_t),
         ("n_shown", c_size_t),
@@ -75,13 +75,13 @@ class Run(Structure):
     )
 
 
-class Block(Structure):
+class CBlock(Structure):
     """Rows, each with the time in front: where they are, how many there may be, and are."""
 
     _fields_ = (("rows", c_void_p), ("most", c_size_t), ("n", c_size_t))
 
 
-class Failure(Structure):
+class CFailure(Structure):
     """The first call with a status that is worse than a warning."""
 
     _fields_ = (("stage", c_size_t), ("member", c_size_t), ("call", c_int), ("status", c_int))

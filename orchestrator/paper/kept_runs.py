@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from fmus.kinds import PYTHON
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.ledger import Ledger
@@ -19,18 +20,16 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.identity import code_of, digest_of
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.master.observers.table import Table
-from orchestrator.master.simulation import simulate
-from orchestrator.paper.variations import Run
-from orchestrator.runs.bundle import PYTHON
 from orchestrator.runs.folder import opened
-from orchestrator.runs.preparation import Prepared
+from orchestrator.runs.preparation import Prepared, prepared_of
+from orchestrator.runs.request import Request
 from orchestrator.runs.run import metrics_json
 from orchestrator.system.names import port_name
 from orchestrator.vehicle.metrics import Metrics
 
 
 @dataclass(frozen=True)
-class Outcome:
+class KeptRun:
     """What is kept of a run.
 
     Attributes:
@@ -48,7 +47,7 @@ class Outcome:
         return self.metrics.get("failure")
 
 
-class Outcomes:
+class KeptRuns:
     """Outcomes of runs; equal ones, of whatever name, are made once."""
 
     def __init__(
@@ -69,15 +68,15 @@ class Outcomes:
         """
         self._folder, self._stop_time, self._kind = folder, stop_time, kind
         self._force = force
-        self._keys: dict[Run, str] = {}
+        self._keys: dict[Request, str] = {}
         self._labels: dict[str, str] = {}
-        self._outcomes: dict[str, Outcome] = {}
+        self._kept_runs: dict[str, KeptRun] = {}
 
-    def __getitem__(self, run: Run) -> Outcome:
+    def __getitem__(self, run: Request) -> KeptRun:
         """The outcome of a run that was made."""
-        return self._outcomes[self._keys[run]]
+        return self._kept_runs[self._keys[run]]
 
-    def label(self, run: Run) -> str:
+    def label(self, run: Request) -> str:
         """The shortest of the labels that equal runs have."""
         return self._labels[self._keys[run]]
 
@@ -86,7 +85,7 @@ class Outcomes:
         """Of all runs."""
         return list(self._labels.values())
 
-    def make(self, runs: Iterable[Run], workers: Workers) -> None:
+    def make(self, runs: Iterable[Request], workers: Workers) -> None:
         """Make what is not kept in the folder, the longest first.
 
         Raises:
@@ -97,31 +96,31 @@ class Outcomes:
         with opened(self._folder, self._force) as ledger:
             self._make(runs, workers, ledger)
 
-    def _make(self, runs: Iterable[Run], workers: Workers, ledger: Ledger) -> None:
-        missing: dict[str, tuple[int, Run]] = {}
+    def _make(self, runs: Iterable[Request], workers: Workers, ledger: Ledger) -> None:
+        missing: dict[str, tuple[int, Request]] = {}
         for run in runs:
             wanted = replace(run, stop_time=self._stop_time or run.stop_time, kind=self._kind)
             try:
-                prepared = wanted.prepared()
+                prepared = prepared_of(wanted)
             except InputError as error:
-                self._keys[run] = self._labels[run.label] = key = run.label
-                self._outcomes[key] = Outcome({"failure": str(error)}, Table())
+                self._keys[run] = self._labels[run.command_line] = key = run.command_line
+                self._kept_runs[key] = KeptRun({"failure": str(error)}, Table())
                 continue
             self._keys[run] = key = key_of(prepared)
-            label = wanted.label
+            label = wanted.command_line
             self._labels[key] = min(label, self._labels.get(key, label), key=len)
             ledger.check([_file(key)])
             if ledger.owns(_file(key)):
-                self._outcomes[key] = _read(self._folder / _file(key))
+                self._kept_runs[key] = _read(self._folder / _file(key))
             else:
                 missing.setdefault(key, (prepared.experiment.rows, wanted))
         longest_first = sorted(missing.items(), key=lambda item: -item[1][0])
         tasks = {key: partial(_make, run, key) for key, (_, run) in longest_first}
-        for key, outcome in workers.results(tasks, "run"):
-            self._outcomes[key] = outcome
-            if outcome.failure is None:
+        for key, kept_run in workers.results(tasks, "run"):
+            self._kept_runs[key] = kept_run
+            if kept_run.failure is None:
                 with ledger.changing() as unfinished:
-                    _write(unfinished / _file(key), outcome)
+                    _write(unfinished / _file(key), kept_run)
 
     def forget_others(self) -> None:
         """Remove from the folder what belongs to no run of this report."""
@@ -142,40 +141,34 @@ def key_of(prepared: Prepared) -> str:
     return digest_of(prepared.identity, kept)[:32]
 
 
-def _make(run: Run, key: str) -> Outcome:
+def _make(run: Request, key: str) -> KeptRun:
     """Make a run; a task for a worker."""
     try:
-        prepared = run.prepared()
+        prepared = prepared_of(run)
         if key_of(prepared) != key:
             raise InputError("FMUs have changed while the report was made; make it anew")
         metrics, seen = Metrics(), VisibleRows()
-        simulate(
-            prepared.system,
-            prepared.experiment,
-            [metrics, seen],
-            loop=prepared.loop,
-            attendants=prepared.attendants(),
-        )
+        prepared.run([metrics, seen])
     except InputError as error:
-        return Outcome({"failure": str(error)}, Table())
-    return Outcome(metrics_json(metrics, prepared), Table.of(seen.header, seen.rows, seen.ending))
+        return KeptRun({"failure": str(error)}, Table())
+    return KeptRun(metrics_json(metrics, prepared), Table.of(seen.header, seen.rows, seen.ending))
 
 
-def _write(file: Path, outcome: Outcome) -> None:
-    header = outcome.table.header
+def _write(file: Path, kept_run: KeptRun) -> None:
+    header = kept_run.table.header
     text = {
-        "metrics": outcome.metrics,
+        "metrics": kept_run.metrics,
         "columns": header.columns,
         "experiment": asdict(header.experiment),
         "parameters": {str(name): value for name, value in header.parameters.items()},
-        "messages": outcome.table.ending.messages,
-        "events": outcome.table.ending.events,
+        "messages": kept_run.table.ending.messages,
+        "events": kept_run.table.ending.events,
     }
     # A column together: one that is constant then takes no room.
-    np.savez_compressed(file, text=json.dumps(text), columns=outcome.table.rows.T)
+    np.savez_compressed(file, text=json.dumps(text), columns=kept_run.table.rows.T)
 
 
-def _read(file: Path) -> Outcome:
+def _read(file: Path) -> KeptRun:
     with np.load(file) as content:
         text, rows = json.loads(str(content["text"])), content["columns"].T
     header = Header(
@@ -185,4 +178,4 @@ def _read(file: Path) -> Outcome:
     )
     events = tuple(Occurrence(*event) for event in text["events"])
     ending = Ending(messages=tuple(text["messages"]), events=events)
-    return Outcome(text["metrics"], Table.of(header, rows, ending))
+    return KeptRun(text["metrics"], Table.of(header, rows, ending))

@@ -1,22 +1,27 @@
-"""A section of the report for each scenario: its figure, its indices, and what in it is ours."""
+"""Sections of the report: a scenario with its figure and indices, a study with its figures."""
 
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
+from fmus.kinds import PYTHON
 from orchestrator.figures import FIGURES, Drawn, draw
 from orchestrator.machine.errors import InputError, did_you_mean
-from orchestrator.paper.formatting import actuator_values, numbers, picture, plain, table
-from orchestrator.paper.kept_runs import Outcome, Outcomes
-from orchestrator.paper.variations import Run
-from orchestrator.runs.bundle import PYTHON
+from orchestrator.paper.kept_runs import KeptRun, KeptRuns
+from orchestrator.paper.page import actuator_values, numbers, picture, plain, table
+from orchestrator.runs.folder import inner
+from orchestrator.runs.preparation import Prepared, prepared_of, with_companion
+from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario, read_scenario
-from orchestrator.system.names import port_name
+from orchestrator.studies.study import Study, read_study, ready_studies
+from orchestrator.studies.sweep import Means, swept
+from orchestrator.system.names import file_name, port_name
 
 #: The parameter that decides whether a run has a twin without noise.
 _NOISE = "plant.noise.std"
@@ -45,7 +50,7 @@ class Section:
 
     name: str
     scenario: Scenario
-    runs: Mapping[str, Run]
+    runs: Mapping[str, Request]
 
     @property
     def title(self) -> str:
@@ -81,26 +86,67 @@ def _numbered(name: str) -> Iterator[str]:
         n += 1
 
 
-def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Run]:
+def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Request]:
     """The run of a scenario and what it is drawn with: its companion, or its twin without noise."""
-    run = Run(reference, kind=kind)
+    request = Request(reference, kind=kind)
     try:
-        system = run.prepared().system
+        system = prepared_of(request).system
     except InputError:
-        # Whoever makes the run says why it cannot be made.
-        return {scenario.legend: run}
+        # The report says why it cannot be made.
+        return {scenario.legend: request}
     if scenario.compare:
-        [companion] = run.companions()
+        [companion] = companions(request)
         label = read_scenario(scenario.compare).legend
-        return {scenario.legend: run, label + " (2)" * (label == scenario.legend): companion}
+        return {scenario.legend: request, label + " (2)" * (label == scenario.legend): companion}
     noise = port_name(_NOISE)
     if scenario.figure == "tracking" and system.has(noise) and system.value(noise):
-        quiet = replace(run, parameters={_NOISE: 0.0})
-        return {"with noise": run, "without noise": quiet}
-    return {scenario.legend: run}
+        quiet = replace(request, parameters={_NOISE: 0.0})
+        return {"with noise": request, "without noise": quiet}
+    return {scenario.legend: request}
 
 
-def draw_section(section: Section, outcomes: Sequence[Outcome], folder: Path) -> list[str]:
+def companions(request: Request) -> list[Request]:
+    """Runs that are drawn together with one: of its companion, with the least changes to it.
+
+    Raises:
+        InputError: the scenario or the changes are not usable.
+
+    """
+    found = with_companion(prepared_of(request), request)
+    return [_as_request(request, found[0], one) for one in found[1:]]
+
+
+def _as_request(request: Request, compared: Prepared, prepared: Prepared) -> Request:
+    """What was prepared as the companion of a run, as what changes its own scenario."""
+    standard = Request(compared.scenario.compare, kind=request.kind)
+    own = prepared_of(standard)
+    experiment, table = prepared.experiment, prepared.input_table
+    played = table.targets if table else ()
+    inputs = prepared.scenario.inputs
+    changed = {
+        name: getattr(experiment, name)
+        for name in ("stop_time", "step", "order", "coupling")
+        if getattr(experiment, name) != getattr(own.experiment, name)
+    }
+    return replace(
+        standard,
+        **changed,
+        parameters={
+            str(name): value
+            for name, value in prepared.system.parameters.items()
+            if own.system.value(name) != value and name not in played
+        },
+        events=None if prepared.events == own.events else request.events or request.scenario,
+        inputs=str(inputs.file) if inputs and inputs != own.scenario.inputs else None,
+        steps={
+            name: step
+            for name, step in prepared.system.steps.items()
+            if own.system.steps.get(name) != step
+        },
+    )
+
+
+def draw_section(section: Section, kept_runs: Sequence[KeptRun], folder: Path) -> list[str]:
     """Draw the figures of a section and give notes on what is left out; a task for a worker.
 
     Args:
@@ -113,9 +159,9 @@ def draw_section(section: Section, outcomes: Sequence[Outcome], folder: Path) ->
     if kind not in FIGURES:
         return [f"no figure: there is none of the name {kind!r}{did_you_mean(kind, FIGURES)}"]
     runs = [
-        Drawn(label, outcome.table, section.scenario.z_up)
-        for label, outcome in zip(section.runs, outcomes, strict=True)
-        if len(outcome.table)
+        Drawn(label, kept_run.table, section.scenario.z_up)
+        for label, kept_run in zip(section.runs, kept_runs, strict=True)
+        if len(kept_run.table)
     ]
     if not runs:
         return []
@@ -125,7 +171,7 @@ def draw_section(section: Section, outcomes: Sequence[Outcome], folder: Path) ->
 
 
 def written(
-    section: Section, outcomes: Outcomes, notes: Sequence[str], folder: Path
+    section: Section, kept_runs: KeptRuns, notes: Sequence[str], folder: Path
 ) -> Iterator[str]:
     """A section in Markdown.
 
@@ -136,7 +182,7 @@ def written(
         folder: of the report, in which its figures are.
 
     """
-    scenario, own = section.scenario, outcomes[next(iter(section.runs.values()))]
+    scenario, own = section.scenario, kept_runs[next(iter(section.runs.values()))]
     yield f"### {section.title}"
     # By their stems: `fig4` comes before `fig4-velocity`.
     files = Path(folder, "figures", section.name).glob("*.png")
@@ -145,19 +191,19 @@ def written(
     yield from (f"Note: {plain(note)}." for note in notes)
     if scenario.remark:
         yield scenario.remark
-    made = {label: outcomes[run] for label, run in section.runs.items()}
-    for label, outcome in made.items():
-        if outcome.failure is not None:
-            yield f"**The run {plain(label)} ended early:** {plain(outcome.failure)}"
-    if rows := list(_indices([outcome.metrics for outcome in made.values()])):
+    made = {label: kept_runs[run] for label, run in section.runs.items()}
+    for label, kept_run in made.items():
+        if kept_run.failure is not None:
+            yield f"**The run {plain(label)} ended early:** {plain(kept_run.failure)}"
+    if rows := list(_indices([kept_run.metrics for kept_run in made.values()])):
         yield table(["index", *map(plain, made)], rows)
     reaching = own.metrics.get("velocities_reaching_controller")
     if reaching is not None:
         names = ", ".join(f"`{name}`" for name in reaching) or "none"
         yield f"Velocities of the vehicle that reach the controller: {names}."
     yield "\n".join(
-        f"- {plain(label)}: `auv-fmu run {outcomes.label(run)}`"
-        + (f", until {time:g} s" if (time := outcomes[run].metrics.get("stop_time")) else "")
+        f"- {plain(label)}: `auv-fmu run {kept_runs.label(run)}`"
+        + (f", until {time:g} s" if (time := kept_runs[run].metrics.get("stop_time")) else "")
         for label, run in section.runs.items()
     )
     if scenario.ours:
@@ -179,3 +225,59 @@ def _ours(scenario: Scenario) -> Iterator[str]:
         is_short = value is not None and not isinstance(value, Mapping)
         stated = f"{name} = {json.dumps(value, default=str)}" if is_short else name
         yield f"- `{stated}`: {plain(why)}"
+
+
+_WITHOUT = (
+    f"Not in this report: {', '.join(ready_studies())}, each 10,000 runs or more. "
+    "`auv-fmu report --studies` makes them, or what is missing of them."
+)
+
+
+def make_studies(
+    names: Sequence[str], folder: Path, kind: str, command: Sequence[str], force: bool = False
+) -> list[Study]:
+    """Make what is missing of some studies.
+
+    Args:
+        names: of ready studies, or paths of files.
+        folder: in which each has a folder, from one report to the next.
+        kind: of the bundle's FMUs.
+        command: for the record.
+        force: move aside files of the user's that are in the way.
+
+    Raises:
+        InputError: something about a study is not usable, or cannot be written.
+        KeyboardInterrupt: somebody wants it to stop; what is done is kept.
+
+    """
+    studies = [read_study(name) for name in names]
+    for study in studies:
+        place = inner(folder, study.stem)
+        swept(study, Means(kind=kind, force=force), place, command, progress=True)
+    return studies
+
+
+def study_sections(studies: Sequence[Study], kept: Path, folder: Path) -> Iterator[str]:
+    """A section for each study, in Markdown.
+
+    Args:
+        studies: that were made.
+        kept: the folder that has their folders.
+        folder: of the report, into which their figures go.
+
+    """
+    if not studies:
+        yield _WITHOUT
+    for study in studies:
+        title = plain(study.title or study.name)
+        yield f"### {title}"
+        figures = Path("figures", "studies", study.stem)
+        (folder / figures).mkdir(parents=True)
+        for figure in study.figures:
+            file = kept / study.stem / f"{file_name(figure)}.png"
+            if file.is_file():
+                shutil.copy(file, folder / figures)
+                yield picture(f"{title}: {figure}", (figures / file.name).as_posix())
+        if study.remark:
+            yield study.remark.strip()
+        yield f"- `auv-fmu sweep {study.name}`"

@@ -6,8 +6,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from orchestrator.machine.errors import did_you_mean, shortened
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings, did_you_mean, shortened
 
 
 class Entry(NamedTuple):

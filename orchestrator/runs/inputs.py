@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.machine.errors import InputError
-from orchestrator.master.hooks.playback import Course
+from orchestrator.master.hooks.playback import InputTable
 from orchestrator.master.observers.files import read_columns, read_rows
 from orchestrator.runs.entries import Entry, is_text
 from orchestrator.system.names import PortName, port_name
@@ -55,14 +55,9 @@ class Inputs:
     between: str = _WAYS[0]
 
 
-def inputs_of(file: str | Path | None) -> Inputs | None:
-    """Inputs from a file, if one is named."""
-    return None if file is None else Inputs(Path(file))
-
-
 def read_inputs(
     inputs: Inputs, system: System, given: Collection[PortName]
-) -> tuple[System, Course]:
+) -> tuple[System, InputTable]:
     """A system that begins with the first values of a table, and what follows.
 
     Args:
@@ -86,10 +81,10 @@ def read_inputs(
                 raise InputError(f"{target} is given a value of its own beside the table")
             _check_column(system, target, column)
         linear = [_is_linear(system, target, inputs.between) for target in targets]
-        course = Course(targets, rows[:, 0], rows[:, 1:], np.array(linear))
+        input_table = InputTable(targets, rows[:, 0], rows[:, 1:], np.array(linear))
         start = system.start_time or 0.0
-        values = map(_number, course.at(start, int((course.times <= start).sum()) - 1))
-        return system.with_parameters(dict(zip(targets, values, strict=True))), course
+        values = map(_number, input_table.at(start, int((input_table.times <= start).sum()) - 1))
+        return system.with_parameters(dict(zip(targets, values, strict=True))), input_table
     except InputError as error:
         raise InputError(f"{file}: {error}") from error
 

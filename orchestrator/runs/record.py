@@ -13,12 +13,12 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from fmus.kinds import NATIVE, PYTHON
 from orchestrator.machine.archives import runs_python
 from orchestrator.machine.ledger import RECORD
 from orchestrator.master import identity
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
-from orchestrator.runs.bundle import NATIVE, PYTHON
 from orchestrator.runs.preparation import Prepared
 from orchestrator.system.names import port_name
 
@@ -29,7 +29,7 @@ METRICS = "metrics.json"
 PACKAGES = (*identity.PACKAGES, "matplotlib")
 
 
-class Clock:
+class Stopwatch:
     """When something has begun, and how long it has taken, even if somebody sets the time."""
 
     def __init__(self) -> None:
@@ -56,7 +56,7 @@ def write_record(
     header: Header,
     ending: Ending,
     command: Sequence[str],
-    clock: Clock,
+    clock: Stopwatch,
     remarks: Mapping[str, object] | None = None,
 ) -> None:
     """Write the record of a run into the folder of its files.
@@ -84,7 +84,7 @@ def write_record(
         "messages": list(ending.messages),
         "experiment": {**vars(header.experiment), "steps": dict(prepared.system.steps)},
         "loop": header.loop,
-        "texts": sorted(header.texts),
+        "texts": sorted(header.strings),
         **(remarks or {}),
         "events": [occurrence._asdict() for occurrence in ending.events],
         "fmus": {

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
 from shutil import rmtree
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -18,26 +18,31 @@ from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.machine.ledger import LEDGER, RECORD, Ledger
 from orchestrator.machine.locks import process_folder
-from orchestrator.master.fmi.transfer import KINDS
+from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.clock import RealTime
-from orchestrator.master.hooks.hook import Attendant
+from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Ending, Observer
 from orchestrator.master.observers.progress import Progress
 from orchestrator.master.observers.selection import Selection, check_interval, matches, matching
-from orchestrator.master.simulation import simulate
 from orchestrator.runs.folder import INCOMPLETE, inner, place_of, publish, replaced
 from orchestrator.runs.preparation import Prepared
-from orchestrator.runs.record import METRICS, Clock, write_metrics, write_record
+from orchestrator.runs.record import METRICS, Stopwatch, write_metrics, write_record
+from orchestrator.runs.request import CliOption, Force
 from orchestrator.runs.resume import FOLDER, checkpoints_of, leave
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import file_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.cautions import WATCHED, cautions, cautions_after, cautions_beside
+from orchestrator.vehicle.cautions import (
+    WATCHED,
+    cautions,
+    cautions_after,
+    cautions_beside,
+    velocities_reaching,
+)
 from orchestrator.vehicle.certificates import CertificatesFile
 from orchestrator.vehicle.metrics import Metrics
-from orchestrator.vehicle.sensors import velocities_reaching
 from orchestrator.vehicle.signals import CONTROLLER
 
 #: The table of the certificates.
@@ -56,26 +61,37 @@ _FAILED = 1
 
 @dataclass(frozen=True)
 class Files:
-    """What is kept of a run.
+    """What is kept of a run."""
 
-    Attributes:
-        interval: of the rows in the table [s]; None: every step.
-        columns: of the table: `all`, `outputs`, or patterns with commas between them.
-        format: of the table, a key of :data:`orchestrator.master.observers.files.FORMATS`.
-        figures: whether to draw them.
-        checkpoint_every: a checkpoint for so many simulated seconds [s]; None: none.
-        resume: go on from the one that an earlier process has left.
-        force: move aside files of the user's that have names of these.
-
-    """
-
-    interval: float | None = None
-    columns: str = "all"
-    format: str = "csv"
-    figures: bool = True
-    checkpoint_every: float | None = None
-    resume: bool = False
-    force: bool = False
+    interval: Annotated[
+        float | None,
+        CliOption(
+            "rows kept in the table, one for each interval [s]; default: one a step",
+            type=float,
+            metavar="S",
+        ),
+    ] = None
+    columns: Annotated[
+        str,
+        CliOption(
+            "columns kept in the table, for example plant.y.*,controller.tau; default: all",
+            metavar="outputs|all|PATTERN,...",
+        ),
+    ] = "all"
+    format: Annotated[str, CliOption("of the table; default: csv", choices=tuple(FORMATS))] = "csv"
+    no_figures: Annotated[bool, CliOption("draw none; default: draw", action="store_true")] = False
+    checkpoint_every: Annotated[
+        float | None,
+        CliOption(
+            "keep what it takes to go on, every so many simulated seconds, in DIR/checkpoint",
+            type=float,
+            metavar="S",
+        ),
+    ] = None
+    resume: Annotated[
+        bool, CliOption("go on from the last checkpoint in DIR/checkpoint", action="store_true")
+    ] = False
+    force: Force = False
 
 
 @dataclass(frozen=True)
@@ -153,7 +169,7 @@ def run_into(
     # The library of numpy's algebra ends the process if there is no memory for it: not later, when
     # there are rows to lose.
     np.linalg.inv(np.eye(1))
-    clock = Clock()
+    clock = Stopwatch()
     done: list[_Done] = []
     figures = figure_files(runs[0].scenario.figure, runs[0].scenario.stem)
     folders = _folders(runs, figures)
@@ -186,14 +202,7 @@ def run_into(
                     _give_up(run, done, unfinished, folder, command, clock, say)
 
                 with interrupts.insistence(give_up):
-                    ending = simulate(
-                        prepared.system,
-                        prepared.experiment,
-                        run.observers,
-                        prepared.isolation,
-                        prepared.loop,
-                        run.attendants,
-                    )
+                    ending = prepared.run(run.observers, run.hooks)
                 done.append(run.ended(ending))
                 missed = [] if ending.failure else prepared.missed(ending)
                 said = [f"did not happen: {event}" for event in missed]
@@ -203,7 +212,7 @@ def run_into(
                 if interrupts:
                     break
             ended_at_once = done[0].ending.failure is not None and len(done[0].seen.rows) == 1
-            if files.figures and not interrupts.urgent and not ended_at_once:
+            if not files.no_figures and not interrupts.urgent and not ended_at_once:
                 for note in _draw(runs[0].scenario, done, unfinished, interrupts):
                     say(note)
         except (OSError, MemoryError) as error:
@@ -243,7 +252,7 @@ class _Running:
         self._folder, self._prepared = folder, prepared
         self._metrics = Metrics()
         # Without figures the cautions alone look at what was seen.
-        self._seen = VisibleRows() if files.figures else VisibleRows(WATCHED)
+        self._seen = VisibleRows(WATCHED) if files.no_figures else VisibleRows()
         self._table = FORMATS[files.format](folder / f"result.{files.format}")
         self.observers: list[Observer] = [
             Selection(self._table, files.interval, columns),
@@ -252,16 +261,15 @@ class _Running:
             self._seen,
             Progress(prepared.scenario.name),
         ]
-        self.attendants: list[Attendant] = []
+        self.hooks: list[Hook] = []
         self._resumed_at = None
         if checkpoints is not None:
             self.observers.append(checkpoints)
-            self.attendants.append(checkpoints)
+            self.hooks.append(checkpoints)
             self._resumed_at = checkpoints.time
         self._real_time = None if prepared.real_time is None else RealTime(prepared.real_time)
         if self._real_time is not None:
-            self.attendants.append(self._real_time)
-        self.attendants += prepared.attendants()
+            self.hooks.append(self._real_time)
 
     def ended(self, ending: Ending) -> _Done:
         """When its observers have been told the end."""
@@ -293,7 +301,7 @@ def _give_up(
     unfinished: Path,
     folder: Path,
     command: Sequence[str],
-    clock: Clock,
+    clock: Stopwatch,
     say: Callable[[str], None],
 ) -> None:
     """Keep what is there and end the process; the thread that steps the FMUs never will."""
@@ -309,7 +317,7 @@ def _give_up(
         os._exit(_FAILED)
 
 
-def _write_ends(done: Sequence[_Done], command: Sequence[str], clock: Clock) -> None:
+def _write_ends(done: Sequence[_Done], command: Sequence[str], clock: Stopwatch) -> None:
     """Write what is written last; the record of the first names the files of all."""
     for run in reversed(done):
         write_metrics(run.folder, run.metrics)
@@ -371,7 +379,7 @@ def selected_columns(system: System, wanted: str, is_companion: bool = False) ->
         for component in system.components.values()
         for causality in (("output",) if outputs else ("input", "output"))
         for variable in component.having(causality)
-        if variable.type in KINDS
+        if variable.type in FMI_TYPES
     ]
     if outputs:
         return names

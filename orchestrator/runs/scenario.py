@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from orchestrator.machine.errors import InputError
-from orchestrator.machine.findings import Findings
-from orchestrator.machine.reading import explained, text_of
+from orchestrator.machine.errors import Findings, InputError
+from orchestrator.machine.user_files import explained, text_of
 from orchestrator.master.experiment import COUPLINGS, Order
 from orchestrator.runs.entries import (
     Entry,

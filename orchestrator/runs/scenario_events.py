@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from orchestrator.machine.errors import InputError
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings, InputError
 from orchestrator.master.hooks.events import (
     COMPARISONS,
     Action,
@@ -34,7 +33,7 @@ from orchestrator.runs.entries import (
 )
 from orchestrator.system.names import PortName, port_name, splits
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.transformation import Linear, Mapped
+from orchestrator.system.units import Linear, Mapped
 from orchestrator.system.values import INTEGERS, finite, literal, type_of, typed
 
 #: What is between the names of a group and of its members.

@@ -12,7 +12,7 @@ from auv_fmu import path_planner
 from auv_fmu.actuators import Limits
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.vehicle import Vehicle
-from orchestrator.machine.reading import explained, lines_of
+from orchestrator.machine.user_files import explained, lines_of
 from orchestrator.runs.entries import Entry, is_text
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System

@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from orchestrator.machine.errors import InputError, did_you_mean
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.component import RUNNABLE, Component, read_component
 from orchestrator.system.names import PortName, port_name

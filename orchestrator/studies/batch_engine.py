@@ -16,18 +16,19 @@ from auv_fmu.closed_loop import LAWS, Moment, Setting, splits
 from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS
 from auv_fmu.output_feedback import Gains
 from fmus.auv_plant.behaviour import check
+from fmus.kinds import PYTHON
 from fmus.ports.port import Refusal
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import digest_of
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
-from orchestrator.runs.bundle import PYTHON, current_fmus
+from orchestrator.runs.bundle import current_fmus
 from orchestrator.studies.batch import accumulator
 from orchestrator.studies.batch.kernel import COLUMNS, RunSteps, is_bounded, part_of
 from orchestrator.studies.batch.kernels import compiled, digest
 from orchestrator.studies.batch.support import setting_of, unsupported
-from orchestrator.studies.engine import Outcome, Run
+from orchestrator.studies.engine import Outcome, Point
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 from orchestrator.vehicle.metrics import LAST_SECONDS
@@ -69,13 +70,13 @@ class BatchEngine:
         """Of the equations, and of what compiles them."""
         return digest_of({"equations": digest(), "numba": version("numba")})
 
-    def outcomes(self, runs: Iterable[Run]) -> Iterator[Outcome]:
+    def outcomes(self, runs: Iterable[Point]) -> Iterator[Outcome]:
         """Make some runs, in their order."""
         for run in runs:
             [outcome] = self.outcomes_at(run, [run.stop_time])
             yield outcome
 
-    def outcomes_at(self, run: Run, stop_times: Sequence[float]) -> list[Outcome]:
+    def outcomes_at(self, run: Point, stop_times: Sequence[float]) -> list[Outcome]:
         """What would have come out of a run with other stop times, all from one run.
 
         Args:
@@ -97,7 +98,7 @@ class BatchEngine:
             for end, found in zip(ends, accumulators, strict=True)
         ]
 
-    def setting(self, run: Run) -> Setting:
+    def setting(self, run: Point) -> Setting:
         """The setting of the straight line that makes the same numbers as a run.
 
         Raises:
@@ -106,7 +107,7 @@ class BatchEngine:
         """
         return _job(self._systems[run.scenario], run).setting
 
-    def table(self, run: Run) -> Table:
+    def table(self, run: Point) -> Table:
         """A run with its rows, those of the columns :data:`.kernel.COLUMNS` that it has.
 
         Raises:
@@ -139,7 +140,7 @@ class _Job(NamedTuple):
         return isinstance(self.setting.controller, Gains)
 
 
-def _job(system: System, run: Run) -> _Job:
+def _job(system: System, run: Point) -> _Job:
     """A run, ready to be made.
 
     Raises:

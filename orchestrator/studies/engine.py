@@ -54,7 +54,7 @@ INDICES: tuple[str, ...] = (
 )
 
 
-class Run(NamedTuple):
+class Point(NamedTuple):
     """One run of a study.
 
     Attributes:
@@ -106,7 +106,7 @@ class Engine(Protocol):
         """A text in hexadecimal digits."""
         ...
 
-    def outcomes(self, runs: Sequence[Run]) -> Iterator[Outcome]:
+    def outcomes(self, runs: Sequence[Point]) -> Iterator[Outcome]:
         """Make some runs, in their order.
 
         Args:

@@ -12,9 +12,9 @@ from orchestrator.machine.errors import InputError
 from orchestrator.machine.locks import process_folder
 from orchestrator.master.identity import code_of
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, chosen
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import planned
 from orchestrator.runs.preparation import Prepared
-from orchestrator.studies.engine import Outcome, Run
+from orchestrator.studies.engine import Outcome, Point
 from orchestrator.studies.indices import Indices
 from orchestrator.system.names import port_name
 
@@ -39,7 +39,7 @@ class FmuEngine:
         """Of the code that says what comes out of rows."""
         return code_of("orchestrator.vehicle", "orchestrator.studies")
 
-    def outcomes(self, runs: Sequence[Run]) -> Iterator[Outcome]:
+    def outcomes(self, runs: Sequence[Point]) -> Iterator[Outcome]:
         """Make some runs, in their order.
 
         Raises:
@@ -52,7 +52,7 @@ class FmuEngine:
             except InputError as error:
                 yield Outcome(run.number, {}, str(error))
 
-    def _outcome(self, run: Run) -> Outcome:
+    def _outcome(self, run: Point) -> Outcome:
         prepared = self._prepared[run.scenario]
         system = prepared.system.with_parameters(
             {port_name(name): value for name, value in run.parameters.items()}
@@ -61,13 +61,8 @@ class FmuEngine:
             prepared.experiment, stop_time=run.stop_time, step=run.step, order=run.order
         )
         indices = Indices()
-        ending = simulate(
-            system,
-            experiment,
-            [indices],
-            loop=chosen(self._loop, experiment),
-            attendants=prepared.attendants(),
-        )
+        plan, loop = planned(system, experiment), chosen(self._loop, experiment)
+        ending = replace(prepared, plan=plan, loop=loop).run([indices])
         if ending.signals:
             raise KeyboardInterrupt
         if ending.failure is not None:
@@ -98,7 +93,7 @@ class FmuEngine:
                 for part in prepared.system.components.values()
             }
             system = replace(prepared.system, components=components)
-            self._prepared[name] = replace(prepared, system=system)
+            self._prepared[name] = replace(prepared, plan=replace(prepared.plan, system=system))
 
 
 def _place(digest: str, content: bytes) -> Path:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from orchestrator.machine.errors import InputError, did_you_mean, shortened
-from orchestrator.machine.reading import explained, text_of
+from orchestrator.machine.user_files import explained, text_of
 from orchestrator.master.experiment import ORDERS
 from orchestrator.runs.entries import (
     Entry,

@@ -1,4 +1,4 @@
-"""What gives numbers that may not be meant: known before a run, or seen in it."""
+"""What may give numbers that are not meant: known before a run, or seen in it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from auv_fmu.proof.gain_conditions import bounds
 from auv_fmu.proof.sampling import observer_rate, robust_rate
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.table import Table
+from orchestrator.system.graph import reaching
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
+from orchestrator.system.values import unit_of
 from orchestrator.vehicle.signals import (
     ATTITUDE,
     CONTROLLER,
@@ -155,3 +157,24 @@ def cautions_beside(table: Table, name: str, other: Table) -> list[str]:
         f"its reference planner.y_d is up to {apart:.3g} m away from that of {name}: the two runs "
         "follow different paths"
     ]
+
+
+#: Units of a velocity at a port.
+_VELOCITY_UNITS = {"m/s", "rad/s"}
+
+
+def velocities_reaching(system: System, component: str = CONTROLLER) -> list[str]:
+    """Velocities of the vehicle that reach a component, directly or through others.
+
+    The vehicle is what the component feeds. Empty for a controller without velocity sensors.
+    """
+    vehicles = {c.target.component for c in system.connections if c.source.component == component}
+    sources = (connection.source for connection in reaching(system, component, until=vehicles))
+    return sorted(
+        {
+            str(source)
+            for source in sources
+            if source.component in vehicles
+            and unit_of(system.component(source.component).variable(source.port)) in _VELOCITY_UNITS
+        }
+    )

@@ -26,9 +26,9 @@ from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.structure import System
 from support.fmi3 import Fmi3Library, Logger, trials
-from support.instances import NAMES
 from support.kinds import outcome
 from support.raw import Host, Status, instance
+from support.settings import NAMES
 from support.status_table import creations, fmi3_rows, names_in_fmi3, rows
 from support.trials import CREATIONS, SKIPPED
 from support.worker import Lost, Worker

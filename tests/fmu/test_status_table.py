@@ -11,8 +11,8 @@ import pytest
 
 from orchestrator.runs import bundle
 from support.calls import CASES, MODEL_EXCHANGE_FUNCTIONS
-from support.instances import NAMES
 from support.kinds import FIXTURES
+from support.settings import NAMES
 from support.status_table import (
     CREATION,
     ERROR,

@@ -19,10 +19,10 @@ from fuzz.reachable import faults, without_checksum
 from fuzz.sequences import Finding, Fuzzer, unpacked
 from support import states
 from support.calls import CASES, Call, Draw, Item
-from support.instances import NAMES
 from support.native_states import Unwritable
 from support.raw import Description, Library, Variable, instance
 from support.sanitizers import GCC, compiled, sanitize, sanitizers
+from support.settings import NAMES
 from support.worker import Lost, Worker
 
 #: Seeds of CI: those of the night come after them.

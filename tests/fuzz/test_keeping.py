@@ -39,7 +39,7 @@ from orchestrator.paper import report
 from orchestrator.paper.sections import Section
 from orchestrator.runs import bundle, own_controller, run
 from orchestrator.runs.bundle import MANIFEST, current_fmus
-from orchestrator.studies.engine import Engine, Outcome, Run
+from orchestrator.studies.engine import Engine, Outcome, Point
 from orchestrator.studies.store import Store
 from support.machine import contents, ended, forked
 
@@ -160,7 +160,7 @@ def quick(here: Path) -> Iterator[None]:
     """Without what takes seconds and writes elsewhere: compilers, processes, most of a report."""
 
     def copied(module: str, folder: Path, *options: str) -> list[Path]:
-        source = current_fmus() if module == "packaging.build" else here / "own"
+        source = current_fmus() if module == "build" else here / "own"
         found = [*source.glob("*.fmu"), *source.glob(MANIFEST)]
         return [Path(shutil.copy(path, folder)) for path in found]
 
@@ -184,7 +184,7 @@ def quick(here: Path) -> Iterator[None]:
         return drawn(section.scenario.figure, "", made, folder, section.name)
 
     @contextmanager
-    def making(engine: Engine, runs: Iterable[Run], **_: object) -> Iterator[list[list[Outcome]]]:
+    def making(engine: Engine, runs: Iterable[Point], **_: object) -> Iterator[list[list[Outcome]]]:
         yield [list(engine.outcomes([run])) for run in runs]
 
     with ExitStack() as stack:

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from random import Random
 from typing import NamedTuple
 
 from support import states
-from support.calls import CASES, NO_START, OVERFLOWING, Call, Draw, Saved, Setting, make
+from support.calls import CASES, Call, Draw, Saved, make
 from support.raw import Host, Library, Status, Variable, instance
+from support.settings import Setting, Trials, trials_of
 from support.status_table import ERROR, Cell, Row, rows
 
 #: Step of the trials [s], and how many come before the state stepping is tried.
 H, STEPS = 0.02, 3
 
-#: The rows that need values of their own, by the names of the FMUs that have such values.
-_SETTINGS: Mapping[tuple[str, str], Mapping[str, Setting]] = {
-    ("fmi2DoStep", "values that the equations overflow with"): OVERFLOWING,
-    ("fmi2ExitInitializationMode", "values that give no start"): NO_START,
-    ("fmi2GetReal", "outputs of values that give no start"): NO_START,
+#: The rows that need values of their own.
+_SETTINGS: Mapping[tuple[str, str], Callable[[Trials], Setting | None]] = {
+    ("fmi2DoStep", "values that the equations overflow with"): lambda trials: trials.overflow,
+    ("fmi2ExitInitializationMode", "values that give no start"): lambda trials: trials.no_start,
+    ("fmi2GetReal", "outputs of values that give no start"): lambda trials: trials.no_start,
 }
 
 
@@ -27,6 +28,16 @@ class Company(NamedTuple):
 
     other: Host  #: another instance of the same FMU, stepping
     foreign: bytes  #: a serialised state of another FMU
+
+
+def company_of(library: Library, other: Library) -> Company:
+    """Company for trials on an FMU, which another one gives a state to."""
+    with instance(other) as foreign:
+        content = foreign.content()
+    beside = Host(library)
+    assert beside.instantiate()
+    assert beside.setup() == beside.enter() == beside.exit() == Status.OK
+    return Company(beside, content)
 
 
 def check(library: Library, key: tuple[str, str], state: str, company: Company) -> bool:
@@ -68,7 +79,8 @@ class Trial:
         self.cell: Cell = row.cells[state]
         self.mode = "stepping" if state == ERROR else state
         self.time = 0.0
-        self.setting = _SETTINGS.get(row.key, {}).get(host.description.name)
+        found = _SETTINGS.get(row.key)
+        self.setting = found and found(trials_of(host.description.name))
         self._reach(state)
         self.good = host.get_state()
         freed = host.get_state()

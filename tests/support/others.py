@@ -8,9 +8,10 @@ from zipfile import ZipFile
 
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.hooks.hook import Attendant
+from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
@@ -109,10 +110,10 @@ def run(
     loop: str = "python",
     isolation: Isolation | None = None,
     order: str = "jacobi",
-    attendants: Sequence[Attendant] = (),
+    hooks: Sequence[Hook] = (),
 ) -> Table:
     """All rows of a run."""
     table, experiment = Table(), Experiment(stop_time, step, order)
     how = chosen(loop, experiment, isolation)
-    simulate(system, experiment, [table], isolation, how, attendants)
+    simulate(planned(system, experiment), [table], isolation, how, hooks)
     return table

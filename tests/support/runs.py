@@ -10,8 +10,10 @@ from orchestrator.master.experiment import Experiment, Order
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.preparation import Prepared, Request, loaded, prepare
+from orchestrator.runs.preparation import Prepared, loaded, prepare
+from orchestrator.runs.request import Request
 from orchestrator.system.structure import System
 from orchestrator.vehicle.metrics import indices
 
@@ -25,7 +27,7 @@ def run(
 ) -> Table:
     """All rows of a run."""
     table, experiment = Table(), Experiment(stop_time, step, order)
-    simulate(system, experiment, [table], loop=chosen(loop, experiment))
+    simulate(planned(system, experiment), [table], loop=chosen(loop, experiment))
     return table
 
 

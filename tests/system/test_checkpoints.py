@@ -270,7 +270,7 @@ def stopped(system: System, stop_time: float = 2.0) -> None:
 
     def doomed() -> None:
         def kill(self: Checkpoints, ending: Ending) -> None:
-            self._spool.to_disk()
+            self._row_log.to_disk()
             os.kill(os.getpid(), signal.SIGKILL)
 
         Checkpoints.end = kill

@@ -21,7 +21,7 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.commands.options import INTERRUPTED
+from orchestrator.commands.streams import INTERRUPTED
 from orchestrator.machine.locks import claimed
 from orchestrator.master.observers.files import read_rows
 from orchestrator.runs import record

@@ -12,23 +12,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
-from orchestrator.master.decimation import paces
-from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.experiment import ORDERS, Experiment, decimations
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
-from orchestrator.master.schedule import delays, stages
+from orchestrator.master.plan import delays, planned, stages
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.bundle import NATIVE
-from orchestrator.runs.preparation import Request, load, prepare
+from orchestrator.runs.preparation import load, prepare
+from orchestrator.runs.request import Request
 from orchestrator.runs.result import simulate as simulated
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.graph import delayed
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from orchestrator.system.transformation import Linear, Mapped
+from orchestrator.system.units import Linear, Mapped
 from support.machine import LOOPS
 from support.relay import Clock, Wire, expected, relay, system_of
 
@@ -48,7 +48,7 @@ def run(
 ) -> Table:
     table = Table()
     how = chosen(loop, experiment, isolation)
-    simulate(system, experiment, [table], isolation, how)
+    simulate(planned(system, experiment), [table], isolation, how)
     assert table.failure is None
     return table
 
@@ -102,9 +102,9 @@ def test_any_system_in_any_order_is_what_a_few_lines_make(folder, arguments, n, 
     flat = (
         None if order == "jacobi" else [name for names in stages(system, order) for name in names]
     )
-    paces = {name: round(system.steps.get(name, H) / H) for name in system.components}
+    decimations = {name: round(system.steps.get(name, H) / H) for name in system.components}
     first = dict(zip(map(port_name, table.columns), table.rows[0, 1:].tolist(), strict=True))
-    rows = expected(system, clock, paces, flat, first)
+    rows = expected(system, clock, decimations, flat, first)
     assert list(table.time) == [clock.time(k) for k in range(clock.steps + 1)]
     for k, row in enumerate(rows, start=1):
         got = dict(zip(table.columns, table.rows[k, 1:].tolist(), strict=True))
@@ -124,7 +124,7 @@ def ring(folder: Path, declares: bool = True, gain: float = 0.5, **others: objec
 @pytest.mark.parametrize("declares", [True, False])
 def test_a_ring_is_opened_before_its_first_component_and_one_line_says_so(folder, declares):
     system, table = ring(folder, declares), Table()
-    ending = simulate(system, Experiment(3 * H, H, coupling="delay"), [table])
+    ending = simulate(planned(system, Experiment(3 * H, H, coupling="delay")), [table])
     line = "a takes c.g one step late: direct feedthroughs form a ring"
     assert ending.messages == (line, *(f"{name}: initialises" for name in "abc"))
     assert stages(system, "gauss-seidel") == [["a"], ["b"], ["c"]]
@@ -238,7 +238,7 @@ def test_steps_follow_from_what_is_stated_and_else_from_the_fmus(folder):
     def paces_of(system: System, **stated: object) -> tuple[float, dict[str, int]]:
         prepared = prepare(Scenario("s"), system, Request(**stated))
         step = prepared.experiment.step
-        return step, paces(prepared.system, step)
+        return step, decimations(prepared.system, step)
 
     assert paces_of(system) == (0.01, {"a": 2, "b": 5, "c": 1})
     assert paces_of(system, steps={"b": 0.1}) == (0.02, {"a": 1, "b": 5, "c": 1})
@@ -280,5 +280,7 @@ def test_a_scenario_may_state_order_and_steps(workplace):
 
 @pytest.mark.parametrize("isolation", [None, Isolation(20.0)])
 def test_no_step_is_logged(folder, isolation):
-    ending = simulate(system_of({"a": relay(folder)}), Experiment(10 * H, H), (), isolation)
+    ending = simulate(
+        planned(system_of({"a": relay(folder)}), Experiment(10 * H, H)), (), isolation
+    )
     assert ending.messages == ("a: initialises",)

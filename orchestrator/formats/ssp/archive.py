@@ -10,14 +10,11 @@ from urllib.parse import unquote, urlsplit
 from xml.etree.ElementTree import Element
 
 from orchestrator.formats.ssp import STRUCTURE
-from orchestrator.formats.ssp.document import read_document
-from orchestrator.formats.ssp.validation import violations
+from orchestrator.formats.ssp.document import read_document, violations
 from orchestrator.machine.archives import unpacked
-from orchestrator.machine.errors import InputError, did_you_mean, reason
-from orchestrator.machine.findings import Findings
-from orchestrator.machine.reading import check_file, is_folder
-from orchestrator.system.transformation import Linear
-from orchestrator.system.units import UndefinedUnit, Unit, conversion
+from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason
+from orchestrator.machine.user_files import check_file, is_folder
+from orchestrator.system.units import Linear, UndefinedUnit, Unit, conversion
 from orchestrator.system.values import finite, integer
 
 _SUFFIX = Path(STRUCTURE).suffix

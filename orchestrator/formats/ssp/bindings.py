@@ -9,12 +9,16 @@ from typing import TypeAlias
 from xml.etree.ElementTree import Element
 
 from orchestrator.formats.ssp.archive import Archive, listed
-from orchestrator.formats.ssp.definitions import Definitions, Items, definitions_of
+from orchestrator.formats.ssp.definitions import (
+    Definitions,
+    Items,
+    converts_units,
+    definitions_of,
+    transformation_of,
+)
 from orchestrator.formats.ssp.hierarchy import Bus, Connector, Group, Leaf, Node
-from orchestrator.formats.ssp.transformations import converts_units, transformation_of
 from orchestrator.machine.errors import InputError
-from orchestrator.system.transformation import Transformation, chained
-from orchestrator.system.units import Unit
+from orchestrator.system.units import Transformation, Unit, chained
 
 #: The types of files that are known.
 _VALUES, _MAPPING = "application/x-ssp-parameter-set", "application/x-ssp-parameter-mapping"

@@ -1,4 +1,4 @@
-"""A file of an SSP as elements by their local names, whatever prefixes its writer has given them.
+"""A file of an archive as elements, read leniently and held against the schemas.
 
 fmpy.ssp is no such reader: it looks for transformations in the wrong namespace, passes over
 parameter mappings, units and annotations, does not decode the addresses of files, and reads a file
@@ -7,9 +7,15 @@ only if it is valid to the letter. What is harmless is a note here.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
+
+import fmpy.ssp
+from lxml import etree
 
 from orchestrator.formats.ssp import NAMESPACES
 
@@ -91,3 +97,36 @@ class _Reader:
         elif not self._open and namespace not in NAMESPACES:
             where = f"the namespace {namespace!r}" if namespace else "no namespace"
             self._note(f"elements are in {where}, which is none of SSP 1.0")
+
+
+#: Schemas by the root elements of the files that they are for.
+_SCHEMAS = {
+    "SystemStructureDescription": "SystemStructureDescription.xsd",
+    "ParameterSet": "SystemStructureParameterValues.xsd",
+    "ParameterMapping": "SystemStructureParameterMapping.xsd",
+}
+
+
+def violations(root: str, text: bytes) -> list[str]:
+    """What is not as the schema has it, with the number of its line.
+
+    Args:
+        root: name of the root element.
+        text: the file.
+
+    """
+    if root not in _SCHEMAS:
+        return [f"<{root}> is no element of SSP"]
+    schema = _schema(_SCHEMAS[root])
+    try:
+        schema.assertValid(etree.fromstring(text))
+    except etree.LxmlError as error:
+        said = [(entry.line, entry.message) for entry in error.error_log]
+        return [f"line {line}: {re.sub('{[^}]*}', '', message)}" for line, message in said]
+    return []
+
+
+@cache
+def _schema(name: str) -> etree.XMLSchema:
+    [folder] = fmpy.ssp.__path__
+    return etree.XMLSchema(etree.parse(Path(folder, "schema", name)))

@@ -1,10 +1,11 @@
-"""An SSP archive as a system."""
+"""An SSP archive as a system, and the experiment that it states."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 from orchestrator.formats.ssp import LEFT_OPEN
@@ -12,17 +13,66 @@ from orchestrator.formats.ssp.archive import Archive, listed
 from orchestrator.formats.ssp.bindings import Bindings, Values
 from orchestrator.formats.ssp.building import Builder
 from orchestrator.formats.ssp.definitions import definitions_of
-from orchestrator.formats.ssp.experiment import annotated, step_of, times_of
 from orchestrator.formats.ssp.hierarchy import Leaf, Node, Way
-from orchestrator.formats.ssp.wires import Course, Wires
-from orchestrator.machine.errors import InputError, shortened
-from orchestrator.machine.findings import Findings
+from orchestrator.formats.ssp.routes import Route, Routes
+from orchestrator.machine.errors import Findings, InputError, shortened
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.transformation import Transformation, chained
-from orchestrator.system.units import Unit
+from orchestrator.system.units import Transformation, Unit, chained
 from orchestrator.system.values import BOOLEANS, Value, real, typed
+
+#: Elements and attributes of annotations that hold the step of a whole system: those of libcosim
+#: and ecos, of Vico, and of OMSimulator.
+_STEPS = (
+    ("FixedStepAlgorithm", "baseStepSize"),
+    ("FixedStepMaster", "baseStepSize"),
+    ("FixedStepMaster", "stepSize"),
+    ("SimulationInformation", "fixedStepSize"),
+)
+
+#: That of a component.
+_STEP_OF_A_COMPONENT = ("StepSizeHint", "value")
+
+
+class Times(NamedTuple):
+    """The experiment of a description [s]; None: it does not say."""
+
+    start_time: float | None
+    stop_time: float | None
+    step: float | None
+
+
+def times_of(archive: Archive, root: Element) -> Times:
+    """The experiment that a description asks for."""
+    experiment = root.find("DefaultExperiment")
+    stated = (
+        archive.number(element, attribute, None)
+        for name, attribute in _STEPS
+        for place in (experiment, root.find("System"), root)
+        for element in annotated(place, name)
+    )
+    return Times(
+        archive.number(experiment, "startTime", None),
+        archive.number(experiment, "stopTime", None),
+        next((step for step in stated if step is not None), None),
+    )
+
+
+def step_of(archive: Archive, leaf: Leaf) -> float | None:
+    """The step that a component asks for [s]; None, as zero does: it has no wish."""
+    name, attribute = _STEP_OF_A_COMPONENT
+    for element in annotated(leaf.content, name):
+        return archive.number(element, attribute, None) or None
+    return None
+
+
+def annotated(element: Element | None, name: str) -> Iterator[Element]:
+    """Elements of a name in the annotations of an element itself."""
+    if element is not None:
+        for annotations in element.findall("Annotations"):
+            yield from annotations.iter(name)
+
 
 _ROOT = "SystemStructureDescription"
 
@@ -58,7 +108,9 @@ def _read(archive: Archive, root: Element) -> System:
     [content] = root.findall("System")[:1]
     top = Builder(archive, definitions).group(content)
     leaves = {leaf.way: leaf for leaf in top.leaves()}
-    ports = _Ports(archive, leaves, Wires(archive, top), Bindings(archive, definitions).values(top))
+    ports = _Ports(
+        archive, leaves, Routes(archive, top), Bindings(archive, definitions).values(top)
+    )
     components: dict[str, Component] = {}
     for leaf in leaves.values():
         name = ".".join(leaf.way)
@@ -118,7 +170,7 @@ class _Ports:
     """
 
     def __init__(
-        self, archive: Archive, leaves: Mapping[Way, Leaf], wires: Wires, given: Values
+        self, archive: Archive, leaves: Mapping[Way, Leaf], routes: Routes, given: Values
     ) -> None:
         """Follow each port upstream."""
         self.connections: list[Connection] = []
@@ -126,62 +178,62 @@ class _Ports:
         self._archive, self._leaves, self._given = archive, leaves, given
         self._used: set[Node] = set()
         self._arrivals: dict[Node, _Arrival] = {}
-        for node in dict.fromkeys((*wires.targets(), *given)):
+        for node in dict.fromkeys((*routes.targets(), *given)):
             leaf = leaves.get(node.way)
             if leaf is not None and leaf.component is not None:
                 port = PortName(leaf.component.name, node.port)
                 try:
-                    self._enter(port, wires.course(node), leaf)
+                    self._enter(port, routes.route(node), leaf)
                 except InputError as error:
                     archive.problem(error)
         lost = [str(node) for node in given if node not in self._used]
         if lost:
             archive.note(f"values that are given to {listed(lost)} reach no component")
 
-    def _enter(self, port: PortName, course: Course, leaf: Leaf) -> None:
+    def _enter(self, port: PortName, route: Route, leaf: Leaf) -> None:
         """Enter what arrives at a port: another's value, or the outermost that is given."""
-        origin = self._leaves.get(course.origin.way) if course.wire else None
-        arrival = self._arrival(course) if course.wire else self._given_to(course.node)
+        origin = self._leaves.get(route.origin.way) if route.segment else None
+        arrival = self._arrival(route) if route.segment else self._given_to(route.node)
         if origin is None:
             self._set(port, leaf, arrival)
         elif origin.component is not None:
-            source = PortName(origin.component.name, course.origin.port)
+            source = PortName(origin.component.name, route.origin.port)
             if arrival.error is not None:
                 raise InputError(f"{source} -> {port}: {arrival.error}")
             self.connections.append(Connection(source, port, arrival.whole))
 
-    def _arrival(self, course: Course) -> _Arrival:
-        """What is known of a value at the end of a course, of which each wire is looked at once."""
-        ahead: list[Course] = []
-        at: Course | None = course
+    def _arrival(self, route: Route) -> _Arrival:
+        """What is known of a value at the end of a route; each segment is looked at once."""
+        ahead: list[Route] = []
+        at: Route | None = route
         while at is not None and at.node not in self._arrivals:
             ahead.append(at)
             at = at.before
         for one in reversed(ahead):
             self._arrivals[one.node] = self._arrival_by(one)
-        return self._arrivals[course.node]
+        return self._arrivals[route.node]
 
-    def _arrival_by(self, course: Course) -> _Arrival:
+    def _arrival_by(self, route: Route) -> _Arrival:
         """The same, where it is known of the course before."""
-        origin = self._leaves.get(course.origin.way)
-        if course.before is None or course.wire is None:
+        origin = self._leaves.get(route.origin.way)
+        if route.before is None or route.segment is None:
             if origin is None:
-                return self._given_to(course.node)
-            connector = None if origin.component is None else origin.connector(course.node.port)
-            return _Arrival(course.node, unit=connector.unit if connector else None)
-        before = self._arrivals[course.before.node]
+                return self._given_to(route.node)
+            connector = None if origin.component is None else origin.connector(route.node.port)
+            return _Arrival(route.node, unit=connector.unit if connector else None)
+        before = self._arrivals[route.before.node]
         if before.start is None:
-            return self._given_to(course.node)
-        self._used.add(course.node)
-        if origin is not None and course.node in self._given:
+            return self._given_to(route.node)
+        self._used.add(route.node)
+        if origin is not None and route.node in self._given:
             self._archive.note(
-                f"{course.node}: is fed by {course.origin}, and the value that is given to it has "
+                f"{route.node}: is fed by {route.origin}, and the value that is given to it has "
                 "no effect"
             )
         if before.error is not None or (origin is not None and origin.component is None):
             return before
         try:
-            whole, unit = course.wire.carry(self._archive, before.whole, before.unit)
+            whole, unit = route.segment.carry(self._archive, before.whole, before.unit)
         except InputError as error:
             return _Arrival(before.start, error=error)
         return _Arrival(before.start, whole, unit)
@@ -211,8 +263,8 @@ class _Ports:
             return
         if not component.is_settable(port.port):
             self._archive.note(
-                f"{port}: is of causality {connector.kind} and cannot be set; the value that is "
-                "given to it has no effect"
+                f"{port}: is of causality {connector.causality} and cannot be set; the value that "
+                "is given to it has no effect"
             )
             return
         items = {**connector.items, **given.items}

@@ -12,8 +12,7 @@ from orchestrator.formats.ssp import LEFT_OPEN, OMS, OSP, SSC, SSD, SSV, STRUCTU
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, file_name, plain
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.transformation import Linear, Mapped
-from orchestrator.system.units import BASES
+from orchestrator.system.units import BASES, Linear, Mapped
 from orchestrator.system.values import Value, literal, type_of
 
 #: Name of every parameter set: ecos applies the sets of the one name that it is given.
@@ -73,8 +72,10 @@ def parameter_set_xml(system: System, component: Component) -> bytes:
     parameters = ElementTree.SubElement(root, f"{{{SSV}}}Parameters")
     for name, value in system.parameters_of(component.name).items():
         element = ElementTree.SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
-        kind = component.variable(name).type
-        ElementTree.SubElement(element, f"{{{SSV}}}{kind}", value=_literal(component, name, value))
+        fmi_type = component.variable(name).type
+        ElementTree.SubElement(
+            element, f"{{{SSV}}}{fmi_type}", value=_literal(component, name, value)
+        )
     return _serialised(root)
 
 
@@ -161,8 +162,8 @@ def _add_transformation(
         ElementTree.SubElement(element, _ssc("LinearTransformation"), numbers)
     elif isinstance(made, Mapped):
         source = connection.source
-        kind = type_of(system.component(source.component).variable(source.port))
-        of = bool if kind == "Boolean" else int
+        fmi_type = type_of(system.component(source.component).variable(source.port))
+        of = bool if fmi_type == "Boolean" else int
         # Numbers of an enumeration are integers as well.
         name = "BooleanMapping" if of is bool else "IntegerMapping"
         table = ElementTree.SubElement(element, _ssc(f"{name}Transformation"))

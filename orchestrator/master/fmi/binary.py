@@ -18,9 +18,8 @@ from fmpy.fmi2 import FMU2Slave, fmi2Error, fmi2Status
 
 from orchestrator.machine.archives import check_place, runs_python
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.master.fmi.mode import put_back
 from orchestrator.master.fmi.sources import check_compiler, compile_into, sources_of
-from orchestrator.master.fmi.surroundings import within
+from orchestrator.master.fmi.surroundings import put_back, within
 from orchestrator.system.component import Component
 
 #: How this program names itself in descriptions of FMUs.

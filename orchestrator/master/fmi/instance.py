@@ -9,9 +9,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from orchestrator.master import stepper_types as layout
-from orchestrator.master.fmi.string_table import Texts
-from orchestrator.system.values import Value
+from orchestrator.master.stepper_types import CMember
+from orchestrator.system.values import StringTable, Value
 
 #: What a component is asked for in every step, one after the other.
 CALLS = SET_INPUTS, DO_STEP, GET_OUTPUTS = "setting inputs", "fmi2DoStep", "getting outputs"
@@ -47,18 +46,18 @@ class Ended(Exception):
 
 
 class Part(NamedTuple):
-    """Ports of one component that have the same causality and kind.
+    """Ports of one component that have the same causality and type.
 
     Attributes:
         causality: `input` or `output`.
-        kind: one of :data:`orchestrator.master.fmi.transfer.KINDS`.
+        fmi_type: one of :data:`orchestrator.master.fmi.transfer.FMI_TYPES`.
         references: value references.
         place: of their values among those of the component.
 
     """
 
     causality: str
-    kind: str
+    fmi_type: str
     references: list[int]
     place: slice
 
@@ -87,7 +86,7 @@ class Instance(Protocol):
     def do_step(self) -> Callable[[c_double, c_double, int], int]:
         """FMI's doStep, to be called with time, step size and one."""
 
-    def pointers(self) -> layout.Member:
+    def pointers(self) -> CMember:
         """The same calls as pointers, for an FMU in this process."""
 
     def failed(self, status: int, function: str) -> ComponentFailed | Ended:
@@ -99,7 +98,7 @@ class Instance(Protocol):
 
         """
 
-    def tie(self, values: np.ndarray, parts: Sequence[Part], texts: Texts) -> None:
+    def tie(self, values: np.ndarray, parts: Sequence[Part], strings: StringTable) -> None:
         """Say where its values are: a view of the row, with the inputs first, and its parts.
 
         Args:

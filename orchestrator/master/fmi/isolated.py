@@ -24,14 +24,13 @@ from fmpy.fmi2 import fmi2OK, fmi2Pending, fmi2Warning
 
 from orchestrator.machine.errors import InputError, StartError, reason
 from orchestrator.machine.interrupts import Interrupts
-from orchestrator.master import stepper_types as layout
 from orchestrator.master.fmi.channel import LONGEST_NOTE, LONGEST_STATE, Channel, sizes
 from orchestrator.master.fmi.instance import ComponentFailed, Ended, Instance, Part
 from orchestrator.master.fmi.log import Log
-from orchestrator.master.fmi.string_table import Texts
 from orchestrator.master.fmi.supervisor import END
+from orchestrator.master.stepper_types import CMember
 from orchestrator.system.component import Component
-from orchestrator.system.values import Value, is_integer, is_of
+from orchestrator.system.values import StringTable, Value, is_integer, is_of
 
 #: How long a call may take by default [s]: an FMU may fetch a licence or read maps first.
 STEP_TIMEOUT = 60.0
@@ -46,7 +45,7 @@ _GLANCE, _PATIENCE, _FAREWELL = 0.1, 1.0, 5.0
 #: Statuses that a message can have.
 _STATUSES = range(fmi2OK, fmi2Pending + 1)
 
-#: What the keeper begins with: the modules that this process would find, and no main module.
+#: What the supervisor begins with: the modules that this process would find, and no main module.
 _BEGIN = """
 import json, sys
 order = json.loads(sys.stdin.buffer.raw.readline())
@@ -132,7 +131,7 @@ class IsolatedInstance:
         self._text_outputs: list[int] = []
         self._integer_outputs: list[int] = []
         # Those of the run, and those of the process there, which numbers its own.
-        self._texts, self._theirs, self._told = Texts(), Texts(), len(Texts())
+        self._strings, self._theirs, self._told = StringTable(), StringTable(), len(StringTable())
         inputs, outputs = sizes(component)
         self._channel = Channel(connection, 2 + inputs, outputs, self._waited)
 
@@ -148,20 +147,20 @@ class IsolatedInstance:
         self._doing = "instantiate"
         self._receive()
 
-    def tie(self, values: np.ndarray, parts: Sequence[Part], texts: Texts) -> None:
+    def tie(self, values: np.ndarray, parts: Sequence[Part], strings: StringTable) -> None:
         """Say where its values are."""
         inputs, outputs = len(self._channel.outgoing) - 2, len(self._channel.incoming)
         first = next((part.place.start for part in parts if part.causality == "output"), inputs)
         self._inputs, self._outputs = values[:inputs], values[first : first + outputs]
-        self._texts = texts
+        self._strings = strings
         for part in parts:
-            if part.kind == "String":
+            if part.fmi_type == "String":
                 places = range(part.place.start, part.place.stop)
                 if part.causality == "input":
                     self._text_inputs += places
                 else:
                     self._text_outputs += [place - first for place in places]
-            elif part.kind != "Real" and part.causality == "output":
+            elif part.fmi_type != "Real" and part.causality == "output":
                 self._integer_outputs += range(part.place.start - first, part.place.stop - first)
 
     def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
@@ -230,7 +229,7 @@ class IsolatedInstance:
         """Take on a state."""
         self._ask("restore", state)
 
-    def pointers(self) -> layout.Member:
+    def pointers(self) -> CMember:
         """There are none: its calls are messages to another process."""
         raise NotImplementedError
 
@@ -290,7 +289,7 @@ class IsolatedInstance:
         inputs = self._channel.outgoing[2:]
         inputs[:] = self._inputs
         for i in self._text_inputs:
-            inputs[i] = self._theirs.number(self._texts.text(inputs[i]))
+            inputs[i] = self._theirs.number(self._strings.text(inputs[i]))
 
     def _read_outputs(self) -> None:
         """Take the outputs that have come with a message."""
@@ -299,7 +298,7 @@ class IsolatedInstance:
             raise self._nonsense()
         try:
             for i in self._text_outputs:
-                outputs[i] = self._texts.number(self._theirs.text(outputs[i]))
+                outputs[i] = self._strings.number(self._theirs.text(outputs[i]))
         except ValueError as error:
             raise self._nonsense(error) from error
         self._outputs[:] = outputs
@@ -316,7 +315,7 @@ class IsolatedInstance:
     def _send(self, note: dict[str, Any]) -> None:
         """Send a note, with the texts that are new there."""
         if news := self._theirs.since(self._told):
-            note["texts"] = news
+            note["strings"] = news
             self._told += len(news)
         try:
             self._channel.send(note or None)
@@ -346,9 +345,9 @@ class IsolatedInstance:
         refused: str | None = None,
         ended: str | None = None,
         until: float = -inf,
-        texts: Sequence[str] = (),
+        strings: Sequence[str] = (),
     ) -> Any:
-        for text in texts:
+        for text in strings:
             self._theirs.number(_text(text))
         self._told = len(self._theirs)
         for status, text in messages:
@@ -409,8 +408,8 @@ def _end(status: int | None) -> str:
     return f"was ended by {name} ({signal.strsignal(-status)}{memory})"
 
 
-class _Keeper:
-    """The process that has the FMUs' processes: see :mod:`.keeper`."""
+class _Supervisor:
+    """The process that has the FMUs' processes: see :mod:`.supervisor`."""
 
     def __init__(
         self, components: Mapping[str, Component], connections: Sequence[socket.socket]
@@ -455,7 +454,7 @@ class _Keeper:
             if ready.poll(1000.0 * left):
                 text = os.read(reports.fileno(), 4096)
                 if not text:
-                    # Its children die with the keeper.
+                    # Its children die with the supervisor.
                     return -signal.SIGKILL
                 *lines, self._text = (self._text + text).split(b"\n")
                 for line in lines:
@@ -503,15 +502,15 @@ def isolated(
             for pair in pairs:
                 for end in pair:
                     stack.enter_context(end)
-            keeper = _Keeper(components, [there for _, there in pairs])
+            supervisor = _Supervisor(components, [there for _, there in pairs])
         except OSError as error:
             raise StartError(f"cannot start processes for FMUs: {reason(error)}") from error
-        stack.callback(keeper.end)
+        stack.callback(supervisor.end)
         instances = []
         for number, component in enumerate(components.values()):
             here, there = pairs[number]
             there.close()
-            status = partial(keeper.status, number)
+            status = partial(supervisor.status, number)
             instances.append(
                 IsolatedInstance(component, here, status, log, isolation.step_timeout, interrupts)
             )

@@ -40,15 +40,14 @@ from fmpy.logging import addLoggerProxy
 from fmpy.model_description import ModelVariable
 
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.master import stepper_types as layout
 from orchestrator.master.fmi.binary import Library, library_of, named
 from orchestrator.master.fmi.instance import DO_STEP, ComponentFailed, Ended, Instance, Part
 from orchestrator.master.fmi.log import Listener
-from orchestrator.master.fmi.mode import put_back
-from orchestrator.master.fmi.string_table import Texts
-from orchestrator.master.fmi.transfer import Block, text_of
+from orchestrator.master.fmi.surroundings import put_back
+from orchestrator.master.fmi.transfer import PortBlock, text_of
+from orchestrator.master.stepper_types import CMember, CMove
 from orchestrator.system.component import Component
-from orchestrator.system.values import Value
+from orchestrator.system.values import StringTable, Value
 
 #: FMI's categories of messages about what goes wrong (FMI 2.0.4, section 2.2.4).
 _LOGGED = {f"logStatus{status}" for status in ("Warning", "Discard", "Error", "Fatal")}
@@ -81,8 +80,8 @@ class LoadedInstance:
         self.name = component.name
         self.set_inputs: list[Callable[[], int]] = []
         self.get_outputs: list[Callable[[], int]] = []
-        self._inputs: list[Block] = []
-        self._outputs: list[Block] = []
+        self._inputs: list[PortBlock] = []
+        self._outputs: list[PortBlock] = []
         self._variables = component.variables
         self._gives_state = component.gives_state
         self.gives_derivatives = component.gives_derivatives
@@ -147,10 +146,10 @@ class LoadedInstance:
         called.argtypes, called.restype = types, fmi2Status
         return partial(called, fmi2Component(self._fmu.component))
 
-    def tie(self, values: np.ndarray, parts: Sequence[Part], texts: Texts) -> None:
+    def tie(self, values: np.ndarray, parts: Sequence[Part], strings: StringTable) -> None:
         """Say where its values are."""
         for part in parts:
-            block = Block(*part[:3], values[part.place], texts)
+            block = PortBlock(*part[:3], values[part.place], strings)
             function = self.function(block.function)
             if part.causality == "input":
                 self._inputs.append(block)
@@ -159,17 +158,17 @@ class LoadedInstance:
                 self._outputs.append(block)
                 self.get_outputs.append(block.getter(function))
 
-    def pointers(self) -> layout.Member:
+    def pointers(self) -> CMember:
         """The same calls for the compiled loop."""
         inputs, outputs = (
             [block.move(self._address(block.function)) for block in blocks]
             for blocks in (self._inputs, self._outputs)
         )
-        return layout.Member(
+        return CMember(
             self._fmu.component,
             _address(self._called_back) if self._called_back else self._address("DoStep"),
-            (layout.Move * len(inputs))(*inputs),
-            (layout.Move * len(outputs))(*outputs),
+            (CMove * len(inputs))(*inputs),
+            (CMove * len(outputs))(*outputs),
             len(inputs),
             len(outputs),
         )

@@ -71,7 +71,7 @@ class Log:
         self._said, self._n = state["said"], state["n"]
 
 
-class Letters:
+class MessageQueue:
     """Messages on their way to the log of another process."""
 
     def __init__(self) -> None:

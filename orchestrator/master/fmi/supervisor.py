@@ -22,7 +22,7 @@ from typing import Any
 from orchestrator.machine.errors import plain
 from orchestrator.master.fmi.worker import serve
 
-#: What is written to the keeper to have all ended; the end of its input says that nobody is there.
+#: Written to the supervisor to end all processes; so does the end of its input.
 END = b"."
 
 #: What an FMU may write to its standard output and error [bytes]; more is not shown.
@@ -64,7 +64,7 @@ def keep(order: dict[str, Any]) -> None:
 
 
 def _alone_with(descriptor: int) -> socket.socket:
-    """In a new process: keep one socket and the standard streams, and die with the keeper."""
+    """In a new process: keep one socket and the standard streams, and die with the supervisor."""
     os.dup2(descriptor, 3)
     os.set_inheritable(3, False)
     os.closerange(4, os.sysconf("SC_OPEN_MAX"))
@@ -76,7 +76,7 @@ def _alone_with(descriptor: int) -> socket.socket:
     return socket.socket(fileno=3)
 
 
-class _Output:
+class _Captured:
     """What the process of a component writes to its standard output and error."""
 
     def __init__(self, name: str, descriptor: int) -> None:
@@ -103,7 +103,7 @@ class _Children:
 
     def __init__(self) -> None:
         self._numbers: dict[int, int] = {}
-        self._outputs: dict[int, _Output] = {}
+        self._outputs: dict[int, _Captured] = {}
         # A child that ends interrupts the poll through this pipe.
         self._ends, end = os.pipe()
         os.set_blocking(end, False)
@@ -132,7 +132,7 @@ class _Children:
             return True
         os.close(writing)
         self._numbers[pid] = len(self._numbers)
-        self._outputs[reading] = _Output(name, reading)
+        self._outputs[reading] = _Captured(name, reading)
         self._poll.register(reading, select.POLLIN)
         return False
 

@@ -1,17 +1,62 @@
-"""What FMUs in this process may change of it, and how it becomes again what it was."""
+"""What FMUs may change of this process, such as its floating-point mode, and how it is undone."""
 
 from __future__ import annotations
 
 import builtins
+import ctypes
 import json
 import os
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import chdir, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+
+#: Factors whose product passes through the smallest numbers, and is rounded up and down: with
+#: another mode it is another one.
+A, B, C, PRODUCT = 1e-308, 0.1, 1e300, 1.000000000000002e-09
+
+#: More bytes than any machine needs for its mode.
+_SIZE = 1024
+
+
+def _functions() -> Iterator[Callable[..., object]]:
+    """C's functions: to take on the default mode, and to get and to set one."""
+    c = ctypes.PyDLL(None)
+    if sys.platform == "darwin":
+        yield partial(c.fesetenv, ctypes.byref(ctypes.c_char.in_dll(c, "_FE_DFL_ENV")))
+    else:
+        yield partial(c.fesetenv, ctypes.c_void_p(-1))
+    yield c.fegetenv
+    yield c.fesetenv
+
+
+_take_default, _get, _set = _functions()
+
+
+def put_back() -> None:
+    """Take on the default mode after a call of an FMU, if numbers are others in the present one.
+
+    To look is a third of what it costs to take it on.
+    """
+    if A * B * C != PRODUCT:
+        _take_default()
+
+
+@contextmanager
+def default_mode() -> Iterator[None]:
+    """Compute in the default mode, and leave behind the one that was there."""
+    before = ctypes.create_string_buffer(_SIZE)
+    _get(before)
+    _take_default()
+    try:
+        yield
+    finally:
+        _set(before)
+
 
 #: Modules that FMUs in Python share with this program; what they add to them is theirs.
 _MODULES = (builtins, json, os, np)

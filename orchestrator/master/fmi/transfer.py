@@ -18,12 +18,12 @@ from fmpy.fmi2 import (
     fmi2ValueReference,
 )
 
-from orchestrator.master import stepper_types as layout
-from orchestrator.master.fmi.string_table import Texts
+from orchestrator.master.stepper_types import CMove
+from orchestrator.system.values import StringTable
 
 #: Kinds of values that can be connected and recorded, with FMI's functions for them and the types
 #: that they are moved in: for a String moves the number of its text.
-KINDS = {
+FMI_TYPES = {
     "Real": ("Real", fmi2Real),
     "Integer": ("Integer", fmi2Integer),
     "Enumeration": ("Integer", fmi2Integer),
@@ -35,8 +35,8 @@ KINDS = {
 _CALLBACK = CFUNCTYPE(fmi2Status, fmi2Component, c_void_p, c_size_t, c_void_p)
 
 
-class Block:
-    """Values of one kind, side by side in the row of all values, moved by one FMI call.
+class PortBlock:
+    """Values of one type, side by side in the row of all values, moved by one FMI call.
 
     Attributes:
         function: the one of FMI that moves them, without fmi2.
@@ -46,29 +46,29 @@ class Block:
     def __init__(
         self,
         causality: str,
-        kind: str,
+        fmi_type: str,
         references: Sequence[int],
         row: np.ndarray,
-        texts: Texts,
+        strings: StringTable,
     ) -> None:
         """Prepare the arrays that every call uses.
 
         Args:
             causality: `input` or `output`.
-            kind: one of :data:`KINDS`.
+            kind: one of :data:`FMI_TYPES`.
             references: value references.
             row: the part of the row of all values where the values are, a view.
             texts: whose numbers stand in the row.
 
         """
-        self._kind, c_type = KINDS[kind]
-        self._texts = texts
-        self.function = f"{'Set' if causality == 'input' else 'Get'}{self._kind}"
+        self._fmi_type, c_type = FMI_TYPES[fmi_type]
+        self._strings = strings
+        self.function = f"{'Set' if causality == 'input' else 'Get'}{self._fmi_type}"
         self._row = row
         n = len(references)
         self._n = c_size_t(n)
         self._references = (fmi2ValueReference * n)(*references)
-        if self._kind == "Real":
+        if self._fmi_type == "Real":
             self._values = (c_type * n).from_buffer(row)
         else:
             self._values = (c_type * n)()
@@ -77,7 +77,7 @@ class Block:
     def setter(self, function: Callable[..., int]) -> Callable[[], int]:
         """A call that hands the values to an FMU, by its function of this block."""
         call = self._call(function)
-        if self._kind == "Real":
+        if self._fmi_type == "Real":
             return call
 
         row, integers = self._row, self._integers
@@ -92,7 +92,7 @@ class Block:
     def getter(self, function: Callable[..., int]) -> Callable[[], int]:
         """A call that takes the values from an FMU, by its function of this block."""
         call = self._call(function)
-        if self._kind == "Real":
+        if self._fmi_type == "Real":
             return call
 
         row, values = self._row, self._values
@@ -110,16 +110,16 @@ class Block:
         # Most components have one such output, and an array of one costs twice as much.
         return get_one if len(row) == 1 else get_converted
 
-    def move(self, address: int | None) -> layout.Move:
+    def move(self, address: int | None) -> CMove:
         """The same for the compiled loop, by the address of the FMU's function of this block."""
-        integers = None if self._kind == "Real" else addressof(self._values)
-        if self._kind == "String":
+        integers = None if self._fmi_type == "Real" else addressof(self._values)
+        if self._fmi_type == "String":
             address = cast(self._called_back, c_void_p).value
         references, row = addressof(self._references), self._row.ctypes.data
-        return layout.Move(address, references, self._n, row, integers)
+        return CMove(address, references, self._n, row, integers)
 
     def _call(self, function: Callable[..., int]) -> Callable[[], int]:
-        if self._kind == "String":
+        if self._fmi_type == "String":
             move = self._set_texts if self.function.startswith("Set") else self._get_texts
             call = partial(move, function)
             # The compiled loop looks for numbers and has an FMU's function move them.
@@ -128,14 +128,14 @@ class Block:
         return partial(function, self._references, self._n, self._values)
 
     def _set_texts(self, function: Callable[..., int]) -> int:
-        texts = [self._texts.text(number).encode() for number in self._values]
-        return function(self._references, self._n, (fmi2String * len(texts))(*texts))
+        strings = [self._strings.text(number).encode() for number in self._values]
+        return function(self._references, self._n, (fmi2String * len(strings))(*strings))
 
     def _get_texts(self, function: Callable[..., int]) -> int:
-        texts = (fmi2String * len(self._values))()
-        status = function(self._references, self._n, texts)
-        for i, text in enumerate(texts):
-            self._values[i] = self._texts.number(text_of(text))
+        strings = (fmi2String * len(self._values))()
+        status = function(self._references, self._n, strings)
+        for i, text in enumerate(strings):
+            self._values[i] = self._strings.number(text_of(text))
         return status
 
 

@@ -17,14 +17,14 @@ from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.fmi.channel import Channel, sizes
 from orchestrator.master.fmi.instance import ComponentFailed, Ended
 from orchestrator.master.fmi.loaded import LoadedInstance, loaded
-from orchestrator.master.fmi.log import Letters
-from orchestrator.master.fmi.string_table import Texts
+from orchestrator.master.fmi.log import MessageQueue
 from orchestrator.master.fmi.surroundings import Surroundings
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import member, step
 from orchestrator.system.component import Component
 from orchestrator.system.description import read_description
 from orchestrator.system.structure import System
+from orchestrator.system.values import StringTable
 
 
 @np.errstate(all="ignore")
@@ -42,12 +42,12 @@ def serve(name: str, fmu: Path, digest: str, folder: Path, connection: socket.so
     component = Component(name, fmu, read_description(folder).description, digest)
     inputs, outputs = sizes(component)
     # Before the inputs: time and step size.
-    channel, letters = Channel(connection, outputs, 2 + inputs), Letters()
+    channel, messages = Channel(connection, outputs, 2 + inputs), MessageQueue()
     with suppress(EOFError, OSError):
         channel.send()
         try:
-            with loaded(component, letters, folder) as instance:
-                _Served(component, instance, channel, letters).answer_all()
+            with loaded(component, messages, folder) as instance:
+                _Served(component, instance, channel, messages).answer_all()
         except InputError as error:
             channel.send({"refused": str(error)})
 
@@ -61,25 +61,29 @@ class _Served:
     """
 
     def __init__(
-        self, component: Component, instance: LoadedInstance, channel: Channel, letters: Letters
+        self,
+        component: Component,
+        instance: LoadedInstance,
+        channel: Channel,
+        messages: MessageQueue,
     ) -> None:
-        self._instance, self._channel, self._letters = instance, channel, letters
+        self._instance, self._channel, self._messages = instance, channel, messages
         self._surroundings = Surroundings()
         system = System(component.name, {component.name: component}, ())
         row = Row(system, {component.name: instance})
         self._member = member(instance)
         n = len(channel.incoming) - 2
         self._inputs, self._outputs = row.values[:n], row.values[n:]
-        self._texts, self._told = row.texts, len(Texts())
+        self._strings, self._told = row.strings, len(StringTable())
 
     def answer_all(self) -> None:
         """Answer until the other end closes, or the FMU must not be called again."""
         going_on = self._answered(lambda: None)
         while going_on:
             request = self._channel.receive() or {}
-            for text in request.get("texts", ()):
-                self._texts.number(text)
-            self._told = len(self._texts)
+            for text in request.get("strings", ()):
+                self._strings.number(text)
+            self._told = len(self._strings)
             self._inputs[:] = self._channel.incoming[2:]
             going_on = self._answered(
                 partial(getattr(self._instance, request["call"]), *request["arguments"])
@@ -108,10 +112,10 @@ class _Served:
         except Exception as error:
             note |= {"failed": f"{self._instance.name}: {reason(error)}", "fatal": True}
         self._surroundings.end_copy()
-        if messages := self._letters.handed_over():
+        if messages := self._messages.handed_over():
             note["messages"] = messages
-        if news := self._texts.since(self._told):
-            note["texts"] = news
+        if news := self._strings.since(self._told):
+            note["strings"] = news
         self._channel.outgoing[:] = self._outputs
         self._channel.send(note or None)
         return not note.get("fatal")

@@ -24,13 +24,12 @@ from uuid import uuid4
 
 import numpy as np
 
-from orchestrator.machine.atomic import write_whole
+from orchestrator.machine.atomic import sealed, unsealed, write_whole
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.ledger import moved_aside
-from orchestrator.machine.sealed import sealed, unsealed
 from orchestrator.master.fmi.log import Log
 from orchestrator.master.hooks.hook import NEVER, Lasting, Run
-from orchestrator.master.hooks.row_log import Spool, begins
+from orchestrator.master.hooks.row_log import RowLog, begins
 from orchestrator.master.identity import Identity
 from orchestrator.master.observers.observer import Ending, Header, NotKept
 from orchestrator.system.structure import System
@@ -81,9 +80,9 @@ def check_gives_states(system: System) -> None:
 
 
 class Checkpoints:
-    """An observer and attendant that writes checkpoints, and begins with the one that it finds.
+    """An observer and hook that writes checkpoints, and begins with the one that it finds.
 
-    As an attendant it comes first: what others do at the same time belongs to what follows.
+    As a hook it comes first: what others do at the same time belongs to what follows.
 
     Attributes:
         folder: of the checkpoint.
@@ -167,14 +166,14 @@ class Checkpoints:
             self._known = found.made + 1
         digest = "" if found is None else found.rows
         rows = self.folder / _ROWS
-        self._spool = Spool(rows, self._identity, len(self._columns), self._known, digest)
+        self._row_log = RowLog(rows, self._identity, len(self._columns), self._known, digest)
 
     def take(self, rows: np.ndarray) -> None:
         """Write some rows, but for those that are told again."""
         again = min(self._known, len(rows))
         self._known -= again
         new = rows[again:]
-        if (different := self._spool.append(new)) and self._log is not None:
+        if (different := self._row_log.append(new)) and self._log is not None:
             row, column = different
             self._log.remark(
                 f"{self._columns[column]} is not what it was at t = {new[row, 0]:g} s before the "
@@ -183,9 +182,9 @@ class Checkpoints:
 
     def end(self, ending: Ending) -> None:
         """Close the file of rows."""
-        self._spool.close()
+        self._row_log.close()
 
-    def attend(self, run: Run) -> int:
+    def act(self, run: Run) -> int:
         """Write a checkpoint, or begin with one."""
         self._log = run.log
         found, self._found = self._found, None
@@ -219,7 +218,7 @@ class Checkpoints:
                 dict(self._run),
                 run.time,
                 run.made,
-                self._spool.to_disk(),
+                self._row_log.to_disk(),
                 run.row.values.tolist(),
                 {
                     name: b64encode(instance.state()).decode()
@@ -244,7 +243,7 @@ class Checkpoints:
         for one, state in zip(_lasting(run), found.lasting, strict=True):
             one.restore(state)
         first = 1  # which was computed anew
-        for rows in self._spool.kept():
+        for rows in self._row_log.kept():
             run.blocks.tell(rows[first:])
             run.made += len(rows) - first
             if run.interrupts:
@@ -256,8 +255,8 @@ class Checkpoints:
 
 
 def _lasting(run: Run) -> list[Lasting]:
-    attendants = [one for one in run.attendants if isinstance(one, Lasting)]
-    return [run.row.texts, run.signals, run.log, *attendants]
+    hooks = [one for one in run.hooks if isinstance(one, Lasting)]
+    return [run.row.strings, run.overrides, run.log, *hooks]
 
 
 def interval_in(folder: Path) -> float | None:

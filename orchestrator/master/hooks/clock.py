@@ -71,7 +71,7 @@ def check_factor(factor: float) -> None:
 
 
 class RealTime:
-    """An attendant that makes a run wait for a clock, and measures by how much it is late.
+    """A hook that makes a run wait for a clock, and measures by how much it is late.
 
     A run that is late makes up for it as fast as it can: times are those of one clock, from the
     first step on.
@@ -88,7 +88,7 @@ class RealTime:
         self.lateness = Lateness()
         self._origin: float | None = None
 
-    def attend(self, run: Run) -> int:
+    def act(self, run: Run) -> int:
         """Wait until the clock has come to the time of the run."""
         now = monotonic()
         if self._origin is None:

@@ -56,13 +56,13 @@ class Layer(NamedTuple):
 
     Attributes:
         event: its number; that of what was there before any is :data:`_GROUND`.
-        kind: a key of :data:`_KINDS`.
-        value: of that kind.
+        effect: a key of :data:`_EFFECTS`.
+        value: that goes with it.
 
     """
 
     event: int
-    kind: str
+    effect: str
     value: Any
 
 
@@ -79,11 +79,11 @@ def _tune(run: Run, target: PortName, value: Value) -> None:
         )
 
 
-_KINDS: Mapping[str, Callable[[Run, PortName, Any], None]] = {
-    "override": lambda run, target, value: run.signals.override(target, value),
-    "bias": lambda run, target, value: run.signals.bias(target, value),
-    "release": lambda run, target, _: run.signals.release(target),
-    "supply": lambda run, target, value: run.signals.supply(target, value),
+_EFFECTS: Mapping[str, Callable[[Run, PortName, Any], None]] = {
+    "override": lambda run, target, value: run.overrides.override(target, value),
+    "bias": lambda run, target, value: run.overrides.bias(target, value),
+    "release": lambda run, target, _: run.overrides.release(target),
+    "supply": lambda run, target, value: run.overrides.supply(target, value),
     "tune": _tune,
 }
 
@@ -100,31 +100,31 @@ class Layers:
 
     def put(self, run: Run, target: PortName, layer: Layer) -> None:
         """Lay something upon whatever acts at a place."""
-        place = target, layer.kind in _SETTING
+        place = target, layer.effect in _SETTING
         layers = self._at.setdefault(place, [])
         if not layers:
-            layers.append(_ground(run, target, layer.kind))
+            layers.append(_ground(run, target, layer.effect))
         layers[:] = [other for other in layers if other.event != layer.event] + [layer]
-        _KINDS[layer.kind](run, target, layer.value)
+        _EFFECTS[layer.effect](run, target, layer.value)
 
     def take(self, run: Run, event: int) -> None:
         """Take away what an event does."""
         for (target, _), layers in self._at.items():
             if layers[-1].event == event:
-                _KINDS[layers[-2].kind](run, target, layers[-2].value)
+                _EFFECTS[layers[-2].effect](run, target, layers[-2].value)
             layers[:] = [layer for layer in layers if layer.event != event]
 
     def release(self, run: Run, target: PortName) -> None:
         """Take away all that alters a signal."""
         if self._at.pop((target, False), None):
-            run.signals.release(target)
+            run.overrides.release(target)
 
     def tuned(self, component: str) -> dict[str, Value]:
         """Values that events have given to parameters of a component."""
         return {
             target.port: layers[-1].value
             for (target, _), layers in self._at.items()
-            if target.component == component and layers[-1].kind == "tune"
+            if target.component == component and layers[-1].effect == "tune"
         }
 
     def state(self) -> list[Any]:
@@ -141,14 +141,14 @@ class Layers:
         }
 
 
-def _ground(run: Run, target: PortName, kind: str) -> Layer:
+def _ground(run: Run, target: PortName, effect: str) -> Layer:
     """What there is where no event acts."""
-    if kind == "tune":
+    if effect == "tune":
         return Layer(
-            _GROUND, kind, run.instances[target.component].read([target.port])[target.port]
+            _GROUND, effect, run.instances[target.component].read([target.port])[target.port]
         )
-    if kind == "supply":
-        return Layer(_GROUND, kind, run.signals.supplied(target))
+    if effect == "supply":
+        return Layer(_GROUND, effect, run.overrides.supplied(target))
     return Layer(_GROUND, "release", None)
 
 
@@ -171,18 +171,18 @@ class Alter:
     """Override or bias inputs.
 
     Attributes:
-        kind: `override` or `bias`.
+        effect: `override` or `bias`.
         values: for each input.
 
     """
 
-    kind: str
+    effect: str
     values: tuple[tuple[PortName, float], ...]
 
     def act(self, run: Run, event: int, layers: Layers) -> None:
         """Do it."""
         for target, value in self.values:
-            layers.put(run, target, Layer(event, self.kind, value))
+            layers.put(run, target, Layer(event, self.effect, value))
 
 
 @dataclass(frozen=True)
@@ -238,7 +238,7 @@ class Reset:
             values = {**run.system.parameters_of(name), **layers.tuned(name)}
             instance.reset()
             instance.enter_initialization(values, run.time)
-            run.signals.refresh(name)
+            run.overrides.refresh(name)
             instance.exchange()
             instance.exit_initialization()
             instance.exchange()
@@ -285,7 +285,7 @@ class Event:
 
 
 @dataclass
-class _Course:
+class _Progress:
     """How far an event has come.
 
     Attributes:
@@ -303,23 +303,23 @@ class _Course:
 
 
 class Events:
-    """An attendant that has events happen."""
+    """A hook that has events happen."""
 
     def __init__(self, events: Sequence[Event]) -> None:
         """Take events, in the order in which they act at the same time."""
         self._events = events
-        self._courses = [_Course() for _ in events]
+        self._progress = [_Progress() for _ in events]
         self._layers = Layers()
         self._happened: list[Occurrence] = []
 
-    def attend(self, run: Run) -> int:
+    def act(self, run: Run) -> int:
         """End what ends now, then begin what begins now."""
         run.happened = self._happened
         if run.made >= run.experiment.rows - 1:
             # No step follows.
             return NEVER
-        for number, course in enumerate(self._courses):
-            if course.end <= run.made:
+        for number, progress_of in enumerate(self._progress):
+            if progress_of.end <= run.made:
                 self._end(run, number)
         for number in range(len(self._events)):
             if self._begins(run, number):
@@ -328,53 +328,53 @@ class Events:
 
     def state(self) -> Any:
         """How far they have come, as JSON has it."""
-        courses = [tuple(vars(course).values()) for course in self._courses]
-        return courses, self._layers.state(), self._happened
+        progress = [tuple(vars(progress_of).values()) for progress_of in self._progress]
+        return progress, self._layers.state(), self._happened
 
     def restore(self, state: Any) -> None:
         """Be as far again."""
-        courses, layers, happened = state
-        self._courses = [_Course(*course) for course in courses]
+        progress, layers, happened = state
+        self._progress = [_Progress(*progress_of) for progress_of in progress]
         self._layers.restore(layers)
         self._happened = [Occurrence(*one) for one in happened]
 
     def _begins(self, run: Run, number: int) -> bool:
-        event, course = self._events[number], self._courses[number]
+        event, progress_of = self._events[number], self._progress[number]
         if not self._waits(number):
             return False
         if event.when is None:
             return _due(run, event) <= run.made
-        was_true, course.was_true = course.was_true, event.when.holds(run.row)
-        return course.was_true and not was_true
+        was_true, progress_of.was_true = progress_of.was_true, event.when.holds(run.row)
+        return progress_of.was_true and not was_true
 
     def _waits(self, number: int) -> bool:
-        return self._events[number].repeat or not self._courses[number].happened
+        return self._events[number].repeat or not self._progress[number].happened
 
     def _begin(self, run: Run, number: int) -> None:
-        event, course = self._events[number], self._courses[number]
-        course.happened = True
+        event, progress_of = self._events[number], self._progress[number]
+        progress_of.happened = True
         self._say(run, number, event.text, event.label)
         event.action.act(run, number, self._layers)
         if event.lasts is not None:
-            course.end = max(run.experiment.reaching(run.time + event.lasts), run.made + 1)
+            progress_of.end = max(run.experiment.reaching(run.time + event.lasts), run.made + 1)
 
     def _end(self, run: Run, number: int) -> None:
-        self._courses[number].end = NEVER
+        self._progress[number].end = NEVER
         self._layers.take(run, number)
         self._say(run, number, f"{self._events[number].text}, ended")
 
     def _say(self, run: Run, number: int, text: str, label: str = "") -> None:
-        course = self._courses[number]
-        course.listed += 1
-        if course.listed == _MOST_LISTED:
+        progress_of = self._progress[number]
+        progress_of.listed += 1
+        if progress_of.listed == _MOST_LISTED:
             text += "; when it happens again is not listed"
-        if course.listed <= _MOST_LISTED:
+        if progress_of.listed <= _MOST_LISTED:
             self._happened.append(Occurrence(run.time, text, label, number))
 
     def _next(self, run: Run, number: int) -> int:
         """After how many steps something is to be done about an event."""
         begin = _due(run, self._events[number]) if self._waits(number) else NEVER
-        return min(begin, self._courses[number].end)
+        return min(begin, self._progress[number].end)
 
 
 def _due(run: Run, event: Event) -> int:

@@ -1,4 +1,4 @@
-"""Who acts on a run between two of its steps, and what there is to act on."""
+"""What acts on a run between two of its steps, and what there is to act on."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from orchestrator.machine.interrupts import Interrupts
 from orchestrator.master.experiment import MOST_STEPS, Experiment
 from orchestrator.master.fmi.instance import Instance
 from orchestrator.master.fmi.log import Log
-from orchestrator.master.gathering import Signals
+from orchestrator.master.gathering import Overrides
 from orchestrator.master.observers.observer import Blocks, Occurrence
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import Stage
@@ -32,10 +32,10 @@ class Run:
         signals: what is done to values on their way from outputs to inputs.
         blocks: take the rows.
         log: of what the FMUs say.
-        interrupts: signals to stop that have come; whoever waits for something looks there.
-        attendants: who acts on it.
+        interrupts: signals to stop that have come; a hook that waits looks there.
+        hooks: what acts on it.
         made: how many steps have been made.
-        due: after how many somebody acts on it: every loop looks up there.
+        due: after how many a hook acts on it: every loop stops there.
         happened: events, in their order.
 
     """
@@ -45,11 +45,11 @@ class Run:
     instances: Mapping[str, Instance]
     row: Row
     stages: Sequence[Stage]
-    signals: Signals
+    overrides: Overrides
     blocks: Blocks
     log: Log
     interrupts: Interrupts
-    attendants: Sequence[Attendant] = ()
+    hooks: Sequence[Hook] = ()
     made: int = 0
     due: int = NEVER
     happened: list[Occurrence] = field(default_factory=list)
@@ -60,10 +60,10 @@ class Run:
         return self.experiment.time(self.made)
 
 
-class Attendant(Protocol):
-    """Somebody who acts on a run between two of its steps: an event, a checkpoint, a clock."""
+class Hook(Protocol):
+    """Acts on a run between two of its steps: events, a checkpoint, a clock."""
 
-    def attend(self, run: Run) -> int:
+    def act(self, run: Run) -> int:
         """Act after :attr:`Run.made` steps, for the first time before any.
 
         Where a run is resumed, the first call comes after the steps that were made before, whether
@@ -83,7 +83,7 @@ class Attendant(Protocol):
 class Lasting(Protocol):
     """What a run that is resumed has to know again of an earlier process.
 
-    An attendant that is one remembers by itself what it has done, and what is still to be done.
+    A hook that is one remembers by itself what it has done, and what is still to be done.
     """
 
     def state(self) -> Any:
@@ -93,18 +93,18 @@ class Lasting(Protocol):
         """Know it again."""
 
 
-class Attendance:
-    """Calls attendants when their time has come."""
+class Hooks:
+    """Calls hooks when their time has come."""
 
     def __init__(self, run: Run) -> None:
-        """Call all attendants of a run first before any step, in their order."""
+        """Call all hooks of a run first before any step, in their order."""
         self._run = run
-        self._next = dict.fromkeys(run.attendants, 0)
+        self._next = dict.fromkeys(run.hooks, 0)
 
-    def attend(self) -> None:
+    def act(self) -> None:
         """Call those whose time has come, and let the run go on until the next one's."""
         run = self._run
-        for attendant, due in self._next.items():
+        for hook, due in self._next.items():
             if due <= run.made:
-                self._next[attendant] = attendant.attend(run)
+                self._next[hook] = hook.act(run)
         run.due = min(self._next.values(), default=NEVER)

@@ -13,7 +13,7 @@ from orchestrator.system.names import PortName
 
 
 @dataclass(frozen=True)
-class Course:
+class InputTable:
     """Values of some inputs over time.
 
     Attributes:
@@ -58,24 +58,24 @@ class Course:
 
 
 class Playback:
-    """An attendant that supplies inputs with what they have at the beginning of each step.
+    """A hook that supplies inputs with what they have at the beginning of each step.
 
     Before the first time they have its values, after the last those of the last.
     """
 
-    def __init__(self, course: Course) -> None:
+    def __init__(self, input_table: InputTable) -> None:
         """Follow a course."""
-        self._course = course
+        self._course = input_table
         self._steps = np.empty(0, dtype=int)
 
-    def attend(self, run: Run) -> int:
+    def act(self, run: Run) -> int:
         """Supply the values of now."""
-        course = self._course
+        input_table = self._course
         if not len(self._steps):
-            self._steps = np.array([run.experiment.reaching(time) for time in course.times])
+            self._steps = np.array([run.experiment.reaching(time) for time in input_table.times])
         row = int(np.searchsorted(self._steps, run.made, side="right")) - 1
-        for target, value in zip(course.targets, course.at(run.time, row), strict=True):
-            run.signals.supply(target, float(value))
+        for target, value in zip(input_table.targets, input_table.at(run.time, row), strict=True):
+            run.overrides.supply(target, float(value))
         if row + 1 == len(self._steps):
             return NEVER
-        return run.made + 1 if course.linear.any() else int(self._steps[row + 1])
+        return run.made + 1 if input_table.linear.any() else int(self._steps[row + 1])

@@ -38,7 +38,7 @@ def _head(identity: str) -> bytes:
     return (_TITLE + identity.encode()).ljust(_BEGIN - 1) + b"\n"
 
 
-class Spool:
+class RowLog:
     """A file of rows, number after number, without anything between them.
 
     Rows that are there after those that count are compared with what comes in their place.

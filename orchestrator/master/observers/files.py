@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.reading import lines_of
+from orchestrator.machine.user_files import lines_of
 from orchestrator.master.observers.observer import Ending, Header
 
 #: Rows that are written to Parquet, or read, at once.
@@ -136,14 +136,14 @@ class CsvFile:
     def begin(self, header: Header) -> None:
         """Write the names of the columns."""
         self._lines = CsvLines(self._path, ("time", *header.columns))
-        self._texts = header.text_places()
+        self._strings = header.text_places()
 
     def take(self, rows: np.ndarray) -> None:
         """Write some rows."""
         lines = rows.tolist()
-        for place, texts in self._texts:
+        for place, strings in self._strings:
             for line in lines:
-                line[place] = texts.text(line[place])
+                line[place] = strings.text(line[place])
         self._lines.write(lines)
 
     def end(self, ending: Ending) -> None:
@@ -171,9 +171,9 @@ class ParquetFile:
     def begin(self, header: Header) -> None:
         """Make the file and its schema."""
         self._arrow: Any = import_module("pyarrow")
-        self._texts = header.text_places()
+        self._strings = header.text_places()
         kinds = [self._arrow.float64()] * (1 + len(header.columns))
-        for place, _ in self._texts:
+        for place, _ in self._strings:
             kinds[place] = self._arrow.string()
         self._schema = self._arrow.schema(list(zip(("time", *header.columns), kinds, strict=True)))
         self._output = _Output(self._path)
@@ -203,8 +203,8 @@ class ParquetFile:
 
     def _write(self, rows: np.ndarray) -> None:
         columns = [self._arrow.array(column) for column in rows.T]
-        for place, texts in self._texts:
-            columns[place] = self._arrow.array([texts.text(number) for number in rows[:, place]])
+        for place, strings in self._strings:
+            columns[place] = self._arrow.array([strings.text(number) for number in rows[:, place]])
         self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))
         self._n += 1
 
@@ -242,7 +242,7 @@ def read_columns(path: Path) -> tuple[str, ...]:
             return _behind_time(next(csv.reader(lines), ()))
 
 
-def read_rows(path: Path, texts: Collection[str] = ()) -> Iterator[np.ndarray]:
+def read_rows(path: Path, strings: Collection[str] = ()) -> Iterator[np.ndarray]:
     """The rows of a file, time first, some thousand at a time.
 
     Args:
@@ -256,14 +256,14 @@ def read_rows(path: Path, texts: Collection[str] = ()) -> Iterator[np.ndarray]:
     with _explained(path):
         if path.suffix == ".parquet":
             with _parquet(path) as file:
-                names = [name for name in file.schema_arrow.names if name not in texts]
+                names = [name for name in file.schema_arrow.names if name not in strings]
                 for batch in file.iter_batches(_ROWS, columns=names):
                     columns = [column.to_numpy(zero_copy_only=False) for column in batch.columns]
                     yield np.column_stack(columns).astype(float, copy=False)
-        elif texts:
+        elif strings:
             with lines_of(path, newline="") as lines:
                 table = csv.reader(lines)
-                kept = [name not in texts for name in next(table, ())]
+                kept = [name not in strings for name in next(table, ())]
                 while records := list(islice(filter(None, table), _ROWS)):
                     if any(len(record) != len(kept) for record in records):
                         raise ValueError(f"a row has not {len(kept)} values, as there are names")

@@ -15,10 +15,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from orchestrator.machine.errors import unforeseen
-from orchestrator.master import stepper_types as layout
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.fmi.string_table import Texts
+from orchestrator.master.stepper_types import CBlock
 from orchestrator.system.names import PortName
+from orchestrator.system.values import StringTable
 
 #: Rows in a block, and the longest time until observers are told of them [s].
 _ROWS, _PATIENCE = 512, 0.2
@@ -41,12 +41,12 @@ class Header:
     experiment: Experiment
     parameters: Mapping[PortName, Any] = field(default_factory=dict)
     loop: str = field(default="python", compare=False)
-    texts: Mapping[str, Texts] = field(default_factory=dict, compare=False)
+    strings: Mapping[str, StringTable] = field(default_factory=dict, compare=False)
 
-    def text_places(self) -> list[tuple[int, Texts]]:
+    def text_places(self) -> list[tuple[int, StringTable]]:
         """Where numbers of texts stand in a row, time first, and whose they are."""
         names = enumerate(self.columns, start=1)
-        return [(i, self.texts[name]) for i, name in names if name in self.texts]
+        return [(i, self.strings[name]) for i, name in names if name in self.strings]
 
 
 class Occurrence(NamedTuple):
@@ -133,7 +133,7 @@ class Blocks:
         """
         self._rows = np.empty((_ROWS, 1 + width))
         self._times, self._values = self._rows[:, 0], self._rows[:, 1:]
-        self.block = layout.Block(self._rows.ctypes.data, _ROWS)
+        self.block = CBlock(self._rows.ctypes.data, _ROWS)
         self.due = monotonic() + _PATIENCE
         self._observers, self._ours = observers, ours
 

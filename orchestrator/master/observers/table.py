@@ -94,9 +94,9 @@ class Table:
         if column not in self._index:
             raise KeyError(f"no column {column!r}{did_you_mean(str(column), self._index)}")
         values = self.rows[:, self._index[column]]
-        if column not in self.header.texts:
+        if column not in self.header.strings:
             return values
-        return np.array([self.header.texts[column].text(number) for number in values])
+        return np.array([self.header.strings[column].text(number) for number in values])
 
     @property
     def rows(self) -> np.ndarray:

@@ -19,7 +19,9 @@ from auv_fmu.euler import LARGEST_STATE
 from auv_fmu.output_feedback import Gains
 from auv_fmu.types import Vector3, Vector6
 from auv_fmu.vectors import difference
-from orchestrator.analysis.signals import (
+from orchestrator.studies.batch.accumulator import RowSignals, StepSignals, take_row, take_step
+from orchestrator.studies.batch.numbers import flat, nought, square
+from orchestrator.vehicle.signals import (
     APPLIED,
     AXES,
     COMMANDED,
@@ -33,8 +35,6 @@ from orchestrator.analysis.signals import (
     THETA_HAT,
     Y_D,
 )
-from orchestrator.studies.batch.accumulator import RowSignals, StepSignals, take_row, take_step
-from orchestrator.studies.batch.numbers import flat, nought, square
 
 #: The controller's part of the loop: whoever compiles this module for another one puts it here.
 law: Law = LAWS[Gains]

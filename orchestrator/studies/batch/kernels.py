@@ -14,12 +14,12 @@ from typing import Any
 
 from auv_fmu.closed_loop import LAWS, Law, Moment
 from orchestrator.machine.cache import keep, kept
-from orchestrator.machine.imports import imported_apart
+from orchestrator.machine.children import imported_apart
 from orchestrator.master.identity import code_of
 from orchestrator.studies.batch import kernel
 
 #: What it is in the user's cache folder.
-_KIND = "batch"
+_CATEGORY = "batch"
 
 
 @cache
@@ -63,7 +63,7 @@ class _Kept:
 
         target.refresh()
         rebuild: Any = CompileResult._rebuild
-        for content in kept(_KIND, self._key(signature, target.codegen())).values():
+        for content in kept(_CATEGORY, self._key(signature, target.codegen())).values():
             return rebuild(target, *pickle.loads(content))
         return None
 
@@ -75,8 +75,8 @@ class _Kept:
         key = self._key(signature, result.codegen)
         # What cannot be kept is compiled again.
         with suppress(OSError):
-            if not kept(_KIND, key):
-                keep(_KIND, key, {"kernel": dumps(result._reduce())})
+            if not kept(_CATEGORY, key):
+                keep(_CATEGORY, key, {"kernel": dumps(result._reduce())})
 
     def _key(self, signature: Any, codegen: Any) -> str:
         import numba  # noqa: PLC0415

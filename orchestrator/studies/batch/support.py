@@ -15,13 +15,13 @@ from fmus.observer_controller import ports as observer_controller
 from fmus.pd_controller import ports as pd_controller
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, Port, Refusal
-from orchestrator.analysis.signals import AXES
-from orchestrator.errors import InputError
-from orchestrator.experiments.wiring import closed_loop
+from orchestrator.machine.errors import InputError
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.values import Value
+from orchestrator.vehicle.signals import AXES
 
 #: Where a value lies: fields, and places in tuples.
 Place = tuple[str | int, ...]

@@ -1,7 +1,7 @@
 """Figures of a study, from its runs: a study file says which."""
 
-from orchestrator.studies.figures.drawing import draw_figures, figure_files
-from orchestrator.studies.figures.entries import Plan, read_figures
-from orchestrator.studies.figures.values import Columns
+from orchestrator.studies.figures.figure_entries import FigureEntry, read_figures
+from orchestrator.studies.figures.study_data import Columns
+from orchestrator.studies.figures.study_drawing import draw_figures, figure_files
 
-__all__ = ["Columns", "Plan", "draw_figures", "figure_files", "read_figures"]
+__all__ = ["Columns", "FigureEntry", "draw_figures", "figure_files", "read_figures"]

@@ -6,7 +6,7 @@ from zipfile import ZipFile
 import pytest
 
 from orchestrator.formats.examination import examine, surprises
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings
 
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="Odd" guid="odd">

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from orchestrator.machine.atomic import sealed, unsealed
 from orchestrator.machine.ledger import LEDGER, Ledger, Taken, is_changed, moved_aside
-from orchestrator.machine.sealed import sealed, unsealed
 from orchestrator.system.names import file_name
 from support.machine import contents
 

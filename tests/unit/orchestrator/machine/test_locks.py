@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.machine import locks as leftovers
+from orchestrator.machine import locks
+from orchestrator.machine.atomic import sealed
 from orchestrator.machine.locks import claimed, process_folder
-from orchestrator.machine.sealed import sealed
 from support.machine import contents, ended, eventually, forked
 
 
@@ -46,20 +46,20 @@ def test_folders_that_no_process_has_made_stay(tmp_path: Path, monkeypatch):
     (tmp_path / "auvfmu-planted").symlink_to(precious)
     (precious / ".auv-fmu.json").write_text(marker("auvfmu-planted"))
     before = contents(tmp_path)
-    leftovers._remove_left()
+    locks._remove_left()
     assert contents(tmp_path) == before
     (tmp_path / "auvfmu-copied" / ".auv-fmu.json").write_text(marker("auvfmu-copied"))
-    leftovers._remove_left()
+    locks._remove_left()
     assert not (tmp_path / "auvfmu-copied").exists()
 
 
 def test_temporary_folders_of_killed_processes_go_with_the_next(tmp_path: Path, monkeypatch):
     # Held, or a fork that forgets it would remove that of this process.
-    own = leftovers._process_folder()
+    own = locks._process_folder()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
     def work() -> None:
-        leftovers._process_folder.cache_clear()
+        locks._process_folder.cache_clear()
         (process_folder() / "unpacked").touch()
         os.kill(os.getpid(), signal.SIGKILL)
 

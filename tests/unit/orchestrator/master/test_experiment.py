@@ -12,8 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from orchestrator.machine.errors import InputError
-from orchestrator.master.decimation import paces
-from orchestrator.master.experiment import MOST_STEPS, Experiment
+from orchestrator.master.experiment import MOST_STEPS, Experiment, decimations
 from orchestrator.runs.preparation import load
 
 
@@ -101,7 +100,7 @@ def test_an_unknown_order_is_refused():
 def test_a_step_of_a_component_may_be_beyond_all_multiples():
     system = replace(load("fig4", "native"), steps={"plant": 1e308})
     with pytest.raises(InputError, match=r"steps of 1e\+308 s, which are no multiple"):
-        paces(system, 0.02)
+        decimations(system, 0.02)
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.master.gathering import Gathering, Signals
+from orchestrator.master.gathering import Gathering, Overrides
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection
-from orchestrator.system.transformation import Linear, Mapped
+from orchestrator.system.units import Linear, Mapped
 
 OUT, FED, ALSO, FREE = (PortName("a", name) for name in ("out", "fed", "also", "free"))
 
@@ -31,7 +31,7 @@ def made(out: float, free: float = 7.0, transformation=None):
     row = Row(out, free)
     connections = tuple(Connection(OUT, target, transformation) for target in (FED, ALSO))
     gather = Gathering.along(row, connections)
-    signals = Signals(row, [gather], connections)
+    signals = Overrides(row, [gather], connections)
     gather(row.values)
     return row, gather, signals
 

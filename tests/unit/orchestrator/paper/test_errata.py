@@ -17,8 +17,7 @@ from auv_fmu.pd import PdGains
 from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
 from auv_fmu.vehicle import Vehicle, accelerations
 from orchestrator.paper.errata import errata, errata_page, of_the_paper, section
-from orchestrator.paper.measures import sum_without_step
-from orchestrator.paper.published import EFFORT_PD, EFFORT_PROPOSED, TURNING_RADIUS
+from orchestrator.paper.measures import EFFORT_PD, EFFORT_PROPOSED, TURNING_RADIUS, sum_without_step
 from orchestrator.runs.wiring import closed_loop as loop_of
 from orchestrator.vehicle import gains
 

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.machine.errors import InputError
-from orchestrator.system.transformation import Linear, Mapped, chained
-from orchestrator.system.units import UndefinedUnit, Unit, conversion
+from orchestrator.system.units import Linear, Mapped, UndefinedUnit, Unit, chained, conversion
 
 LENGTH, TEMPERATURE = (0, 1, 0, 0, 0, 0, 0, 0), (0, 0, 0, 0, 1, 0, 0, 0)
 M, INCH = Unit("m", LENGTH), Unit("inch", LENGTH, 0.0254)

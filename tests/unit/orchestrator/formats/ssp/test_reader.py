@@ -12,10 +12,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from orchestrator.formats.ssp.reader import read_ssp
-from orchestrator.machine.errors import InputError
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings, InputError
 from orchestrator.system.structure import System
-from orchestrator.system.transformation import Linear, Mapped
+from orchestrator.system.units import Linear, Mapped
 from support.archives import (
     archive,
     binding,
@@ -75,8 +74,8 @@ def read(files: dict[str, Path], tmp_path: Path) -> Read:
     return reader
 
 
-def wires(found: System) -> dict[str, str]:
-    return {str(wire.target): str(wire.source) for wire in found.connections}
+def routes(found: System) -> dict[str, str]:
+    return {str(segment.target): str(segment.source) for segment in found.connections}
 
 
 def parameters(found: System) -> dict[str, object]:
@@ -117,7 +116,7 @@ def test_connections_are_followed_through_systems_of_any_depth(read: Read):
         )
     )  # fmt: skip
     assert list(found.components) == ["middle.inner.c", "middle.d", "a", "b"]
-    assert wires(found) == {
+    assert routes(found) == {
         "middle.inner.c.u": "a.y",
         "middle.d.u": "middle.inner.c.y",
         "b.u": "middle.d.y",
@@ -128,13 +127,13 @@ def test_connections_are_followed_through_systems_of_any_depth(read: Read):
 def test_connection_may_be_written_from_either_end(read: Read):
     inner = system(component("c"), connection("c.u", "u"), connector("u", "input"), name="inner")
     found = read(system(inner + component("a"), connection("inner.u", "a.y")))
-    assert wires(found) == {"inner.c.u": "a.y"}
+    assert routes(found) == {"inner.c.u": "a.y"}
 
 
 def test_empty_name_of_an_element_is_the_system_itself(read: Read):
     text = connection("y", "b.u").replace("<ssd:Connection ", '<ssd:Connection startElement="" ')
     inner = system(component("b"), text, connector("y", "input"), name="inner")
-    assert wires(read(system(inner + component("a"), connection("a.y", "inner.y")))) == {
+    assert routes(read(system(inner + component("a"), connection("a.y", "inner.y")))) == {
         "inner.b.u": "a.y"
     }
 
@@ -155,7 +154,7 @@ def test_signal_dictionary_passes_its_signals_on(read: Read):
             more=dictionary,
         )
     )  # fmt: skip
-    assert wires(found) == {"inner.b.u": "a.y"}
+    assert routes(found) == {"inner.b.u": "a.y"}
 
 
 LENGTHS = {"m": 1.0, "mm": 1e-3, "km": 1e3}
@@ -202,8 +201,8 @@ def test_units_and_transformations_along_a_way_are_those_of_each_hop(read: Read,
         )  # fmt: skip
         name = f"s{depth}"
     top = system(component("a", f"{source}.fmu") + inside, connection("a.y", f"{name}.u", texts[0]))
-    [wire] = read(top).connections
-    arrived = 7.0 if wire.transformation is None else wire.transformation(7.0)
+    [segment] = read(top).connections
+    arrived = 7.0 if segment.transformation is None else segment.transformation(7.0)
     assert arrived == pytest.approx(value, rel=1e-12, abs=1e-9)
 
 
@@ -217,9 +216,9 @@ def test_a_value_that_nothing_changes_arrives_bit_for_bit(read: Read):
 
 def test_temperature_is_shifted_and_scaled(read: Read):
     top = system(component("a", "degC.fmu") + component("b", "K.fmu"), connection("a.y", "b.u"))
-    [wire] = read(top).connections
-    assert isinstance(wire.transformation, Linear)
-    assert wire.transformation(20.0) == pytest.approx(293.15, rel=1e-15)
+    [segment] = read(top).connections
+    assert isinstance(segment.transformation, Linear)
+    assert segment.transformation(20.0) == pytest.approx(293.15, rel=1e-15)
 
 
 def test_suppressed_conversion_leaves_the_number_as_it_is(read: Read):
@@ -227,9 +226,9 @@ def test_suppressed_conversion_leaves_the_number_as_it_is(read: Read):
     double = '<ssc:LinearTransformation factor="2"/>'
     for inside, expected in (("", 7.0), (double, 14.0)):
         top = system(elements, connection("a.y", "b.u", inside, suppressUnitConversion="true"))
-        [wire] = read(top).connections
-        assert wire.transformation is not None
-        assert wire.transformation(7.0) == expected
+        [segment] = read(top).connections
+        assert segment.transformation is not None
+        assert segment.transformation(7.0) == expected
 
 
 @pytest.mark.parametrize(
@@ -246,11 +245,11 @@ def test_suppressed_conversion_leaves_the_number_as_it_is(read: Read):
 )  # fmt: skip
 def test_tables_of_values_become_numbers(read: Read, kind: str, text: str, pairs: set):
     top = system(component("a") + component("b"), connection(f"a.{kind}.out", f"b.{kind}.in", text))
-    [wire] = read(top).connections
-    assert isinstance(wire.transformation, Mapped)
-    assert set(wire.transformation.pairs) == pairs
+    [segment] = read(top).connections
+    assert isinstance(segment.transformation, Mapped)
+    assert set(segment.transformation.pairs) == pairs
     # The standard leaves values alone that stand in no entry.
-    assert wire.transformation(17.0) == 17.0
+    assert segment.transformation(17.0) == 17.0
 
 
 @pytest.mark.parametrize("kind", ["Real", "Integer", "Boolean", "String", "Enumeration"])
@@ -266,7 +265,7 @@ def test_ports_of_all_kinds_are_connected_and_set(read: Read, kind: str):
             connection(f"a.{kind}.out", f"b.{kind}.in"),
         )
     )
-    assert wires(found) == {f"b.{kind}.in": f"a.{kind}.out"}
+    assert routes(found) == {f"b.{kind}.in": f"a.{kind}.out"}
     assert parameters(found) == {f"b.{kind}.k": value}
 
 

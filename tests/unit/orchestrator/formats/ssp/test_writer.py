@@ -16,8 +16,7 @@ from orchestrator.formats.osp import write_osp
 from orchestrator.formats.ssp import OMS
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import write_ssp
-from orchestrator.machine.errors import InputError
-from orchestrator.machine.findings import Findings
+from orchestrator.machine.errors import Findings, InputError
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName, plain
 from orchestrator.system.structure import System

@@ -18,13 +18,14 @@ from hypothesis import strategies as st
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.interrupts import Interrupts
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.fmi import placement as placing
+from orchestrator.master.fmi import placement
 from orchestrator.master.fmi.channel import LONGEST_NOTE, Channel, sizes
 from orchestrator.master.fmi.isolated import IsolatedInstance, Isolation
 from orchestrator.master.fmi.loaded import loaded
-from orchestrator.master.fmi.log import Letters, Log
+from orchestrator.master.fmi.log import Log, MessageQueue
 from orchestrator.master.fmi.worker import _Served
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.system.component import Component
 from orchestrator.system.structure import System
@@ -75,7 +76,7 @@ def answering(component: Component, channel: Answering) -> Iterator[None]:
     """A thread that serves an FMU."""
 
     def serve() -> None:
-        letters = Letters()
+        letters = MessageQueue()
         with suppress(EOFError, OSError):
             channel.send()
             with loaded(component, letters) as instance:
@@ -108,8 +109,8 @@ def run(system: System, n: int, length: float, outputs: list[float], note: bytes
                 instance.leave()
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(placing, "isolated", isolated)
-        simulate(system, Experiment(0.1 * STEPS, 0.1), [table], Isolation())
+        patch.setattr(placement, "isolated", isolated)
+        simulate(planned(system, Experiment(0.1 * STEPS, 0.1)), [table], Isolation())
     return table
 
 

@@ -41,7 +41,7 @@ class World:
         for cost in [*costs, 0.0]:
             run.time = run.experiment.time(run.made)
             if run.made >= due:
-                due = pace.attend(run)
+                due = pace.act(run)
                 let_go.append(self.now - begun)
             self.now += cost
             run.made += 1
@@ -80,19 +80,19 @@ def test_steps_shorter_than_a_millisecond_are_taken_together(monkeypatch):
     assert len(world.advance(pace, run, [0.0] * 50)) == 1 + 5
     run.made = 45
     run.time = run.experiment.time(45)
-    assert pace.attend(run) == 50
+    assert pace.act(run) == 50
     run.made = 50
-    assert pace.attend(run) == NEVER
+    assert pace.act(run) == NEVER
 
 
 def test_who_stops_a_run_does_not_wait(monkeypatch):
     world, pace = World(monkeypatch), RealTime(1e-3)
     run = world.run(Experiment(1.0, 0.5))
     run.time = 0.0
-    pace.attend(run)
+    pace.act(run)
     run.made, run.time, run.interrupts = 1, 0.5, [2]
     before = world.now
-    pace.attend(run)
+    pace.act(run)
     assert world.now == before
 
 

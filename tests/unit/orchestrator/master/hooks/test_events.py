@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.instance import ComponentFailed, Ended
-from orchestrator.master.gathering import Gathering, Signals
+from orchestrator.master.gathering import Gathering, Overrides
 from orchestrator.master.hooks.events import (
     Alter,
     Condition,
@@ -77,7 +77,7 @@ class Trial:
         self.gather = Gathering.along(self.row, wires)
         self.run = SimpleNamespace(
             row=self.row,
-            signals=Signals(self.row, [self.gather], wires),
+            overrides=Overrides(self.row, [self.gather], wires),
             experiment=EXPERIMENT,
             instances={"a": self.component},
             system=SimpleNamespace(parameters_of=lambda name: {"gain": 1.0, "other": 2.0}),
@@ -92,7 +92,7 @@ class Trial:
         run = self.run
         run.time = EXPERIMENT.time(run.made)
         if self.due <= run.made:
-            self.due = self.events.attend(run)
+            self.due = self.events.act(run)
             assert self.due > run.made
         self.gather(self.row.values)
         seen = (*self.row.values[1:], self.component.gain)
@@ -217,7 +217,7 @@ def test_a_condition_that_chatters_is_not_listed_for_ever():
     run.experiment = Experiment(1e5, 0.5)
     for k in range(5000):
         run.made, run.row.values[0] = k, k % 2
-        events.attend(run)
+        events.act(run)
     assert len(run.happened) == 1000
     assert run.happened[-1].text == "x; when it happens again is not listed"
 
@@ -226,7 +226,7 @@ def test_nothing_is_wanted_where_nothing_can_happen_any_more():
     _, trial = seen([event(override(-1.0), at=1.0), event(bias(1.0), at=99.0)])
     assert trial.due >= STEPS
     trial.run.made = STEPS
-    assert trial.events.attend(trial.run) == NEVER
+    assert trial.events.act(trial.run) == NEVER
 
 
 # Any events

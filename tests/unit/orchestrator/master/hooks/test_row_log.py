@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from orchestrator.machine.errors import InputError
-from orchestrator.master.hooks.row_log import Spool
+from orchestrator.master.hooks.row_log import RowLog
 
 ROWS = np.random.default_rng(1).normal(size=(10_000, 3))
 
@@ -25,11 +25,11 @@ def digest(kept: int) -> str:
 def path(tmp_path: Path) -> Path:
     """A file of all rows, and of a part of one more."""
     path = tmp_path / "rows.bin"
-    spool = Spool(path, ID, 3)
+    row_log = RowLog(path, ID, 3)
     for block in np.split(ROWS, [1, 513, 9000]):
-        assert spool.append(block) is None
-    assert spool.to_disk() == digest(10_000)
-    spool.close()
+        assert row_log.append(block) is None
+    assert row_log.to_disk() == digest(10_000)
+    row_log.close()
     path.write_bytes(path.read_bytes() + b"part")
     return path
 
@@ -40,21 +40,21 @@ def read(path: Path) -> np.ndarray:
 
 @pytest.mark.parametrize("kept", [1, 4096, 4097, 10_000])
 def test_rows_that_count_are_read_again_and_gone_on_with(path: Path, kept: int):
-    spool = Spool(path, ID, 3, kept, digest(kept))
-    assert np.vstack(list(spool.kept())).tobytes() == ROWS[:kept].tobytes()
-    assert spool.append(ROWS[kept:]) is None
-    assert spool.append(ROWS[:5]) is None
-    spool.close()
+    row_log = RowLog(path, ID, 3, kept, digest(kept))
+    assert np.vstack(list(row_log.kept())).tobytes() == ROWS[:kept].tobytes()
+    assert row_log.append(ROWS[kept:]) is None
+    assert row_log.append(ROWS[:5]) is None
+    row_log.close()
     assert read(path).tobytes() == np.vstack((ROWS, ROWS[:5])).tobytes()
 
 
 def test_the_first_number_that_is_another_is_told_once(path: Path):
-    spool = Spool(path, ID, 3, 100, digest(100))
+    row_log = RowLog(path, ID, 3, 100, digest(100))
     changed = ROWS[100:].copy()
     changed[2000, 1] += 1e-12
     changed[2001:] = 0.0
-    told = [spool.append(block) for block in np.array_split(changed, 12)]
-    spool.close()
+    told = [row_log.append(block) for block in np.array_split(changed, 12)]
+    row_log.close()
     size = len(np.array_split(changed, 12)[0])
     assert [one for one in told if one] == [(2000 % size, 1)]
     assert read(path).tobytes() == np.vstack((ROWS[:100], changed)).tobytes()
@@ -62,15 +62,15 @@ def test_the_first_number_that_is_another_is_told_once(path: Path):
 
 def test_zero_is_not_minus_zero(path: Path):
     for value in (0.0, -0.0):
-        spool = Spool(path, ID, 3, 5, digest(5))
-        told = spool.append(np.full((1, 3), value))
-        spool.close()
+        row_log = RowLog(path, ID, 3, 5, digest(5))
+        told = row_log.append(np.full((1, 3), value))
+        row_log.close()
     assert told == (0, 0)
 
 
 def test_fewer_rows_than_count_are_refused(path: Path):
     with pytest.raises(InputError, match="holds fewer than 10,001 rows"):
-        Spool(path, ID, 3, 10_001)
+        RowLog(path, ID, 3, 10_001)
 
 
 @pytest.mark.parametrize("place", [3, 40, 64, 64 + 8 * 3 * 99 + 23])
@@ -79,10 +79,10 @@ def test_what_counts_is_as_it_was(path: Path, place: int):
     content[place] ^= 1
     path.write_bytes(content)
     with pytest.raises(InputError, match="missing, damaged, or not of the checkpoint"):
-        Spool(path, ID, 3, 100, digest(100))
+        RowLog(path, ID, 3, 100, digest(100))
 
 
 def test_a_file_of_the_users_is_not_replaced(tmp_path: Path):
     (tmp_path / "rows.bin").write_text("mine")
     with pytest.raises(FileExistsError):
-        Spool(tmp_path / "rows.bin", ID, 3)
+        RowLog(tmp_path / "rows.bin", ID, 3)

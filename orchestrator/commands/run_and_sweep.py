@@ -1,0 +1,124 @@
+"""Commands that make runs: run one, sweep many."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.commands.options import (
+    add_options,
+    add_out,
+    add_set,
+    add_system,
+    read,
+    request,
+    status,
+    taken,
+)
+from orchestrator.commands.streams import INTERRUPTED, OK, say, show
+from orchestrator.machine.errors import Findings
+from orchestrator.machine.interrupts import Interrupts, held_interrupts
+from orchestrator.runs.preparation import prepare, with_companion
+from orchestrator.runs.request import Request
+from orchestrator.runs.run import Files, run_into
+from orchestrator.studies.study import read_study, ready_studies
+from orchestrator.studies.sweep import Means, folder_of, swept
+from orchestrator.vehicle.metrics import LAST_SECONDS
+
+
+def add_run(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu run`."""
+    add_system(parser)
+    add_options(parser, Request)
+    add_set(parser)
+    add_out(parser, None, "results/SCENARIO/")
+    add_options(parser, Files)
+    parser.set_defaults(action=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    wanted = request(options)
+    runs = with_companion(prepare(*read(options), wanted), wanted)
+    findings = Findings(options.strict)
+    for prepared in runs:
+        for doubt in prepared.doubts():
+            findings.note(f"{prepared.scenario.name}: {doubt}")
+    findings.refuse()
+    for note in findings.notes:
+        say(f"warning: {note}")
+    folder = options.out or Path("results", runs[0].scenario.stem)
+    files = taken(Files, options)
+    # Until all is written: a user who stops a run several times wants to know where its rows are.
+    with held_interrupts(_answer, is_last=True):
+        finished = run_into(folder, runs, files, options.command, say)
+        for run in finished:
+            _print_summary(run.metrics)
+            for note in run.notes:
+                show(f"  {note}")
+        show(f"written to {finished[0].folder}{os.sep}")
+        if finished[0].folder != folder:
+            say(f"{folder} keeps the whole result that was there before")
+    return max(status(run.name, run.ending) for run in finished)
+
+
+def _answer(interrupts: Interrupts) -> None:
+    """Tell the user at once what happens now, from within the handler of the signal."""
+    text = "stopping: writing what was computed and drawing it; once more leaves the figures out"
+    if interrupts.urgent:
+        text = "stopping at once, without figures; a third time ends an FMU that does not return"
+    # print could have been interrupted itself, and must not be entered a second time.
+    with suppress(OSError):
+        os.write(2, f"auv-fmu: {text}\n".encode())
+
+
+def _print_summary(values: Mapping[str, Any]) -> None:
+    last = min(LAST_SECONDS, values["stop_time"])
+    rows = {
+        "l2_effort": "L2 effort u, q, r [N.s^1/2, N.m.s^1/2]",
+        "peak_command": "peak command u, q, r [N, N.m]",
+        "saturated_fraction": "share of saturated steps u, q, r",
+        "total_variation": "total variation u, q, r [N, N.m]",
+        "final_error": f"largest error x, y, z in the last {last:g} s [m]",
+    }
+    shown = {label: values[key] for key, label in rows.items() if key in values}
+    if shown:
+        show(values["scenario"])
+    for label, numbers in shown.items():
+        show(f"  {label:44}" + "".join(f"{_number(number):>11}" for number in numbers))
+
+
+def _number(value: float) -> str:
+    """Four digits; an exponent only where zeros would be all that is seen."""
+    if value and not 1e-4 <= abs(value) < 1e7:
+        return f"{value:.3e}"
+    return np.format_float_positional(value, precision=4, unique=False, fractional=False, trim="-")
+
+
+def add_sweep(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu sweep`."""
+    ready = ", ".join(ready_studies())
+    parser.add_argument(
+        "study", metavar="STUDY.toml|NAME", help=f"a study file, or a ready study: {ready}"
+    )
+    add_options(parser, Means)
+    add_out(parser, None, "results/NAME/")
+    parser.set_defaults(action=_sweep)
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    study = read_study(options.study)
+    folder = folder_of(study, options.out)
+    try:
+        result = swept(study, taken(Means, options), folder, options.command, say, progress=True)
+    except KeyboardInterrupt:
+        say(f"interrupted; {folder} keeps what is done: the same command goes on from there")
+        return INTERRUPTED
+    show(f"{study.name}: {result.runs:,} runs, of which {result.failed:,} failed")
+    show(f"written to {folder}{os.sep}")
+    return OK
