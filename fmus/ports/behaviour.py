@@ -188,9 +188,8 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         if name not in said:
             raise TypeError(f"{where} has no {name}")
     for together in _TOGETHER:
-        there, missing = (
-            [name for name in together if (name in said) == is_there] for is_there in (True, False)
-        )
+        there = [name for name in together if name in said]
+        missing = [name for name in together if name not in said]
         if there and missing:
             raise TypeError(f"{where} has {there[0]}, but no {missing[0]}")
     for name, value in said.items():

@@ -79,6 +79,7 @@ def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
         ("advance(h: float,", "advance(h: float, dt: float,", "advance takes dt, which is none of"),
         ("\n\ndef _moved", f"{SEED}\n\ndef _moved", "has seed, but no measured"),
         ("\n\ndef _moved", f"{MEASURED}\n\ndef _moved", "has measured, but no seed"),
+        ("def _moved", "RESTARTED = 'again'\n\n\ndef _moved", "has RESTARTED, but no credible"),
         (
             "\n\ndef _moved",
             f"{SEED}{MEASURED}\n\ndef _moved".replace(", y: tuple[float, float])", ")"),
@@ -87,10 +88,5 @@ def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
     ],
 )
 def test_mistakes_are_named(tmp_path, monkeypatch, old, new, why):
-    text = (
-        GOOD.replace(old, new).replace("-> tuple[State, Outputs]", "")
-        if "Output(" in new
-        else (GOOD.replace(old, new))
-    )
     with pytest.raises(TypeError, match=f"^own_behaviour.*{why}"):
-        behaviour(tmp_path, monkeypatch, text)
+        behaviour(tmp_path, monkeypatch, GOOD.replace(old, new))
