@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 
-from fmus.ports.behaviour import read_behaviour
+from fmus.discovery import package_folder
+from fmus.ports.behaviour import HOOKS, read_behaviour
 from fmus.ports.groups import Nothing
 
 GOOD = """\
@@ -90,3 +92,9 @@ def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
 def test_mistakes_are_named(tmp_path, monkeypatch, old, new, why):
     with pytest.raises(TypeError, match=f"^own_behaviour.*{why}"):
         behaviour(tmp_path, monkeypatch, GOOD.replace(old, new))
+
+
+@pytest.mark.parametrize("path", ["native/translator.py", "python/slave.py"])
+def test_both_kinds_call_every_hook(path):
+    text = (package_folder("fmus") / path).read_text(encoding="utf-8")
+    assert set(re.findall(r"""["'](\w+)["']""", text)) >= HOOKS.keys()
