@@ -16,7 +16,7 @@ from markdown_it import MarkdownIt
 
 from fmus.discovery import components, package_folder, ports_of
 from fmus.kinds import NATIVE, PYTHON
-from fmus.ports.description_fmi3 import KINDS
+from fmus.ports.description_fmi3 import TYPES
 from fmus.ports.port import FAULT, Port
 
 #: The picture of every component.
@@ -76,12 +76,12 @@ def page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
     if fmi == "3":
         refusals = refusals.replace("fmi2GetReal", "fmi3GetFloat64").replace("fmi2", "fmi3")
     made_of = (_NATIVE,) if kind == NATIVE else ()
-    tables = _tables(ports, KINDS if fmi == "3" else {})
+    tables = _tables(ports, TYPES if fmi == "3" else {})
     parts = (text, *made_of, *tables, refusals, _EXAMPLE.format(name=name))
     return "\n\n".join(parts) + "\n"
 
 
-def _tables(ports: Sequence[Port], kinds: Mapping[str, str]) -> Iterator[str]:
+def _tables(ports: Sequence[Port], types: Mapping[str, str]) -> Iterator[str]:
     """The tables of inputs, outputs and parameters, with other names for their types."""
     for causality, heading in (
         ("input", "Inputs"),
@@ -97,7 +97,7 @@ def _tables(ports: Sequence[Port], kinds: Mapping[str, str]) -> Iterator[str]:
         elif causality == "output":
             columns.append("direct feedthrough from")
         lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
-        lines += ["| " + " | ".join(_row(ports, kinds)) + " |" for ports in _alike(found)]
+        lines += ["| " + " | ".join(_row(ports, types)) + " |" for ports in _alike(found)]
         yield f"## {heading}\n\n" + "\n".join(lines)
 
 
@@ -109,9 +109,9 @@ def _alike(ports: Sequence[Port]) -> Iterable[list[Port]]:
     return rows.values()
 
 
-def _row(ports: Sequence[Port], kinds: Mapping[str, str]) -> list[str]:
+def _row(ports: Sequence[Port], types: Mapping[str, str]) -> list[str]:
     port, last = ports[0], ports[-1]
-    kind = kinds.get(port.kind, port.kind)
+    kind = types.get(port.kind, port.kind)
     name = f"`{port.name}`" if port is last else f"`{port.name}` to `{last.name}`"
     cells = [name, kind, port.unit or "", port.description]
     if port.causality == "parameter":

@@ -69,6 +69,7 @@ PARAMETERS = ParameterSet(
     form=_OBSERVER,
 )
 
+#: Fields of its inputs that bear another name than their group of ports.
 GROUP_OF = MEASURED_ANGLES
 
 PORTS: tuple[Port, ...] = (

@@ -37,6 +37,7 @@ PARAMETERS = ParameterSet(
     printed_jacobian=PRINTED_JACOBIAN,
 )
 
+#: Fields of its inputs that bear another name than their group of ports.
 GROUP_OF = MEASURED_ANGLES
 
 PORTS: tuple[Port, ...] = (

@@ -138,8 +138,8 @@ HOOKS: Mapping[str, tuple[str, ...]] = {
     if isinstance(hook, staticmethod)
 }
 
-#: Hooks that go together.
-_TOGETHER = (("credible", "restarted"), ("seed", "measured"))
+#: What goes together.
+_TOGETHER = (("credible", "restarted", "RESTARTED"), ("seed", "measured"))
 
 
 class Behaviour(NamedTuple):
@@ -187,9 +187,11 @@ def read_behaviour(module: ModuleType) -> Behaviour:
     for name in ("begin", "advance", "Outputs"):
         if name not in said:
             raise TypeError(f"{where} has no {name}")
-    for one, other in (*_TOGETHER, *((b, a) for a, b in _TOGETHER)):
-        if one in hooks and other not in hooks:
-            raise TypeError(f"{where} has {one}, but no {other}")
+    for together in _TOGETHER:
+        there = [name for name in together if name in said]
+        missing = [name for name in together if name not in said]
+        if there and missing:
+            raise TypeError(f"{where} has {there[0]}, but no {missing[0]}")
     for name, value in said.items():
         own = isinstance(value, FunctionType) and value.__module__ == where
         if own and name not in HOOKS and not name.startswith("_"):

@@ -92,14 +92,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
     def expected(self, parameters: Parameters, state: State, outputs: Outputs) -> Outputs | None:
         """The outputs that belong to a state that is restored; None: that cannot be told.
 
-        Args:
-            parameters: that are restored with it.
-            state: all of it finite.
-            outputs: that are restored with it: they tell what else they depend on.
-
-        Raises:
-            Refusal: no run can have led to the state.
-
+        As :meth:`fmus.ports.behaviour.Hooks.expected`.
         """
         return None
 

@@ -33,12 +33,14 @@ class Trials(NamedTuple):
         spread: how far good values may lie from those at the start [share].
         overflow: values with which a state or an output of a step leaves the range of numbers.
         no_start: values that no state and outputs at the start time follow from.
+        wild: values with which others need not fit together any more.
 
     """
 
     spread: float = 0.5
     overflow: Setting | None = None
     no_start: Setting | None = None
+    wild: Mapping[str, Any] = {}
 
 
 @cache
@@ -48,7 +50,8 @@ def trials_of(name: str) -> Trials:
         return Trials()
     path = package_folder(components()[name]) / "trials.toml"
     said: dict[str, Any] = tomllib.loads(path.read_text()) if path.is_file() else {}
-    return Trials(**{k: Setting(**v) if isinstance(v, dict) else v for k, v in said.items()})
+    settings = {key: Setting(**said.pop(key)) for key in ("overflow", "no_start") if key in said}
+    return Trials(**said, **settings)
 
 
 @cache

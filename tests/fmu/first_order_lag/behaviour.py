@@ -1,4 +1,4 @@
-"""How the equations run in FirstOrderLag, in either kind of it: T dx/dt = u - x."""
+"""How FirstOrderLag runs in both kinds of FMU: T dx/dt = u - x, solved exactly."""
 
 from __future__ import annotations
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 
-from fmus.ports.behaviour import read_behaviour
+from fmus.discovery import package_folder
+from fmus.ports.behaviour import HOOKS, read_behaviour
 from fmus.ports.groups import Nothing
 
 GOOD = """\
@@ -79,6 +81,7 @@ def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
         ("advance(h: float,", "advance(h: float, dt: float,", "advance takes dt, which is none of"),
         ("\n\ndef _moved", f"{SEED}\n\ndef _moved", "has seed, but no measured"),
         ("\n\ndef _moved", f"{MEASURED}\n\ndef _moved", "has measured, but no seed"),
+        ("def _moved", "RESTARTED = 'again'\n\n\ndef _moved", "has RESTARTED, but no credible"),
         (
             "\n\ndef _moved",
             f"{SEED}{MEASURED}\n\ndef _moved".replace(", y: tuple[float, float])", ")"),
@@ -87,10 +90,11 @@ def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
     ],
 )
 def test_mistakes_are_named(tmp_path, monkeypatch, old, new, why):
-    text = (
-        GOOD.replace(old, new).replace("-> tuple[State, Outputs]", "")
-        if "Output(" in new
-        else (GOOD.replace(old, new))
-    )
     with pytest.raises(TypeError, match=f"^own_behaviour.*{why}"):
-        behaviour(tmp_path, monkeypatch, text)
+        behaviour(tmp_path, monkeypatch, GOOD.replace(old, new))
+
+
+@pytest.mark.parametrize("path", ["native/translator.py", "python/slave.py"])
+def test_both_kinds_call_every_hook(path):
+    text = (package_folder("fmus") / path).read_text(encoding="utf-8")
+    assert set(re.findall(r"""["'](\w+)["']""", text)) >= HOOKS.keys()
