@@ -1,8 +1,8 @@
-"""The saturated velocity observer: equations (18), (23) and (24), or (50) and (51).
+"""The state of the saturated velocity observer: equation (24), or (51), in three forms.
 
 The paper has two signals of almost the same name (reading 15): the state dy_hat_o of (23) and
-(24), and dy_o of (18), which the control law and the proof use. They differ by k_d z. Every
-function here has the name of the signal that it states; ddy_hat_o is the rate of dy_hat_o.
+(24), and dy_o of (18), which the control law and the proof use. They differ by k_d z. (18) and (23)
+stand in :func:`.output_feedback.evaluate`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import expm1
 
 from auv_fmu.types import Vector3
-from auv_fmu.vectors import minus_scaled, plus_scaled, scaled, total
+from auv_fmu.vectors import plus_scaled, scaled, total
 
 #: A form of the observer as a value: which one of these.
 Form = int
@@ -77,35 +77,6 @@ def dy_hat_o(form: Form, state: Vector3, dy_r: Vector3) -> Vector3:
 
     """
     return total(dy_r, state) if form == INTEGRAL else state
-
-
-def dy_hat(dy_hat_o: Vector3, s_z: Vector3, z: Vector3, lambda_: float, k_d: float) -> Vector3:
-    """dy_hat = dy_hat_o + Lambda s(z) + k_d z: equations (23) and (50).
-
-    Args:
-        dy_hat_o: of (24) [m/s].
-        s_z: s(z) of the estimation error.
-        z: estimation error y - y_hat [m].
-        lambda_: diagonal entry of Lambda [m/s].
-        k_d: observer gain [1/s].
-
-    Returns:
-        Estimated velocity of the control point [m/s], the rate of y_hat.
-
-    """
-    return plus_scaled(plus_scaled(dy_hat_o, lambda_, s_z), k_d, z)
-
-
-def dy_o(dy_hat: Vector3, s_z: Vector3, lambda_: float) -> Vector3:
-    """dy_o = dy_hat - Lambda s(z) [m/s]: equation (18).
-
-    Args:
-        dy_hat: estimated velocity (23) [m/s].
-        s_z: s(z) of the estimation error.
-        lambda_: diagonal entry of Lambda [m/s].
-
-    """
-    return minus_scaled(dy_hat, lambda_, s_z)
 
 
 def rate(form: Form, ddy_r: Vector3, s_z: Vector3, lambda_: float, k_d: float) -> Vector3:

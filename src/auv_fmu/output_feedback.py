@@ -138,8 +138,8 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement, h: 
     s_z, s_ez = saturation(s, z), saturation(s, e_z)
     dy_r = minus_scaled(dy_d, lambda_, s_ez)  # (16): dy_d - Lambda s(e - z)
     dy_hat_o = observer.dy_hat_o(form, dy_hat_o, dy_r)  # (24)
-    dy_hat = observer.dy_hat(dy_hat_o, s_z, z, lambda_, k_d)  # (23)
-    dy_o = observer.dy_o(dy_hat, s_z, lambda_)  # (18)
+    dy_hat = plus_scaled(plus_scaled(dy_hat_o, lambda_, s_z), k_d, z)  # (23)
+    dy_o = minus_scaled(dy_hat, lambda_, s_z)  # (18): dy_hat - Lambda s(z)
     de = difference(dy_hat, dy_d)
     ddy_r = minus_times(ddy_d, scaled(lambda_, slope(s, e_z, s_ez)), de)  # Remark 3
     r_hat_sum = plus_scaled(plus_scaled(de, lambda_, s_ez), lambda_, s_z)  # below (21)

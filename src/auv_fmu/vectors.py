@@ -52,9 +52,11 @@ def is_zero(a: Vector3) -> bool:
 
 def distance(a: Vector3, b: Vector3) -> float:
     """The norm of a - b."""
-    return norm(difference(a, b))
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return sqrt(x * x + y * y + z * z)
 
 
 def norm(a: Vector3) -> float:
     """Euclidean norm."""
-    return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    x, y, z = a
+    return sqrt(x * x + y * y + z * z)

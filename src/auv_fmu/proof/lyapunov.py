@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from auv_fmu import observer
 from auv_fmu.control_point import actuated_velocity
 from auv_fmu.saturation import Saturation, integral, saturation
 from auv_fmu.types import Rotation, Vector3
@@ -41,7 +40,7 @@ def composite_errors(
 
     """
     dy_r = minus_scaled(dy_d, lambda_, saturation(s, e_z))  # (16)
-    dy_o = observer.dy_o(dy_hat, saturation(s, z), lambda_)  # (18)
+    dy_o = minus_scaled(dy_hat, lambda_, saturation(s, z))  # (18)
     return difference(dy, dy_r), difference(dy, dy_o)
 
 
