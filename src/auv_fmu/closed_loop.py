@@ -160,6 +160,7 @@ class Instant(NamedTuple):
     t: float  #: [s]
     vehicles: Vehicles
     scene: Scene
+    measured: Any  #: what the controller is told: Measurement or PdMeasurement
     controller_state: Any  #: a ControllerState; of the PD controller theta_hat
     signals: Any  #: Signals or PdSignals
     command: Vector3  #: (tau_u, tau_q, tau_r) as it reaches the actuators [N, N.m]
@@ -270,11 +271,12 @@ def act(
 
     """
     seen, gains, h_c = moment.scene, setting.controller, h / parts.controller
-    state, signals = law.command(gains, moment.controller_state, law.measurement(seen), h_c)
+    measured = law.measurement(seen)
+    state, signals = law.command(gains, moment.controller_state, measured, h_c)
     now = signals.tau, seen.tau_w
     told, tau_w = moment.before if delayed and moment.t > 0.0 else now
     tau = plant.applied(setting.plant, told)
-    return Instant(moment.t, moment.vehicles, seen, state, signals, told, tau, tau_w)
+    return Instant(moment.t, moment.vehicles, seen, measured, state, signals, told, tau, tau_w)
 
 
 def step(
@@ -293,8 +295,7 @@ def step(
 
     """
     gains, signals, n_c = setting.controller, instant.signals, parts.controller
-    measured = law.measurement(instant.scene)
-    state = law.steps(gains, instant.controller_state, signals, measured, h / n_c, n_c)
+    state = law.steps(gains, instant.controller_state, signals, instant.measured, h / n_c, n_c)
     vehicles = move(setting, instant.vehicles, instant.tau, instant.tau_w, h, parts)
     now = signals.tau, instant.scene.tau_w
     return Moment(end, vehicles, scene(setting, vehicles, end, n), state, now)
