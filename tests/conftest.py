@@ -13,6 +13,7 @@ from hypothesis import Phase, settings
 from platformdirs import user_cache_path
 
 from orchestrator.experiments import bundle
+from orchestrator.system.leftovers import claimed
 
 # A slow machine is no error, and the same tree gives the same result every time.
 settings.register_profile("patient", deadline=None, derandomize=True)
@@ -56,28 +57,42 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
             terminalreporter.write_line(f"{what}: {counts}")
 
 
+@pytest.fixture(scope="session")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of this run of the tests, the same one for all workers of pytest-xdist."""
+    root = tmp_path_factory.getbasetemp()
+    folder = (root.parent if "PYTEST_XDIST_WORKER" in os.environ else root) / "shared"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    return folder
+
+
 @pytest.fixture(scope="session", autouse=True)
-def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+def _own_cache(shared: Path) -> None:
     """Keep FMUs that the tests build out of the user's cache."""
     # What that compiler has made of the C libraries takes minutes to make again.
     os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", str(user_cache_path("zig", appauthor=False)))
-    os.environ["XDG_CACHE_HOME"] = str(tmp_path_factory.mktemp("cache"))
+    os.environ["XDG_CACHE_HOME"] = str(shared / "cache")
 
 
-@pytest.fixture(scope="session")
-def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the built bundle."""
-    folder = tmp_path_factory.mktemp("dist")
-    bundle.build(folder)
+def _built(shared: Path, kind: str) -> Path:
+    """Build the FMUs of a kind unless another worker has done so."""
+    folder = shared / kind
+    with claimed(shared, wait=True):
+        if not folder.exists():
+            bundle.build(folder, kind=kind)
     return folder
 
 
 @pytest.fixture(scope="session")
-def native(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the FMUs in C."""
-    folder = tmp_path_factory.mktemp("native")
-    bundle.build(folder, kind="native")
-    return folder
+def dist(shared: Path) -> Path:
+    """A folder with the built bundle, to be read only."""
+    return _built(shared, bundle.PYTHON)
+
+
+@pytest.fixture(scope="session")
+def native(shared: Path) -> Path:
+    """A folder with the FMUs in C, to be read only."""
+    return _built(shared, bundle.NATIVE)
 
 
 @pytest.fixture

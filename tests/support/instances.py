@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import fmpy
+import pytest
 from fmpy.fmi2 import FMU2Slave
 from pythonfmu.enums import Fmi2Status
 
@@ -20,6 +21,15 @@ from fmus.slave.component import Component
 #: Names of all components, and of those with inputs.
 NAMES = [*components()]
 WITH_INPUTS = [name for name in NAMES if not name.endswith("Planner")]
+
+#: One with noise and one without: between them they have ports of all types, states, and all that
+#: can go wrong. What every component has from the same base is tried on these, and on the others
+#: with `-m slow`.
+REPRESENTATIVES = ("AuvPlant", "ObserverController")
+EACH = [
+    name if name in REPRESENTATIVES else pytest.param(name, marks=pytest.mark.slow)
+    for name in NAMES
+]
 
 
 def component(name: str) -> type[Component[Any, Any, Any, Any]]:

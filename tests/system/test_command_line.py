@@ -16,6 +16,7 @@ from orchestrator.commands.main import main
 from orchestrator.experiments import bundle
 from orchestrator.experiments.scenario import FOLDER as SCENARIOS
 from orchestrator.experiments.scenario import names, read_scenario
+from orchestrator.system.cache import users_folder
 from orchestrator.system.ledger import LEDGER
 
 
@@ -66,18 +67,23 @@ def test_build_replaces_fmus_that_are_not_what_was_built(dist, workplace):
     assert other.stat().st_mtime_ns == untouched
 
 
-def test_run_replaces_a_cached_fmu_that_is_not_what_was_built(workplace):
-    fmu = bundle.current_fmus() / "AuvPlant.fmu"
-    whole = fmu.read_bytes()
-    fmu.write_bytes(whole[:1000])
+def test_run_replaces_a_cached_fmu_that_is_not_what_was_built(workplace, monkeypatch):
+    bundle.current_fmus()
+    # Other tests read the one that all share.
+    cache = shutil.copytree(users_folder(), workplace / "cache" / users_folder().name)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(cache.parent))
+    bundle.current_fmus.cache_clear()
     try:
+        fmu = bundle.current_fmus() / "AuvPlant.fmu"
+        whole = fmu.read_bytes()
+        fmu.write_bytes(whole[:1000])
         bundle.current_fmus.cache_clear()
         assert main(["run", "fig4", "--stop-time", "0.1", "--no-figures"]) == 0
         assert (bundle.current_fmus() / "AuvPlant.fmu").read_bytes() == whole
         # Whatever that is, it is not ours to overwrite.
         assert fmu.read_bytes() == whole[:1000]
     finally:
-        fmu.write_bytes(whole)
+        bundle.current_fmus.cache_clear()
 
 
 def test_run_writes_into_its_folder_alone(workplace):
