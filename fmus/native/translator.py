@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import import_module
 from types import FunctionType, ModuleType
 from typing import get_type_hints
@@ -40,6 +41,7 @@ _P, _S, _I = (
 _O, _E = "model_outputs *outputs", "Error *error"
 
 
+@cache
 def translated(package: str) -> str:
     """The equations of a component, and the functions that the component calls.
 

@@ -7,7 +7,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from ctypes import CDLL, addressof, byref, c_bool, c_double, c_size_t, c_uint, c_void_p
 from math import inf, nan
 from pathlib import Path
@@ -220,19 +220,21 @@ SHARED = {
 
 
 @pytest.fixture(scope="module")
-def worker(request: pytest.FixtureRequest, unpacked: Path) -> Iterator[Worker[Any, str]]:
-    another = NAMES[NAMES.index(request.param) - 1]
-    with Worker(trials, unpacked / request.param, unpacked / another) as process:
-        yield process
+def workers(unpacked: Path) -> Iterator[dict[str, Worker[Any, str]]]:
+    """Processes that try cells, one for each component, started when they are needed."""
+    with ExitStack() as stack:
+        yield {
+            name: stack.enter_context(Worker(trials, unpacked / name, unpacked / NAMES[i - 1]))
+            for i, name in enumerate(NAMES)
+        }
 
 
 @pytest.mark.parametrize(
-    ("worker", "cell"),
+    ("name", "cell"),
     [(name, c) for name in REPRESENTATIVES for c in SHARED if has_call(name, SHARED[c][0])],
-    indirect=["worker"],
 )
-def test_cell_of_both_versions(worker: Worker[Any, str], cell: str):
-    wrong = worker.ask(SHARED[cell], PATIENCE)
+def test_cell_of_both_versions(workers: dict[str, Worker[Any, str]], name: str, cell: str):
+    wrong = workers[name].ask(SHARED[cell], PATIENCE)
     assert not isinstance(wrong, Lost), f"the process is lost: {wrong.why}"
     assert wrong == ""
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from functools import cache
 from itertools import product
 from pathlib import Path
 
@@ -61,7 +63,8 @@ def unpacked(fmus: Path, folder: Path, *names: str) -> list[Path]:
 #: Kinds, components, and the cells that they have.
 ALL = [
     pytest.param(
-        (kind, name),
+        kind,
+        name,
         cell,
         id=f"{kind}-{name}-{cell}",
         marks=() if name in REPRESENTATIVES else pytest.mark.slow,
@@ -73,16 +76,20 @@ ALL = [
 
 
 @pytest.fixture(scope="module")
-def worker(
+def workers(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Worker[Cell, str]]:
-    """A process that tries cells on one of the FMUs, of one of the kinds."""
-    kind, name = request.param
-    another = NAMES[NAMES.index(name) - 1]
-    fmus = request.getfixturevalue(FIXTURES[kind])
-    folders = unpacked(fmus, tmp_path_factory.mktemp("status"), name, another)
-    with Worker(trials, *folders, kind) as process:
-        yield process
+) -> Iterator[Callable[[str, str], Worker[Cell, str]]]:
+    """Processes that try cells, one for each kind and component."""
+    with ExitStack() as stack:
+
+        @cache
+        def worker(kind: str, name: str) -> Worker[Cell, str]:
+            another = NAMES[NAMES.index(name) - 1]
+            fmus = request.getfixturevalue(FIXTURES[kind])
+            folders = unpacked(fmus, tmp_path_factory.mktemp("status"), name, another)
+            return stack.enter_context(Worker(trials, *folders, kind))
+
+        yield worker
 
 
 @pytest.fixture(scope="module")
@@ -100,9 +107,9 @@ def hold(worker: Worker[Cell, str], cell: Cell) -> None:
     assert wrong == ""
 
 
-@pytest.mark.parametrize(("worker", "cell"), ALL, indirect=["worker"])
-def test_cell(worker: Worker[Cell, str], cell: str):
-    hold(worker, CELLS[cell])
+@pytest.mark.parametrize(("kind", "name", "cell"), ALL)
+def test_cell(workers: Callable[[str, str], Worker[Cell, str]], kind: str, name: str, cell: str):
+    hold(workers(kind, name), CELLS[cell])
 
 
 @pytest.mark.parametrize("cell", [c for c in OF_THE_SLAVE if has_call(PLAIN, OF_THE_SLAVE[c][0])])

@@ -69,6 +69,7 @@ def test_workers_of_a_report_read_it_no_more(workplace):
     assert said.stdout == "{0: 10.0}\n"
 
 
+@pytest.mark.slow
 def test_numba_takes_nothing_from_the_current_folder(workplace):
     pytest.importorskip("numba", reason="needs the extra `studies`")
     pytest.importorskip("distributed", reason="needs the extra `studies`")
