@@ -181,6 +181,7 @@ def test_arm_gives_the_same_bit_for_bit(native: Path, arm: Path, scenario: str):
     np.testing.assert_array_equal(there, here)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CMAKE is None, reason="there is no cmake")
 @each_scenario
 def test_fmpy_builds_the_same_from_the_sources_alone(native: Path, tmp_path: Path, scenario: str):

@@ -27,3 +27,8 @@ def tells(text: str, *runs: Sequence[float | str]) -> bool:
         any(found[i : i + len(run)] == run for i in range(len(found) - len(run) + 1))
         for run in wanted
     )
+
+
+def names(text: str, culprits: str) -> bool:
+    """Whether a text has some words with a blank between them, wherever they stand in it."""
+    return all(word in text for word in culprits.split())
