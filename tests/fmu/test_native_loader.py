@@ -15,6 +15,7 @@ from fmus.packaging.loader import FLAGS, FOLDER, compiler
 from fmus.packaging.own import build_own
 from orchestrator.experiments import bundle
 from support.instances import NAMES
+from support.tiers import slow
 
 LIBPYTHON = Path(
     str(sysconfig.get_config_var("LIBDIR")), str(sysconfig.get_config_var("INSTSONAME"))
@@ -184,7 +185,7 @@ def test_libpython_without_its_standard_library_does_not_end_the_host(dist, tmp_
 
 
 @needs_libpython
-@pytest.mark.parametrize("count", [2, pytest.param(16, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [2, *slow(16)])
 def test_threads_that_instantiate_at_the_same_moment(dist: Path, tmp_path: Path, count: int):
     """One interpreter starts, whoever comes first, and all go by the same sys.path."""
     host = compiled_host(tmp_path, *FINDS_LIBPYTHON, name="threads")

@@ -159,6 +159,7 @@ def arm(unpacked: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @needs_zig
 @pytest.mark.skipif(WINE is None, reason="there is no wine")
 @each_scenario
@@ -170,6 +171,7 @@ def test_windows_gives_the_same_but_for_rounding(native: Path, windows: Path, sc
     np.testing.assert_allclose(there, here, rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.slow
 @needs_zig
 @pytest.mark.skipif(QEMU is None, reason="there is no qemu-aarch64")
 @pytest.mark.skipif(not ARM_LIBRARIES.is_dir(), reason="there is no C library for ARM")

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import fmpy
-import pytest
 from fmpy.fmi2 import FMU2Slave
 from pythonfmu.enums import Fmi2Status
 
 from fmus.packaging.discovery import components
 from fmus.slave.callbacks import ANSWER
 from fmus.slave.component import Component
+from support.tiers import slow
 
 #: Names of all components, and of those with inputs.
 NAMES = [*components()]
@@ -26,10 +26,7 @@ WITH_INPUTS = [name for name in NAMES if not name.endswith("Planner")]
 #: can go wrong. What every component has from the same base is tried on these, and on the others
 #: with `-m slow`.
 REPRESENTATIVES = ("AuvPlant", "ObserverController")
-EACH = [
-    name if name in REPRESENTATIVES else pytest.param(name, marks=pytest.mark.slow)
-    for name in NAMES
-]
+EACH = [*REPRESENTATIVES, *slow(*(name for name in NAMES if name not in REPRESENTATIVES))]
 
 
 def component(name: str) -> type[Component[Any, Any, Any, Any]]:

@@ -29,6 +29,6 @@ def tells(text: str, *runs: Sequence[float | str]) -> bool:
     )
 
 
-def names(text: str, culprits: str) -> bool:
+def mentions(text: str, culprits: str) -> bool:
     """Whether a text has some words with a blank between them, wherever they stand in it."""
     return all(word in text for word in culprits.split())

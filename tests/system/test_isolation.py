@@ -32,6 +32,7 @@ from orchestrator.system.ssp.writing import write_ssp
 from orchestrator.system.structure import System
 from support.foreign import build_c_fmu, build_raising_fmu, build_slave, foreign_system
 from support.machine import LOOPS, contents
+from support.tiers import slow
 
 STEP = 0.02
 
@@ -342,7 +343,7 @@ def test_command_line_says_what_happened_and_keeps_the_rows(
         (["--isolate"], "csv"),
     ],
 )
-@pytest.mark.parametrize("act", ["FORKS", "MOVES", "CLOSES_FILES"])
+@pytest.mark.parametrize("act", ["CLOSES_FILES", *slow("FORKS", "MOVES")])
 def test_rows_are_kept_whatever_an_fmu_does_to_the_process(
     archives, workplace, mark, act, form, options
 ):
@@ -385,12 +386,14 @@ def test_an_alarm_ends_a_run_with_its_rows(archives, workplace, loop):
 @pytest.mark.parametrize(
     "act",
     [
-        "sys.stdout = sys.stderr = None",
-        "sys.stdout.close(); sys.stderr.close()",
         "json.dumps = builtins.print = None",
-        "[setattr(numpy, name, None) for name in list(vars(numpy))]",
-        "os.chdir('/')",
         "os.fork()",
+        *slow(
+            "sys.stdout = sys.stderr = None",
+            "sys.stdout.close(); sys.stderr.close()",
+            "[setattr(numpy, name, None) for name in list(vars(numpy))]",
+            "os.chdir('/')",
+        ),
     ],
 )
 def test_what_a_python_slave_does_to_the_interpreter_costs_no_rows(workplace, act):
@@ -418,6 +421,7 @@ def test_an_fmu_finds_the_current_folder_that_it_has_left(workplace, loop):
     assert Path.cwd() == workplace
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [["--loop", "python"], ["--isolate"]])
 def test_a_current_folder_that_is_gone_is_not_needed(dist, tmp_path, how):
     gone = tmp_path / "gone"
@@ -453,6 +457,7 @@ def test_a_timeout_that_means_nothing_is_bad_usage(options, words, capsys):
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_nothing_is_left_of_a_run_that_hangs_and_is_ended(archives, tmp_path, mark, number):
     """Also not by KILL, which the process itself cannot answer."""

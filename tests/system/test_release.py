@@ -9,12 +9,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from orchestrator.experiments import bundle
 from support.machine import contents
 
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.mark.slow
 def test_wheel_builds_the_bundle_and_runs_fig4_in_an_empty_folder(tmp_path: Path):
     wheels, packages, empty = tmp_path / "wheels", tmp_path / "packages", tmp_path / "empty"
     empty.mkdir()

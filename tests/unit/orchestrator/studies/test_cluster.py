@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+from support.tiers import slow
 from support.toy_engine import Toy, outcome, run
 
 pytest.importorskip("distributed", reason="needs the extra `studies`")
@@ -212,7 +213,7 @@ def test_who_answers_and_says_nothing_is_no_scheduler():
             pass
 
 
-@pytest.mark.parametrize("name", [pytest.param("x" * 150, marks=pytest.mark.slow), "a:b [c] %41"])
+@pytest.mark.parametrize("name", ["a:b [c] %41", *slow("x" * 150)])
 def test_temporary_folders_have_any_name(tmp_path, monkeypatch, name):
     folder = tmp_path / name
     folder.mkdir()

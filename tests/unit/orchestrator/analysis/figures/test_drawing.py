@@ -14,6 +14,7 @@ from orchestrator.analysis.figures.layout import compose
 from orchestrator.analysis.signals import COMMANDED, DY_HAT, NU, POSTURE, THETA_HAT, Y_D
 from orchestrator.errors import InputError
 from support.tables import loop_table
+from support.tiers import slow
 
 
 def panel(figure, label):
@@ -153,9 +154,7 @@ def test_same_run_is_the_same_file(tmp_path):
         assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes(), path.name
 
 
-@pytest.mark.parametrize(
-    "value", [2e8, np.nan, *(pytest.param(v, marks=pytest.mark.slow) for v in (1e-9, np.inf))]
-)
+@pytest.mark.parametrize("value", [2e8, np.nan, *slow(1e-9, np.inf)])
 def test_matplotlib_keeps_its_thoughts_to_itself(tmp_path, caplog, value):
     table = loop_table()
     for column in (*COMMANDED, *THETA_HAT, *DY_HAT):

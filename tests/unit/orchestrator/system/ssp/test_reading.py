@@ -28,7 +28,7 @@ from support.archives import (
     system,
     variable,
 )
-from support.texts import names
+from support.texts import mentions
 
 Read = Callable[..., System]
 
@@ -473,12 +473,12 @@ def test_parameter_set_inside_an_fmu(files, tmp_path: Path):
     ],
 )  # fmt: skip
 def test_what_cannot_be_run_is_said_by_name(read: Read, text: str, why: str):
-    assert names(problem(read, text), why)
+    assert mentions(problem(read, text), why)
 
 
 def test_a_parameter_set_that_is_no_xml_is_named_once(read: Read):
     text = problem(read, system(component("a", bindings=binding(source="s.ssv"))), s__ssv="k = 1")
-    assert text.count("test.ssp") == 1 and names(text, "s.ssv XML")
+    assert text.count("test.ssp") == 1 and mentions(text, "s.ssv XML")
 
 
 def test_all_problems_are_collected(read: Read):
@@ -515,7 +515,7 @@ def test_all_problems_are_collected(read: Read):
 )  # fmt: skip
 def test_what_is_harmless_is_a_note_and_a_problem_for_the_strict(read: Read, text: str, why: str):
     [note] = notes(read, text)
-    assert names(note, why)
+    assert mentions(note, why)
     with pytest.raises(InputError) as error:
         read(text, Findings(strict=True))
     assert note in str(error.value)
