@@ -41,6 +41,10 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 _MISSING = re.compile(r"^(there is |there are )?no | (is|are) not installed$")
 
 
+#: Where pytest's cache keeps what was skipped.
+_SKIPPED = "auv-fmu/skipped"
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Note what a test would be skipped without."""
     for mark in item.iter_markers("skipif"):
@@ -48,9 +52,30 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         item.user_properties += [("needs", needed)] * found
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--skipped", action="store_true", help="only what the last run skipped: after an install"
+    )
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what the last run has not skipped, where that is asked for."""
+    if config.getoption("skipped"):
+        assert config.cache is not None
+        skipped = {*config.cache.get(_SKIPPED, [])}
+        groups: dict[bool, list[pytest.Item]] = {True: [], False: []}
+        for item in items:
+            groups[not skipped.isdisjoint((item.nodeid, item.location[0]))].append(item)
+        config.hook.pytest_deselected(items=groups[False])
+        items[:] = groups[True]
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Say what not every machine has, and how many tests ran with it or were skipped, and why."""
     passed, skipped = (terminalreporter.stats.get(name, []) for name in ("passed", "skipped"))
+    if cache := getattr(terminalreporter.config, "cache", None):
+        nodes = sorted({report.nodeid for report in skipped})
+        cache.set(_SKIPPED, nodes)
     needs = Counter(need for report in passed for _, need in report.user_properties)
     reasons = Counter(report.longrepr[2].removeprefix("Skipped: ") for report in skipped)
     for what, counter in (("ran with", needs), (f"skipped {len(skipped)}", reasons)):
