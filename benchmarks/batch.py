@@ -28,13 +28,13 @@ from statistics import median
 from time import process_time
 
 from auv_fmu.closed_loop import Setting, closed_loop
-from orchestrator.analysis.signals import NU, POSITION, THETA_HAT
-from orchestrator.experiments.preparation import load, loaded
 from orchestrator.master.experiment import Experiment
+from orchestrator.runs.preparation import load, loaded
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import Run
+from orchestrator.studies.engine import Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import read_study, ready_studies
+from orchestrator.vehicle.signals import NU, POSITION, THETA_HAT
 
 #: Runs that are timed: noise is drawn in the first.
 _SCENARIOS = ("fig4", "fig5", "fig5-pd")
@@ -57,7 +57,7 @@ def resident() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def make(engine: BatchEngine, runs: Iterable[Run]) -> None:
+def make(engine: BatchEngine, runs: Iterable[Point]) -> None:
     """Make runs and forget them."""
     deque(engine.outcomes(runs), maxlen=0)
 
@@ -71,7 +71,7 @@ def compare(engine: BatchEngine, steps: int, repetitions: int) -> None:
     """Print what a step costs."""
     print(f"medians of {repetitions} repetitions of {steps} steps, processor's time")
     for name in _SCENARIOS:
-        run = Run(0, name, {}, steps * _STEP, _STEP)
+        run = Point(0, name, {}, steps * _STEP, _STEP)
         setting = engine.setting(run)
         make(engine, [run])
         rows = [
@@ -90,7 +90,7 @@ def grow(engine: BatchEngine) -> None:
     """Print what runs cost where there are many."""
     print(f"{'runs':>8} {'us a run':>9} {'resident [MB]':>14}")
     for n in _MANY:
-        runs = (Run(i, "fig5", {"plant.eta0.y": float(i % 7)}, 1.0, _STEP) for i in range(n))
+        runs = (Point(i, "fig5", {"plant.eta0.y": float(i % 7)}, 1.0, _STEP) for i in range(n))
         seconds = timed(partial(make, engine, runs))
         print(f"{n:8} {1e6 * seconds / n:9.1f} {resident():14.1f}")
 
@@ -107,7 +107,7 @@ def check(n: int) -> None:
         print(f"{name:12} {same} of {n} runs end in the same state", flush=True)
 
 
-def is_straight(engine: BatchEngine, run: Run) -> bool:
+def is_straight(engine: BatchEngine, run: Point) -> bool:
     """Whether a run ends in the state in which the straight line ends, which has equal steps."""
     experiment = Experiment(run.stop_time, run.step, run.order)
     run = run._replace(stop_time=experiment.time(experiment.full_steps))

@@ -29,15 +29,15 @@ from unittest.mock import patch
 
 from auv_fmu.closed_loop import closed_loop
 from auv_fmu.euler import STEP
-from orchestrator.experiments import bundle
-from orchestrator.experiments.wiring import closed_loop as wired
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.instance import Instance
-from orchestrator.master.loaded import LoadedInstance
+from orchestrator.master.fmi.instance import Instance
+from orchestrator.master.fmi.loaded import LoadedInstance
 from orchestrator.master.loop import PYTHON_LOOP, Loop, chosen
+from orchestrator.master.observers.table import Table
 from orchestrator.master.schedule import Member
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs import bundle
+from orchestrator.runs.wiring import closed_loop as wired
 from orchestrator.system.structure import System
 
 #: So many times the steps, so that what they cost is not lost in the set-up that is subtracted.

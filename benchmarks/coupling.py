@@ -18,10 +18,10 @@ from time import perf_counter
 import numpy as np
 
 from orchestrator.master.experiment import COUPLINGS, Experiment
-from orchestrator.master.library import made
 from orchestrator.master.loop import chosen
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.master.stepper import made
 from orchestrator.system.structure import System
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))

@@ -29,18 +29,18 @@ from typing import Any
 
 import fmpy
 
-from orchestrator.errors import InputError
-from orchestrator.experiments import bundle
-from orchestrator.experiments.bundle import NATIVE
-from orchestrator.experiments.preparation import Request, prepare
-from orchestrator.experiments.scenario import Scenario
+from orchestrator.formats.osp import write_osp
+from orchestrator.formats.ssp.reader import read_ssp
+from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.machine.errors import InputError
 from orchestrator.master.loop import chosen
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs import bundle
+from orchestrator.runs.bundle import NATIVE
+from orchestrator.runs.preparation import Request, prepare
+from orchestrator.runs.scenario import Scenario
 from orchestrator.system.component import read_component
-from orchestrator.system.osp import write_osp
-from orchestrator.system.ssp.reading import read_ssp
-from orchestrator.system.ssp.writing import write_ssp
 from orchestrator.system.structure import System
 
 #: Rounds, steps of a run, and the longest that the steps of one run shall take [s].

@@ -19,7 +19,7 @@ from time import perf_counter
 import fmpy
 from fmpy.fmi2 import FMU2Slave
 
-from orchestrator.experiments import bundle
+from orchestrator.runs import bundle
 
 REPETITIONS = 200
 

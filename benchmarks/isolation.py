@@ -16,12 +16,12 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 
 from auv_fmu.euler import STEP
-from orchestrator.experiments import bundle
-from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import ORDERS, Experiment
-from orchestrator.master.isolated import Isolation
+from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs import bundle
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.structure import System
 
 

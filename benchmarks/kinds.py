@@ -32,12 +32,12 @@ from auv_fmu.closed_loop import closed_loop
 from auv_fmu.euler import STEP
 from orchestrator.exchange import c_host
 from orchestrator.exchange.hosts import HOSTS, compare
-from orchestrator.experiments import bundle
-from orchestrator.experiments.wiring import closed_loop as wired
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.loop import chosen
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs import bundle
+from orchestrator.runs.wiring import closed_loop as wired
 from orchestrator.system.structure import System
 
 #: Instances that are timed.

@@ -25,7 +25,7 @@ from fmpy.fmi2 import FMU2Slave
 from pythonfmu import FmuBuilder
 
 from fmus.packaging.loader import compiler
-from orchestrator.experiments import bundle
+from orchestrator.runs import bundle
 
 _PAGE = os.sysconf("SC_PAGE_SIZE")
 _LIBPYTHON = Path(

@@ -22,32 +22,32 @@ from memory import resident
 
 from auv_fmu.euler import STEP
 from orchestrator import load
-from orchestrator.analysis.certificates import CertificatesFile
-from orchestrator.analysis.metrics import Metrics
-from orchestrator.analysis.visible import VisibleRows
-from orchestrator.experiments.bundle import KINDS, NATIVE
-from orchestrator.master.attendant import NEVER, Attendant, Run
-from orchestrator.master.checkpoint import Checkpoints
+from orchestrator.figures.visible import VisibleRows
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.files import CsvFile
+from orchestrator.master.hooks.checkpoint import Checkpoints
+from orchestrator.master.hooks.hook import NEVER, Hook, Run
 from orchestrator.master.loop import LOOPS, chosen
-from orchestrator.master.observer import Observer
-from orchestrator.master.selection import Selection
+from orchestrator.master.observers.files import CsvFile
+from orchestrator.master.observers.observer import Observer
+from orchestrator.master.observers.selection import Selection
 from orchestrator.master.simulation import simulate
+from orchestrator.runs.bundle import KINDS, NATIVE
+from orchestrator.vehicle.certificates import CertificatesFile
+from orchestrator.vehicle.metrics import Metrics
 
 #: Parts of a run that are compared, and simulated seconds between the rows that are kept.
 _PARTS, _INTERVAL = 10, 1.0
 
 
 class Parts:
-    """An attendant that measures each part of a run."""
+    """A hook that measures each part of a run."""
 
     def __init__(self, steps: int) -> None:
         """Measure a run of so many steps."""
         self._steps, self._before = steps // _PARTS, 0.0
         self.times: list[float] = []
 
-    def attend(self, run: Run) -> int:
+    def act(self, run: Run) -> int:
         """Take and print the times."""
         now = process_time()
         if run.made:
@@ -84,7 +84,7 @@ def main() -> None:
     options = parser.parse_args()
     experiment = Experiment(options.steps * STEP, STEP)
     parts, durations = Parts(options.steps), list[float]()
-    attendants: list[Attendant] = [parts]
+    hooks: list[Hook] = [parts]
     print(f"CPython {platform.python_version()}, {platform.machine()}, kind {options.kind}")
     print(f"{'steps':>9} {'us a step':>14} {'resident [MB]':>14}")
     with TemporaryDirectory(prefix="auvfmu") as temporary, timed(durations):
@@ -98,14 +98,14 @@ def main() -> None:
         if options.checkpoint_every is not None:
             checkpoints = Checkpoints(folder / "checkpoint", {}, options.checkpoint_every, False)
             observers.append(checkpoints)
-            attendants.insert(0, checkpoints)
+            hooks.insert(0, checkpoints)
         simulate(
             load("fig4", options.kind),
             experiment,
             observers,
             None,
             chosen(options.loop, experiment),
-            attendants,
+            hooks,
         )
         sizes = {path.name: path.stat().st_size for path in folder.glob("checkpoint/*")}
     print(f"the last tenth of the first: {parts.times[-1] / parts.times[0]:.3f}")

@@ -28,15 +28,15 @@ from time import perf_counter
 from typing import Any
 from zipfile import ZipFile
 
-from orchestrator.experiments.preparation import Request, load, prepare
-from orchestrator.experiments.scenario import Scenario
-from orchestrator.master.observer import Ending, Header
+from orchestrator.formats.osp import write_osp
+from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.master.observers.observer import Ending, Header
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs.preparation import Request, load, prepare
+from orchestrator.runs.scenario import Scenario
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
-from orchestrator.system.osp import write_osp
-from orchestrator.system.ssp.writing import write_ssp
 from orchestrator.system.structure import Connection, System
 
 STEP, STEPS = 0.01, 10

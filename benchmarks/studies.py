@@ -23,11 +23,11 @@ from time import perf_counter, process_time
 from typing import NamedTuple
 from unittest.mock import patch
 
-from orchestrator.experiments.preparation import Prepared, Request, loaded, prepare
+from orchestrator.runs.preparation import Prepared, Request, loaded, prepare
 from orchestrator.studies import cluster
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.cluster import making
-from orchestrator.studies.engine import INDICES, Engine, Outcome, Run
+from orchestrator.studies.engine import INDICES, Engine, Outcome, Point
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import store
@@ -49,7 +49,7 @@ class Timed(NamedTuple):
     engine: Engine
     digest: str = "timed"
 
-    def outcomes(self, runs: Sequence[Run]) -> Iterator[Outcome]:
+    def outcomes(self, runs: Sequence[Point]) -> Iterator[Outcome]:
         """Make runs, one after the other."""
         outcomes = self.engine.outcomes(runs)
         for run in runs:
@@ -63,7 +63,7 @@ class Idle(NamedTuple):
 
     digest: str = "idle"
 
-    def outcomes(self, runs: Sequence[Run]) -> Iterator[Outcome]:
+    def outcomes(self, runs: Sequence[Point]) -> Iterator[Outcome]:
         """Make nothing."""
         for run in runs:
             yield Outcome(run.number, dict.fromkeys(INDICES, 0.1 * run.number))
@@ -76,7 +76,7 @@ class Cost(NamedTuple):
     wall: float
 
 
-def cost(engine: Engine, runs: Iterable[Run], workers: int) -> Cost:
+def cost(engine: Engine, runs: Iterable[Point], workers: int) -> Cost:
     """What runs take when some processes make them."""
     with making(Timed(engine), iter(runs), workers=workers) as blocks:
         for _ in islice(blocks, _WARM * workers):

@@ -4,24 +4,24 @@
     result = simulate("fig4", {"plant.noise.std": 0.0})
     result.plot("plant.eta.*")
 
-==========================  ==========================================================
-room                        what it is for
-==========================  ==========================================================
-:mod:`.errors`              what can go wrong, in words for the user
-:mod:`.findings`            all that is wrong with a file
-:mod:`.reading`             files of the user's, read with care
-:mod:`.system`              what is simulated, and how it is written down
-:mod:`.master`              how it is stepped
-:mod:`.analysis`            the loop's signals by the paper's names; indices, figures
-:mod:`.experiments`         scenarios, wiring, bundle, one run and its files
-:mod:`.exchange`            other tools: hosts, reference results, verification
-:mod:`.studies`             many runs: what varies, engines, Dask
-:mod:`.paper`               the paper's numbers and claims beside ours
-:mod:`.commands`            the command line
-==========================  ==========================================================
+==================  ==========================================================
+room                what it is for
+==================  ==========================================================
+:mod:`.machine`     the operating system: errors, files, processes
+:mod:`.system`      what is simulated
+:mod:`.formats`     how it is written down: SSP, OSP, container
+:mod:`.master`      how it is stepped
+:mod:`.vehicle`     this vehicle's signals, indices and certificates
+:mod:`.figures`     figures of a run
+:mod:`.runs`        scenarios, wiring, bundle, one run and its files
+:mod:`.studies`     many runs
+:mod:`.exchange`    other tools: hosts, reference results, verification
+:mod:`.paper`       the paper's numbers and claims beside ours
+:mod:`.commands`    the command line
+==================  ==========================================================
 
 Each imports only what stands above it in this table. Components are known as FMUs behind their
-ports; what stands above `analysis` knows none of them by name.
+ports; what stands above `vehicle` knows none of them by name.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from orchestrator.experiments.preparation import load
-    from orchestrator.experiments.result import Result, simulate
+    from orchestrator.runs.preparation import load
+    from orchestrator.runs.result import Result, simulate
     from orchestrator.studies.sweep import sweep
 
 __all__ = ["Result", "load", "simulate", "sweep"]
 
 _MODULES = {
-    "Result": "experiments.result",
-    "load": "experiments.preparation",
-    "simulate": "experiments.result",
+    "Result": "runs.result",
+    "load": "runs.preparation",
+    "simulate": "runs.result",
     "sweep": "studies.sweep",
 }
 

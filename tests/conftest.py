@@ -14,8 +14,8 @@ import pytest
 from hypothesis import Phase, settings
 from platformdirs import user_cache_path
 
-from orchestrator.experiments import bundle
-from orchestrator.system.leftovers import claimed
+from orchestrator.machine.locks import claimed
+from orchestrator.runs import bundle
 
 # A slow machine is no error, and the same tree gives the same result every time.
 settings.register_profile("patient", deadline=None, derandomize=True)

@@ -18,13 +18,13 @@ from auv_fmu.attitude import normalised, rotation_from_quaternion
 from auv_fmu.closed_loop import LAWS, Scene, Setting, Vehicles
 from auv_fmu.euler import STEP
 from orchestrator import load, simulate
-from orchestrator.analysis.signals import Y_D, true_control_point
-from orchestrator.master.table import Table
-from orchestrator.paper.formatting import table
+from orchestrator.master.observers.table import Table
 from orchestrator.paper.measures import total_variation_until
+from orchestrator.paper.page import table
 from orchestrator.studies.batch.flat import flat
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import Run
+from orchestrator.studies.engine import Point
+from orchestrator.vehicle.signals import Y_D, true_control_point
 
 Values = Mapping[str, Any]
 
@@ -97,9 +97,9 @@ class Runs:
             yield {"plant.eta0.x": x + MOVED * i / STARTS}
 
     @staticmethod
-    def _run(name: str, values: Values, step: float) -> Run:
+    def _run(name: str, values: Values, step: float) -> Point:
         quiet = {"plant.noise.std": 0.0, **values}
-        return Run(0, name, quiet, stop_time=SCENARIOS[name], step=step)
+        return Point(0, name, quiet, stop_time=SCENARIOS[name], step=step)
 
 
 def plant_alone(runs: Runs) -> None:

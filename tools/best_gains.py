@@ -17,11 +17,11 @@ from time import process_time
 from scipy.optimize import differential_evolution
 
 from auv_fmu.euler import STEP
-from orchestrator.analysis.signals import ACTUATORS
-from orchestrator.experiments.preparation import load
+from orchestrator.runs.preparation import load
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import Run
+from orchestrator.studies.engine import Point
 from orchestrator.studies.study import Study, read_study
+from orchestrator.vehicle.signals import ACTUATORS
 
 #: What no command may pass [N, N·m].
 _LIMITS = (10.0, 20.0, 80.0)
@@ -41,7 +41,7 @@ class Search:
         assert study.sample and study.stop_time, study.name
         system = load(scenario)
         self._engine = BatchEngine({scenario: system})
-        self._run = Run(0, scenario, study.parameters, study.stop_time.base, STEP)
+        self._run = Point(0, scenario, study.parameters, study.stop_time.base, STEP)
         has = system.components["controller"].variables
         ranges = study.sample.ranges
         self.gains = [name for name in ranges if name.partition(".")[2] in has]

@@ -13,8 +13,8 @@ from tempfile import TemporaryDirectory
 
 from PIL import Image
 
-from orchestrator.analysis.figures.style import SETTINGS
-from orchestrator.experiments.preparation import loaded
+from orchestrator.figures.style import SETTINGS
+from orchestrator.runs.preparation import loaded
 from orchestrator.studies.figures import draw_figures, read_figures
 from orchestrator.studies.ready_page import PICTURES
 from orchestrator.studies.space import Space

@@ -16,9 +16,9 @@ import numpy as np
 from fmpy.model_description import ModelVariable
 
 from orchestrator import Result, load, simulate
-from orchestrator.errors import InputError
-from orchestrator.experiments.preparation import DEFAULT_STEP
+from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import DELAY, JACOBI
+from orchestrator.runs.preparation import DEFAULT_STEP
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value

@@ -26,13 +26,13 @@ from typing import NamedTuple
 import numpy as np
 from master import FULL, NONE, ZERO, rows
 
-from orchestrator.errors import InputError, did_you_mean, last_line, reason
-from orchestrator.experiments import bundle
-from orchestrator.experiments.wiring import closed_loop
+from orchestrator.machine.cache import users_folder
+from orchestrator.machine.errors import InputError, did_you_mean, last_line, reason
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import completed
-from orchestrator.master.table import Table
-from orchestrator.system.cache import users_folder
+from orchestrator.runs import bundle
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.structure import System
 
 STEPS, STEP = 5000, 0.02

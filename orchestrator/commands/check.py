@@ -4,27 +4,23 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
-from orchestrator.commands.options import BAD_INPUT, OK, add_variant
-from orchestrator.commands.streams import show
-from orchestrator.experiments.preparation import SOME_TIME, Request, loaded, prepare
-from orchestrator.experiments.waypoints import impossible_paths
-from orchestrator.findings import Findings
-from orchestrator.master.binary import binary_of, check_binary
+from orchestrator.commands.options import add_variant
+from orchestrator.commands.streams import BAD_INPUT, OK, show
+from orchestrator.formats.examination import examine, surprises
+from orchestrator.machine.errors import Findings
+from orchestrator.master.fmi.binary import binary_of, check_binary
+from orchestrator.runs.preparation import SOME_TIME, Request, loaded, prepare
+from orchestrator.runs.waypoints import impossible_paths
 from orchestrator.system.component import Component
-from orchestrator.system.examination import examine, surprises
 from orchestrator.system.graph import rings
 
 
-def add_to(commands: Any) -> None:
-    """Add this command to the parser."""
-    check = commands.add_parser(
-        "check", help="say all that is wrong with an FMU, an SSP or a scenario"
-    )
-    check.add_argument("file", metavar="FILE|DIR|SCENARIO", help="what is looked at, not run")
-    add_variant(check)
-    check.set_defaults(action=_check)
+def add_check(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu check`."""
+    parser.add_argument("file", metavar="FILE|DIR|SCENARIO", help="what is looked at, not run")
+    add_variant(parser)
+    parser.set_defaults(action=_check)
 
 
 def _check(options: argparse.Namespace) -> int:

@@ -13,9 +13,9 @@ from typing import Any
 
 from orchestrator.commands import streams
 from orchestrator.commands.streams import say
-from orchestrator.errors import reason
-from orchestrator.master.interrupts import orderly_end
-from orchestrator.system.imports import imported_apart
+from orchestrator.machine.children import imported_apart
+from orchestrator.machine.errors import reason
+from orchestrator.machine.interrupts import orderly_end
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

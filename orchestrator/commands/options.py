@@ -5,20 +5,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from orchestrator.commands.streams import say
-from orchestrator.errors import InputError
-from orchestrator.experiments.bundle import FMI, KINDS, NATIVE, PYTHON
-from orchestrator.experiments.preparation import Request, loaded
-from orchestrator.experiments.scenario import Scenario
-from orchestrator.findings import Findings
+from orchestrator.commands.streams import FAILED, OK, say
+from orchestrator.machine.errors import Findings, InputError
 from orchestrator.master.experiment import ORDERS, order_of
 from orchestrator.master.loop import LOOPS
-from orchestrator.master.observer import Ending
+from orchestrator.master.observers.observer import Ending
+from orchestrator.runs.bundle import FMI, KINDS, NATIVE, PYTHON
+from orchestrator.runs.preparation import Request, loaded
+from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
-
-#: Exit status: done, a simulation failed, bad usage or input, ended by the user.
-OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
 def add_system(parser: argparse.ArgumentParser) -> None:

@@ -4,30 +4,30 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
-from orchestrator.commands.options import OK, add_force, add_out
-from orchestrator.commands.streams import show
+from orchestrator.commands.options import add_force, add_out
+from orchestrator.commands.streams import OK, show
 from orchestrator.exchange.reference import write_reference
-from orchestrator.experiments.bundle import current_fmus, run_fmus
-from orchestrator.experiments.folder import replaced
-from orchestrator.experiments.scenario_page import scenario_page
 from orchestrator.paper.errata import errata_page
+from orchestrator.runs.bundle import current_fmus, run_fmus
+from orchestrator.runs.folder import replaced
+from orchestrator.runs.scenario_page import scenario_page
 from orchestrator.studies.ready_page import ready_page
 from orchestrator.studies.study_page import study_page
 
 
-def add_to(commands: Any) -> None:
-    """Add these commands to the parser."""
-    reference = commands.add_parser("reference", help="write reference results of every FMU")
-    add_out(reference, Path("reference"))
-    add_force(reference)
-    reference.set_defaults(action=_reference)
+def add_reference(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu reference`."""
+    add_out(parser, Path("reference"))
+    add_force(parser)
+    parser.set_defaults(action=_reference)
 
-    docs = commands.add_parser("docs", help="write the pages that say what the code says")
-    add_out(docs, Path("docs"))
-    add_force(docs)
-    docs.set_defaults(action=_docs)
+
+def add_docs(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu docs`."""
+    add_out(parser, Path("docs"))
+    add_force(parser)
+    parser.set_defaults(action=_docs)
 
 
 def _reference(options: argparse.Namespace) -> int:

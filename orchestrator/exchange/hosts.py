@@ -22,17 +22,17 @@ import fmpy
 import numpy as np
 from fmpy.ssp.simulation import simulate_ssp
 
-from orchestrator.errors import InputError, last_line
 from orchestrator.exchange import c_host
+from orchestrator.formats.container import write_container
+from orchestrator.formats.osp import write_osp
+from orchestrator.formats.ssp.reader import read_ssp
+from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.machine.children import run_module
+from orchestrator.machine.errors import InputError, last_line
+from orchestrator.machine.locks import process_folder
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import completed
-from orchestrator.master.table import Table
-from orchestrator.system.children import run_module
-from orchestrator.system.container import write_container
-from orchestrator.system.leftovers import process_folder
-from orchestrator.system.osp import write_osp
-from orchestrator.system.ssp.reading import read_ssp
-from orchestrator.system.ssp.writing import write_ssp
 from orchestrator.system.structure import System
 
 #: How long a host may take for a run before it is given up [s].

@@ -13,10 +13,10 @@ import fmpy
 import numpy as np
 from fmpy.util import write_csv
 
-from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.files import CsvFile
+from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.simulation import completed
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import Component, read_component
 
 #: Length of the reference runs [s] and their step [s].

@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orchestrator.errors import InputError
-from orchestrator.exchange.foreign import ForeignTable, read_table
-from orchestrator.experiments.preparation import DEFAULT_STEP
+from orchestrator.exchange.table_import import ForeignTable, read_table
+from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import (
     DELAY,
     ORDERS,
@@ -19,10 +18,11 @@ from orchestrator.master.experiment import (
     Order,
     written_order,
 )
-from orchestrator.master.observer import Ending, Header
+from orchestrator.master.fmi.transfer import FMI_TYPES
+from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.schedule import stages
 from orchestrator.master.simulation import completed
-from orchestrator.master.transfer import KINDS
+from orchestrator.runs.preparation import DEFAULT_STEP
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
@@ -31,7 +31,7 @@ from orchestrator.system.structure import System
 _FIRST = 5
 
 
-class Way(NamedTuple):
+class Algorithm(NamedTuple):
     """A way to run a system, as some tool may.
 
     Attributes:
@@ -87,7 +87,7 @@ def verify(
         str(PortName(component.name, variable.name)): variable.type
         for component in system.components.values()
         for variable in component.having("output")
-        if variable.type in KINDS
+        if variable.type in FMI_TYPES
     }
     known = {
         str(PortName(component.name, variable.name))
@@ -110,24 +110,24 @@ def verify(
     raise InputError(f"{path}: {'; '.join(complaints)}")
 
 
-def _ways(system: System, order: Order | None, at_start: bool) -> Iterator[Way]:
+def _ways(system: System, order: Order | None, at_start: bool) -> Iterator[Algorithm]:
     """The ways to run a system that a table may agree with."""
     start = "" if at_start else ", no values exchanged in initialisation mode"
     exchange = Exchange(at_start)
     if not (order is None or isinstance(order, str)):
         words = f"in the order {written_order(order)}"
         latest = exchange._replace(latest=True)
-        yield Way(order, None, latest, f"{words}, each with the latest outputs{start}")
+        yield Algorithm(order, None, latest, f"{words}, each with the latest outputs{start}")
     # Other tools solve rings, or delay them.
     for coupling in (None, DELAY) if rings(system) else (None,):
         delayed = ", rings delayed" * (coupling == DELAY)
         for one in ORDERS if order is None else (order,):
             named = written_order(one)
             words = f"in {named} order" if isinstance(one, str) else f"as run --order {named}"
-            yield Way(one, coupling, exchange, f"{words}{delayed}{start}")
+            yield Algorithm(one, coupling, exchange, f"{words}{delayed}{start}")
 
 
-def _complaint(table: ForeignTable, system: System, way: Way, tolerance: float) -> str | None:
+def _complaint(table: ForeignTable, system: System, way: Algorithm, tolerance: float) -> str | None:
     """What is wrong with a table, seen from our own run; None: nothing."""
     stop_time = float(table.time[-1])
     ours = _Samples(table.time, tuple(table.columns))
@@ -201,7 +201,7 @@ def _certificate(
     table: ForeignTable,
     system: System,
     outputs: Mapping[str, str],
-    way: Way,
+    way: Algorithm,
     tolerance: float,
     verbose: bool,
 ) -> Iterator[str]:

@@ -1,10 +1,13 @@
-"""How the components of a run are coupled: at its start, and in every step."""
+"""How components are coupled: at the start, in every step, and when a delay lets values grow."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
-from orchestrator.errors import InputError, StartError
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from orchestrator.machine.errors import InputError, StartError
 from orchestrator.master.experiment import (
     DELAY,
     GAUSS_SEIDEL,
@@ -13,19 +16,72 @@ from orchestrator.master.experiment import (
     SOLVE,
     Exchange,
     Experiment,
+    decimations,
 )
-from orchestrator.master.instance import Instance
+from orchestrator.master.fmi.instance import Instance
+from orchestrator.master.fmi.log import Log
+from orchestrator.master.gathering import Gathering
 from orchestrator.master.linear import LinearSteps
-from orchestrator.master.log import Log
-from orchestrator.master.paces import paces
+from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import Action, Stage, delays, schedule, stages
+from orchestrator.master.schedule import Stage, StageCall, delays, schedule, stages
 from orchestrator.master.settling import Settling
-from orchestrator.master.signals import Gathering
 from orchestrator.system.graph import has_feedthrough, rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+
+#: A value grows without bound if it doubles at least so often in each of so many intervals, one
+#: after the other, and so often in all of them together. What grows with a power of time does not.
+_INTERVALS, _DOUBLINGS, _IN_ALL = 8, 1.0, 24.0
+
+#: Lengths of these intervals, in steps.
+_LENGTHS = tuple(2**i for i in range(9))
+
+
+class Growth:
+    """An observer that ends a run in which values of delayed rings grow without bound."""
+
+    def __init__(self, ports: Collection[PortName]) -> None:
+        """Watch some ports."""
+        self._names = list(map(str, ports))
+        self._columns: list[int] = []
+        self._rows = 0
+        self._last = {length: np.empty((0, len(self._names))) for length in _LENGTHS}
+
+    def begin(self, header: Header) -> None:
+        """Find the ports."""
+        places = {name: i for i, name in enumerate(header.columns, start=1)}
+        self._columns = [places[name] for name in self._names]
+
+    def take(self, rows: np.ndarray) -> None:
+        """Look at some rows.
+
+        Raises:
+            InputError: a value grows without bound.
+
+        """
+        sizes = np.log2(np.abs(rows[:, self._columns]))
+        # From zero, everything is infinitely far.
+        sizes[np.isinf(sizes)] = np.nan
+        for length in _LENGTHS:
+            new = sizes[-self._rows % length :: length]
+            known = np.concatenate([self._last[length], new])
+            self._last[length] = known[-_INTERVALS - 1 :]
+            if len(new) and len(known) > _INTERVALS:
+                doublings = sliding_window_view(np.diff(known, axis=0), _INTERVALS, axis=0)
+                grows = doublings.min(axis=-1) >= _DOUBLINGS
+                grows &= doublings.sum(axis=-1) >= _IN_ALL
+                if found := np.flatnonzero(grows.any(axis=0)).tolist():
+                    raise InputError(
+                        f"{self._names[found[0]]} grows without bound, in a ring of direct "
+                        "feedthroughs that is delayed by a step; --coupling solve, if its FMUs "
+                        "allow it, or another --order may help"
+                    )
+        self._rows += len(rows)
+
+    def end(self, ending: Ending) -> None:
+        """Nothing is kept."""
 
 
 class Coupling:
@@ -100,7 +156,7 @@ class Coupling:
         if self._experiment.coupling == LINEAR:
             settling = self._settling(self._solved)
             steps = LinearSteps(system, instances, row, settling)
-            stage = Stage(Gathering.along(row, ()), [Action(steps.step).member])
+            stage = Stage(Gathering.along(row, ()), [StageCall(steps.step).member])
             return [stage], settling.gatherings
         found = schedule(
             system,
@@ -139,7 +195,7 @@ class Coupling:
         else:
             for ring in self._rings:
                 reasons |= ring.unsolved()
-            for name, n in paces(system, self._experiment.step).items():
+            for name, n in decimations(system, self._experiment.step).items():
                 if n > 1:
                     reasons[name] = f"{name} takes longer steps"
         solved = rings(system, system.components.keys() - reasons.keys())

@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 from fmpy.fmi2 import fmi2OK, fmi2Warning
 
-from orchestrator.master.attendant import Run
 from orchestrator.master.experiment import ROUNDING
-from orchestrator.master.instance import Ended
+from orchestrator.master.fmi.instance import Ended
+from orchestrator.master.hooks.hook import Run
 from orchestrator.master.loop import Steps
 from orchestrator.master.schedule import Stage, step
 
@@ -71,7 +71,7 @@ def _finished(run: Run, end: Ended) -> Iterator[None]:
     run.experiment, left = cut, run.stages[place + 1 :]
     for n, t, _, after in cut.steps(k):
         for stage in left:
-            if stage.pace and not stage.pace.is_due(n - 1, cut.rows - 1):
+            if stage.decimation and not stage.decimation.is_due(n - 1, cut.rows - 1):
                 continue
             stage.gather(run.row.values)
             every = _every(stage)
@@ -92,7 +92,7 @@ def _finished(run: Run, end: Ended) -> Iterator[None]:
 
 
 def _every(stage: Stage) -> int:
-    return stage.pace.every if stage.pace else 1
+    return stage.decimation.every if stage.decimation else 1
 
 
 def _can_be_read(stage: Stage, component: str) -> bool:

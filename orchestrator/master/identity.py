@@ -15,9 +15,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from platform import python_version
 
-from orchestrator.master.events import Event
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.playback import Course
+from orchestrator.master.hooks.events import Event
+from orchestrator.master.hooks.playback import InputTable
 from orchestrator.system.structure import System
 
 #: Packages whose versions the rows depend on.
@@ -26,12 +26,15 @@ PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy")
 #: All that decides the numbers of a run: by names in words, each as text.
 Identity = Mapping[str, str]
 
+#: Rooms whose code makes the rows.
+ROOMS = ("machine", "system", "formats", "master")
+
 
 def identity(
     system: System,
     experiment: Experiment,
     events: Sequence[Event] = (),
-    course: Course | None = None,
+    input_table: InputTable | None = None,
 ) -> Identity:
     """All that the rows of a run depend on.
 
@@ -43,7 +46,9 @@ def identity(
 
     """
     return {
-        "the code": code_of("orchestrator.system", "orchestrator.master"),
+        "the code": code_of(
+            *(f"orchestrator.{room}" for room in ("machine", "system", "formats", "master"))
+        ),
         "the version of Python": python_version(),
         **{f"the version of {package}": version(package) for package in PACKAGES},
         # Their order is that of the columns, and says where a ring is opened.
@@ -55,7 +60,7 @@ def identity(
         **_parameters(system),
         **{name: repr(value) for name, value in vars(experiment).items()},
         "the events": repr(tuple(events)),
-        "the inputs": "" if course is None else course.digest,
+        "the inputs": "" if input_table is None else input_table.digest,
     }
 
 

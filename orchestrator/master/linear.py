@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from orchestrator.errors import InputError
-from orchestrator.master.instance import Instance
+from orchestrator.machine.errors import InputError
+from orchestrator.master.fmi.instance import Instance
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import member, step
 from orchestrator.master.settling import Settling

@@ -13,13 +13,12 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from orchestrator.errors import InputError
-from orchestrator.master.attendant import Run
+from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.isolated import Isolation
-from orchestrator.master.library import kept, made
+from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.hooks.hook import Run
 from orchestrator.master.schedule import step
-from orchestrator.master.stepper import stepped
+from orchestrator.master.stepper import kept, made, stepped
 
 #: Loops that can be asked for; the first is the default.
 LOOPS = ("auto", "python", "compiled")
@@ -58,17 +57,17 @@ def interpreted(run: Run) -> Iterator[None]:
     # Times zero, what is finite is zero and what is not is nan: the cheapest way to see it.
     is_not_finite = partial(np.vdot, shown, np.zeros_like(shown))
     for k, t, h, end in experiment.steps(run.made):
-        for gather, members, pace in stages:
-            if pace is None:
+        for gather, members, decimation in stages:
+            if decimation is None:
                 # What most stages are costs no call.
                 if gather.is_plain:
                     values[gather.targets] = values[gather.sources]
                 else:
                     gather(values)
                 step(members, t, h)
-            elif pace.is_due(k - 1, steps):
+            elif decimation.is_due(k - 1, steps):
                 gather(values)
-                step(members, t, experiment.length(k - 1, pace.every))
+                step(members, t, experiment.length(k - 1, decimation.every))
         if is_not_finite():
             return
         append(end, shown)

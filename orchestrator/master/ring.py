@@ -14,10 +14,10 @@ from math import inf
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from orchestrator.errors import shortened
-from orchestrator.master.instance import ComponentFailed, Instance
+from orchestrator.machine.errors import shortened
+from orchestrator.master.fmi.instance import ComponentFailed, Instance
+from orchestrator.master.gathering import Gathering
 from orchestrator.master.row import Row
-from orchestrator.master.signals import Gathering
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System

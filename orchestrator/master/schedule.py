@@ -30,15 +30,14 @@ from typing import NamedTuple, Protocol
 
 from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
 
-from orchestrator.errors import InputError, shortened
-from orchestrator.master import layout
-from orchestrator.master.experiment import JACOBI, ORDERS, Experiment, Order
-from orchestrator.master.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
-from orchestrator.master.mode import PRODUCT, A, B, C, put_back
-from orchestrator.master.paces import paces
+from orchestrator.machine.errors import InputError, shortened
+from orchestrator.master.experiment import JACOBI, ORDERS, Experiment, Order, decimations
+from orchestrator.master.fmi.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
+from orchestrator.master.fmi.surroundings import PRODUCT, A, B, C, put_back
+from orchestrator.master.gathering import Gathering
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Row
-from orchestrator.master.signals import Gathering
+from orchestrator.master.stepper_types import CMember, CMove
 from orchestrator.system.component import Component
 from orchestrator.system.graph import delayed, derived_order, has_feedthrough, in_stages
 from orchestrator.system.names import PortName
@@ -60,7 +59,7 @@ class Steppable(Protocol):
     name: str
     is_here: bool
 
-    def pointers(self) -> layout.Member:
+    def pointers(self) -> CMember:
         """The same calls as pointers."""
 
     def failed(self, status: int, function: str) -> Exception:
@@ -76,7 +75,7 @@ class Member(NamedTuple):
     instance: Steppable
 
 
-class Action:
+class StageCall:
     """A member of a stage that acts in the place of a step, and is no component."""
 
     name, is_here = "", True
@@ -106,10 +105,10 @@ class Action:
         assert self._error is not None
         return self._error
 
-    def pointers(self) -> layout.Member:
+    def pointers(self) -> CMember:
         """The same for the compiled loop."""
-        nothing = (layout.Move * 0)()
-        return layout.Member(None, cast(self._called_back, c_void_p).value, nothing, nothing, 0, 0)
+        nothing = (CMove * 0)()
+        return CMember(None, cast(self._called_back, c_void_p).value, nothing, nothing, 0, 0)
 
     def _tried(self, t: float, h: float) -> int:
         try:
@@ -121,7 +120,7 @@ class Action:
         return int(fmi2OK)
 
 
-class Pace(NamedTuple):
+class Decimation(NamedTuple):
     """When a slow component is stepped, or what it has computed is shown.
 
     Attributes:
@@ -152,7 +151,7 @@ class Stage(NamedTuple):
 
     gather: Gathering
     members: list[Member]
-    pace: Pace | None = None
+    decimation: Decimation | None = None
 
 
 def stages(system: System, order: Order, solved: Sequence[Sequence[str]] = ()) -> list[list[str]]:
@@ -274,7 +273,7 @@ def schedule(
         latest: whether stages take all that those before them have computed.
 
     """
-    pace = paces(system, experiment.step)
+    decimation = decimations(system, experiment.step)
     ring_of = {ring.names[0]: ring for ring in rings}
     renewed = [Stage(Gathering.along(row, ()), [_action(ring.renew)]) for ring in rings]
     found: list[Stage] = []
@@ -285,13 +284,13 @@ def schedule(
     for names, connections in zip(plan, gathers, strict=True):
         taken: dict[int, list[Connection]] = {1: []}
         for connection in connections:
-            taken.setdefault(pace[connection.target.component], []).append(connection)
+            taken.setdefault(decimation[connection.target.component], []).append(connection)
         fast = Stage(
             Gathering.along(row, taken.pop(1)),
-            [member(instances[name]) for name in names if pace[name] == 1],
+            [member(instances[name]) for name in names if decimation[name] == 1],
         )
         # All inputs are gathered before anybody is stepped.
-        found += [Stage(Gathering.along(row, some), [], Pace(n)) for n, some in taken.items()]
+        found += [Stage(Gathering.along(row, some), [], Decimation(n)) for n, some in taken.items()]
         here = [ring_of[name] for name in names if name in ring_of]
         if here:
             # All are stepped before one takes what another has come to.
@@ -302,23 +301,23 @@ def schedule(
         else:
             found.append(fast)
         for name in names:
-            if (n := pace[name]) > 1:
+            if (n := decimation[name]) > 1:
                 early, later = (
                     Gathering(*row.hidden(ports))
                     for ports in _shown(system.components[name], experiment.order)
                 )
                 found += [
-                    Stage(nothing, [member(instances[name])], Pace(n)),
-                    Stage(early, [], Pace(n)),
+                    Stage(nothing, [member(instances[name])], Decimation(n)),
+                    Stage(early, [], Decimation(n)),
                 ]
-                shown.append(Stage(later, [], Pace(n, at_end=True)))
+                shown.append(Stage(later, [], Decimation(n, at_end=True)))
     found += shown + renewed
     return [stage for stage in found if stage.members or len(stage.gather.targets)]
 
 
 def _action(act: Callable[[], object]) -> Member:
     """A member that does something that needs no time."""
-    return Action(lambda _t, _h: act()).member
+    return StageCall(lambda _t, _h: act()).member
 
 
 def _shown(component: Component, order: Order) -> tuple[list[PortName], list[PortName]]:

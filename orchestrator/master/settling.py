@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from orchestrator.errors import shortened
-from orchestrator.master.instance import ComponentFailed, Instance
+from orchestrator.machine.errors import shortened
+from orchestrator.master.fmi.instance import ComponentFailed, Instance
+from orchestrator.master.gathering import Gathering
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Row
-from orchestrator.master.signals import Gathering
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 

@@ -10,26 +10,23 @@ from time import monotonic
 
 import numpy as np
 
-from orchestrator.errors import InputError, StartError, reason, unforeseen
-from orchestrator.master.attendant import Attendance, Attendant, Run
-from orchestrator.master.coupling import Coupling
+from orchestrator.machine.errors import InputError, StartError, reason, unforeseen
+from orchestrator.machine.interrupts import held_interrupts
+from orchestrator.master.coupling import Coupling, Growth
 from orchestrator.master.ends import to_its_end
-from orchestrator.master.experiment import LINEAR, OURS, Exchange, Experiment
-from orchestrator.master.growth import Growth
-from orchestrator.master.instance import ComponentFailed, Ended, Instance
-from orchestrator.master.interrupts import held_interrupts
-from orchestrator.master.isolated import Isolation
+from orchestrator.master.experiment import LINEAR, OURS, Exchange, Experiment, decimations
+from orchestrator.master.fmi.instance import ComponentFailed, Ended, Instance
+from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.fmi.log import Log
+from orchestrator.master.fmi.placement import placed
+from orchestrator.master.fmi.surroundings import Surroundings, default_mode
+from orchestrator.master.gathering import Overrides
+from orchestrator.master.hooks.hook import Hook, Hooks, Run
 from orchestrator.master.linear import check_linear
-from orchestrator.master.log import Log
 from orchestrator.master.loop import PYTHON_LOOP, Loop
-from orchestrator.master.mode import default_mode
-from orchestrator.master.observer import Blocks, Ending, Header, NotKept, Observer
-from orchestrator.master.paces import paces
-from orchestrator.master.placing import placed
+from orchestrator.master.observers.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import stages
-from orchestrator.master.signals import Signals
-from orchestrator.master.surroundings import Surroundings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import literal, same
@@ -44,7 +41,7 @@ def simulate(
     observers: Sequence[Observer] = (),
     isolation: Isolation | None = None,
     loop: Loop = PYTHON_LOOP,
-    attendants: Sequence[Attendant] = (),
+    hooks: Sequence[Hook] = (),
     exchange: Exchange = OURS,
 ) -> Ending:
     """Run a system.
@@ -55,7 +52,7 @@ def simulate(
         observers: take the rows.
         isolation: run each FMU in a process of its own; None: all in this one.
         loop: makes the steps.
-        attendants: act between them, in this order.
+        hooks: act between them, in this order.
         exchange: of values.
 
     Returns:
@@ -70,7 +67,7 @@ def simulate(
     stages(system, experiment.order)
     if experiment.coupling == LINEAR:
         check_linear(system)
-    slow = {name for name, n in paces(system, experiment.step).items() if n > 1}
+    slow = {name for name, n in decimations(system, experiment.step).items() if n > 1}
     log = Log()
     experiment = _whole_steps(system, experiment, log)
     with held_interrupts() as interrupts, Surroundings() as surroundings, ExitStack() as stack:
@@ -84,8 +81,8 @@ def simulate(
             coupling.initialise()
             names = tuple(map(str, row.columns))
             parameters = _parameters(system, instances, log)
-            texts = dict.fromkeys(map(str, row.text_ports), row.texts)
-            header = Header(names, experiment, parameters, loop.name, texts)
+            strings = dict.fromkeys(map(str, row.text_ports), row.strings)
+            header = Header(names, experiment, parameters, loop.name, strings)
         scheduled, gatherings = coupling.schedule()
         if watched := coupling.delayed_ports():
             observers = [*observers, Growth(watched)]
@@ -93,23 +90,23 @@ def simulate(
             blocks = Blocks(len(row.shown), observers, surroundings.ours)
             interrupts.hand_over = blocks.hand_over
             blocks.append(experiment.start_time, row.shown)
-            signals = Signals(row, gatherings, system.connections)
+            overrides = Overrides(row, gatherings, system.connections)
             run = Run(
                 system,
                 experiment,
                 instances,
                 row,
                 scheduled,
-                signals,
+                overrides,
                 blocks,
                 log,
                 interrupts,
-                attendants,
+                hooks,
             )
             order = [name for names in coupling.plan for name in names]
             remark = None
             try:
-                failure = _advance(run, loop, Attendance(run), order, surroundings)
+                failure = _advance(run, loop, Hooks(run), order, surroundings)
             except NotKept as error:
                 # Rows that cannot be kept need not be computed.
                 failure = str(error)
@@ -152,8 +149,8 @@ def _whole_steps(system: System, experiment: Experiment, log: Log) -> Experiment
 
     """
     rigid = [name for name, component in system.components.items() if not component.takes_any_step]
-    pace = paces(system, experiment.step)
-    period = lcm(*(pace[name] for name in rigid))
+    decimation = decimations(system, experiment.step)
+    period = lcm(*(decimation[name] for name in rigid))
     whole = experiment.full_steps // period * period
     if not rigid or whole == experiment.rows - 1:
         return experiment
@@ -211,17 +208,17 @@ def _terminate(instances: Mapping[str, Instance]) -> None:
 def _advance(
     run: Run,
     loop: Loop,
-    attendance: Attendance,
+    hooks: Hooks,
     order: Sequence[str],
     surroundings: Surroundings,
 ) -> str | None:
     """Step to the end, or to the first failure, and say what it was."""
     blocks, failure = run.blocks, None
     try:
-        attendance.attend()
+        hooks.act()
         for _ in to_its_end(loop.steps, run):
             if run.made >= run.due:
-                attendance.attend()
+                hooks.act()
             if monotonic() > blocks.due:
                 blocks.hand_over()
             if run.interrupts.signals:

@@ -1,14 +1,45 @@
-"""The compiled loop: steps made by stepper.c, some hundred in one call."""
+"""The compiled loop: stepper.c, compiled once into the user's cache folder, makes the steps."""
 
 from __future__ import annotations
 
+import sys
+import sysconfig
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from ctypes import CDLL, POINTER, c_double, c_int, c_size_t
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from orchestrator.master import layout
-from orchestrator.master.attendant import Run
-from orchestrator.master.instance import CALLS
-from orchestrator.master.schedule import Pace, Stage
+from orchestrator.machine import cache as user_cache
+from orchestrator.machine.compiler import Compiler, compiler, of_the_machine
+from orchestrator.machine.errors import InputError, last_line, reason
+from orchestrator.machine.locks import claimed, process_folder
+from orchestrator.master.fmi.instance import CALLS
+from orchestrator.master.hooks.hook import Run
+from orchestrator.master.schedule import Decimation, Stage
+from orchestrator.master.stepper_types import (
+    DUE,
+    FAILED,
+    CBlock,
+    CFailure,
+    CMapping,
+    CMember,
+    CRun,
+    CStage,
+)
+
+_SOURCE = Path(__file__).with_name("stepper.c")
+
+#: Products are not contracted with sums: t + h must not depend on the processor.
+_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC")
+
+#: What it is in the user's cache folder.
+_CATEGORY = "loop"
+
+#: Libraries that this process has loaded, by cache folders.
+_in_use: dict[Path, CDLL] = {}
 
 #: Longest time until Python looks whether somebody wants the run to stop [s].
 _GLANCE = 0.02
@@ -19,13 +50,13 @@ def stepped(library: CDLL, run: Run) -> Iterator[None]:
     advance = library.advance
     advance.restype = c_int
     advance.argtypes = (
-        POINTER(layout.Run), c_size_t, c_size_t, c_double, POINTER(layout.Block),
-        POINTER(layout.Failure),
+        POINTER(CRun), c_size_t, c_size_t, c_double, POINTER(CBlock),
+        POINTER(CFailure),
     )  # fmt: skip
     stages, row, experiment, blocks = run.stages, run.row, run.experiment, run.blocks
     steps = experiment.rows - 1
-    plan = layout.Run(
-        (layout.Stage * len(stages))(*map(_laid_out, stages)),
+    plan = CRun(
+        (CStage * len(stages))(*map(_laid_out, stages)),
         row.values.ctypes.data,
         len(stages),
         len(row.shown),
@@ -35,35 +66,106 @@ def stepped(library: CDLL, run: Run) -> Iterator[None]:
         experiment.full_steps,
         steps,
     )
-    block, failure = blocks.block, layout.Failure()
-    outcome = layout.DUE
-    while outcome == layout.DUE and run.made < steps:
+    block, failure = blocks.block, CFailure()
+    outcome = DUE
+    while outcome == DUE and run.made < steps:
         if block.n == block.most:
             blocks.hand_over()
         before = block.n
         outcome = advance(plan, run.made, min(run.due, steps), _GLANCE, block, failure)
         run.made += block.n - before
         yield
-    if outcome == layout.FAILED:
+    if outcome == FAILED:
         member = stages[failure.stage].members[failure.member]
         raise member.instance.failed(failure.status, CALLS[failure.call])
 
 
-def _laid_out(stage: Stage) -> layout.Stage:
+def _laid_out(stage: Stage) -> CStage:
     gather, members = stage.gather, [member.instance.pointers() for member in stage.members]
     mappings = [_mapping(place, gather.mapped[place]) for place in sorted(gather.mapped)]
-    return layout.Stage(
+    return CStage(
         *(array.ctypes.data for array in (gather.targets, gather.sources)),
         *(array.ctypes.data for array in (gather.factors, gather.offsets)),
-        (layout.Mapping * len(mappings))(*mappings),
-        (layout.Member * len(members))(*members),
+        (CMapping * len(mappings))(*mappings),
+        (CMember * len(members))(*members),
         len(gather.targets),
         len(mappings),
         len(members),
-        *(stage.pace or Pace(1)),
+        *(stage.decimation or Decimation(1)),
     )
 
 
-def _mapping(place: int, pairs: Mapping[float, float]) -> layout.Mapping:
+def _mapping(place: int, pairs: Mapping[float, float]) -> CMapping:
     n = len(pairs)
-    return layout.Mapping(place, n, (c_double * n)(*pairs), (c_double * n)(*pairs.values()))
+    return CMapping(place, n, (c_double * n)(*pairs), (c_double * n)(*pairs.values()))
+
+
+def kept() -> CDLL | None:
+    """The library that was compiled earlier; None: there is none."""
+    folder = user_cache.users_folder()
+    if folder not in _in_use:
+        # What is loaded needs no second look: short runs would take longer for it.
+        with suppress(OSError):
+            _in_use.update((folder, _loaded(path)) for path in user_cache.kept(_CATEGORY, _key()))
+    return _in_use.get(folder)
+
+
+def made(in_no_time: bool = False) -> CDLL:
+    """The library, compiled now.
+
+    Args:
+        in_no_time: only by a compiler that takes a tenth of a second.
+
+    Raises:
+        InputError: it cannot be; the text says what to do.
+
+    """
+    found = of_the_machine() if in_no_time else compiler()
+    if found is None:
+        raise InputError(
+            "the compiled loop needs a C compiler: install gcc or clang, or `pip install ziglang`"
+        )
+    try:
+        return _made(found)
+    except OSError as error:
+        raise InputError(f"the loop cannot be compiled: {reason(error)}") from error
+
+
+def _made(compiler: Compiler) -> CDLL:
+    """The library, compiled and kept.
+
+    Raises:
+        OSError: it cannot be compiled, kept or loaded.
+
+    """
+    with claimed(user_cache.folder_of(_CATEGORY), wait=True):
+        if library := kept():
+            # Another process was first.
+            return library
+        with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
+            path = Path(temporary, _name())
+            process = compiler(*_FLAGS, str(_SOURCE), "-o", str(path))
+            if process.returncode != 0:
+                raise OSError(last_line(process.stderr))
+            [place] = user_cache.keep(_CATEGORY, _key(), {path.name: path.read_bytes()})
+    return _loaded(place)
+
+
+@cache
+def _loaded(place: Path) -> CDLL:
+    library = CDLL(str(place))
+    if not hasattr(library, "advance"):
+        raise OSError(f"{place} has no function advance")
+    return library
+
+
+def _name() -> str:
+    return "stepper" + (".dll" if sys.platform == "win32" else ".so")
+
+
+@cache
+def _key() -> str:
+    """Of the text, the flags and the kind of machine."""
+    digest = sha256(_SOURCE.read_bytes())
+    digest.update("\0".join((*_FLAGS, sysconfig.get_platform())).encode())
+    return digest.hexdigest()[:16]

@@ -17,7 +17,7 @@ from auv_fmu.euler import STEP
 from auv_fmu.motion_planner import TAU_D
 from auv_fmu.vehicle import Vehicle
 from orchestrator.master.experiment import ORDERS
-from orchestrator.studies.engine import Run
+from orchestrator.studies.engine import Point
 
 #: The scenarios of the two columns of the table.
 PROPOSED, PD = "fig5", "fig5-pd"
@@ -210,7 +210,7 @@ def options_of(choice: Choice, scenario: str) -> tuple[Option, ...]:
     return choice.options
 
 
-def runs(scenario: str, of_runs: Sequence[Choice] = OF_RUNS) -> Iterator[Run]:
+def runs(scenario: str, of_runs: Sequence[Choice] = OF_RUNS) -> Iterator[Point]:
     """A run for each combination, in the order of the choices; the last varies fastest."""
     combinations = product(*(options_of(choice, scenario) for choice in of_runs))
     for number, combination in enumerate(combinations):
@@ -218,4 +218,4 @@ def runs(scenario: str, of_runs: Sequence[Choice] = OF_RUNS) -> Iterator[Run]:
             name: value for option in combination for name, value in option.parameters.items()
         }
         order = next((option.order for option in combination if option.order), ORDERS[0])
-        yield Run(number, scenario, parameters, END_TIMES[-1], STEP, order)
+        yield Point(number, scenario, parameters, END_TIMES[-1], STEP, order)

@@ -17,33 +17,31 @@ from auv_fmu.output_feedback import Gains
 from auv_fmu.proof.attraction import theorem
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from auv_fmu.vehicle import Vehicle
-from orchestrator.paper.formatting import actuator_values, numbers
+from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.measures import (
-    largest_error_after,
-    largest_estimate,
-    sum_without_step,
-    total_variation_until,
-    turning_radius,
-    way_of,
-)
-from orchestrator.paper.outcomes import Outcome
-from orchestrator.paper.published import (
     EFFORT_PD,
     EFFORT_PROPOSED,
     FINAL_ERROR_PD,
     FINAL_ERROR_PROPOSED,
     TURNING_RADIUS,
+    approach_of,
+    largest_error_after,
+    largest_estimate,
+    sum_without_step,
+    total_variation_until,
+    turning_radius,
 )
-from orchestrator.paper.runs import Run
+from orchestrator.paper.page import actuator_values, numbers
+from orchestrator.paper.variations import Variation
 from orchestrator.studies.engine import REACHED
 
 #: The runs of the figures, and what the claims change in them.
-FIVE, FIVE_PD = Run("fig5"), Run("fig5-pd")
-SIX, SIX_PD = Run("fig6"), Run("fig6-pd")
-SEVEN = (Run("fig7a"), Run("fig7b"), Run("fig7c"))
-QUIET = Run("fig4", {"plant.noise.std": 0.0})
-SHARP = Run("fig5", {"controller.eps_t": 1.0})
-TURNING = Run("fig3b", {"plant.tau.u": 80.0, "plant.tau.q": 0.0, "plant.tau.r": 80.0})
+FIVE, FIVE_PD = Variation("fig5"), Variation("fig5-pd")
+SIX, SIX_PD = Variation("fig6"), Variation("fig6-pd")
+SEVEN = (Variation("fig7a"), Variation("fig7b"), Variation("fig7c"))
+QUIET = Variation("fig4", {"plant.noise.std": 0.0})
+SHARP = Variation("fig5", {"controller.eps_t": 1.0})
+TURNING = Variation("fig3b", {"plant.tau.u": 80.0, "plant.tau.q": 0.0, "plant.tau.r": 80.0})
 
 #: A signal that is squared and integrated.
 _SQUARED = "·√s"
@@ -76,15 +74,15 @@ class Claim:
 
     title: str
     published: str
-    runs: tuple[Run, ...]
+    runs: tuple[Variation, ...]
     judge: Callable[..., Finding]
 
-    def finding(self, outcomes: Sequence[Outcome]) -> Finding:
+    def finding(self, kept_runs: Sequence[KeptRun]) -> Finding:
         """What the outcomes of the runs say."""
-        for outcome in outcomes:
-            if outcome.failure is not None:
-                return Finding(f"a run ended early: {outcome.failure}", "none")
-        return self.judge(*outcomes)
+        for kept_run in kept_runs:
+            if kept_run.failure is not None:
+                return Finding(f"a run ended early: {kept_run.failure}", "none")
+        return self.judge(*kept_runs)
 
 
 #: All claims, in the order of the paper.
@@ -92,7 +90,7 @@ CLAIMS: list[Claim] = []
 
 
 def claim(
-    title: str, published: str, *runs: Run
+    title: str, published: str, *runs: Variation
 ) -> Callable[[Callable[..., Finding]], Callable[..., Finding]]:
     """Register a function of the outcomes of some runs as the judge of a claim."""
 
@@ -118,7 +116,7 @@ def ratio(ours: Sequence[float], published: Sequence[float]) -> str:
     f"{TURNING_RADIUS:g} m",
     TURNING,
 )
-def turning(run: Outcome) -> Finding:
+def turning(run: KeptRun) -> Finding:
     """The radius of the circle, and its diameter, which is what may have been printed."""
     radius = turning_radius(run.table)
     return Finding(
@@ -130,7 +128,7 @@ def turning(run: Outcome) -> Finding:
 
 
 @claim("Fig. 4: the vehicle tracks the reference without saturation", "no saturation", QUIET)
-def no_saturation(quiet: Outcome) -> Finding:
+def no_saturation(quiet: KeptRun) -> Finding:
     """No step whose command is outside the limits of (3)."""
     return Finding(
         f"peaks {actuator_values(quiet.metrics['peak_command'])} of 80",
@@ -139,14 +137,14 @@ def no_saturation(quiet: Outcome) -> Finding:
 
 
 @claim("Fig. 4: the tracking errors converge to a neighbourhood of the origin", "no numbers", QUIET)
-def convergence(quiet: Outcome) -> Finding:
+def convergence(quiet: KeptRun) -> Finding:
     """e_f within 0.1 m."""
     error = quiet.metrics["final_error"]
     return Finding(f"e_f {numbers(error)} m", said(max(error) < 0.1))
 
 
 @claim("Fig. 4: the estimated parameters are bounded", "no numbers", QUIET)
-def bounded_estimates(quiet: Outcome) -> Finding:
+def bounded_estimates(quiet: KeptRun) -> Finding:
     """A run of finite length can only fail to contradict this."""
     largest = largest_estimate(quiet.table)
     return Finding(
@@ -161,7 +159,7 @@ def bounded_estimates(quiet: Outcome) -> Finding:
     actuator_values(EFFORT_PROPOSED),
     FIVE,
 )
-def effort_proposed(five: Outcome) -> Finding:
+def effort_proposed(five: KeptRun) -> Finding:
     """The L2 norms beside the printed numbers."""
     effort = five.metrics["l2_effort"]
     return Finding(actuator_values(effort, _SQUARED), ratio(effort, EFFORT_PROPOSED))
@@ -172,7 +170,7 @@ def effort_proposed(five: Outcome) -> Finding:
     actuator_values(EFFORT_PD),
     FIVE_PD,
 )
-def effort_pd(pd: Outcome) -> Finding:
+def effort_pd(pd: KeptRun) -> Finding:
     """The L2 norms beside the printed numbers."""
     effort = pd.metrics["l2_effort"]
     return Finding(actuator_values(effort, _SQUARED), ratio(effort, EFFORT_PD))
@@ -184,7 +182,7 @@ def effort_pd(pd: Outcome) -> Finding:
     FIVE,
     FIVE_PD,
 )
-def effort_as_printed(five: Outcome, pd: Outcome) -> Finding:
+def effort_as_printed(five: KeptRun, pd: KeptRun) -> Finding:
     """(59) itself."""
     proposed, baseline = five.metrics["rms_effort"], pd.metrics["rms_effort"]
     holds = np.allclose(proposed, EFFORT_PROPOSED, rtol=0.5)
@@ -200,7 +198,7 @@ def effort_as_printed(five: Outcome, pd: Outcome) -> Finding:
     FIVE,
     FIVE_PD,
 )
-def effort_as_a_sum(five: Outcome, pd: Outcome) -> Finding:
+def effort_as_a_sum(five: KeptRun, pd: KeptRun) -> Finding:
     """It falls with T_f, which is not given."""
     proposed, baseline = (
         sum_without_step(
@@ -221,19 +219,20 @@ def effort_as_a_sum(five: Outcome, pd: Outcome) -> Finding:
     FIVE,
     FIVE_PD,
 )
-def effort_of_the_way(five: Outcome, pd: Outcome) -> Finding:
+def effort_of_the_way(five: KeptRun, pd: KeptRun) -> Finding:
     """No course of the force gives that impulse in that time with the printed L2 norm."""
-    ways = [found for run in (five, pd) if (found := way_of(run.table))]
+    approaches = [found for run in (five, pd) if (found := approach_of(run.table))]
     published = EFFORT_PROPOSED[0], EFFORT_PD[0]
-    if len(ways) < len(published):
+    if len(approaches) < len(published):
         return Finding(f"|e| does not come to {REACHED:g} m", "none")
-    least = [found.least_effort for found in ways]
-    soonest = [found.soonest(effort) for found, effort in zip(ways, published, strict=True)]
-    took = ", and ".join(f"{found.impulse:.4g} N·s in {found.duration:.3g} s" for found in ways)
+    least = [found.least_effort for found in approaches]
+    pairs = list(zip(approaches, published, strict=True))
+    soonest = [found.soonest(effort) for found, effort in pairs]
+    took = ", and ".join(
+        f"{found.impulse:.4g} N·s in {found.duration:.3g} s" for found in approaches
+    )
     step = five.table.header.experiment.step
-    free = [
-        found.contradicts_until(effort, step) for found, effort in zip(ways, published, strict=True)
-    ]
+    free = [found.contradicts_until(effort, step) for found, effort in pairs]
     return Finding(
         f"{took}, until |e| is {REACHED:g} m: not below {numbers(least)} N{_SQUARED} (Cauchy and "
         "Schwarz)",
@@ -244,20 +243,20 @@ def effort_of_the_way(five: Outcome, pd: Outcome) -> Finding:
 
 
 @claim("4.2: e_f of the proposed controller (x, y, z)", f"{numbers(FINAL_ERROR_PROPOSED)} m", FIVE)
-def final_error_proposed(five: Outcome) -> Finding:
+def final_error_proposed(five: KeptRun) -> Finding:
     """e_f beside the printed numbers."""
     error = five.metrics["final_error"]
     return Finding(f"{numbers(error)} m", ratio(error, FINAL_ERROR_PROPOSED))
 
 
 @claim("4.2: the same with eps_t = 1 instead of 10", f"{numbers(FINAL_ERROR_PROPOSED)} m", SHARP)
-def final_error_sharp(sharp: Outcome) -> Finding:
+def final_error_sharp(sharp: KeptRun) -> Finding:
     """The paper may mean 10 for the PD controller alone."""
     return final_error_proposed(sharp)
 
 
 @claim("4.2: e_f of the PD controller (x, y, z)", f"{numbers(FINAL_ERROR_PD)} m", FIVE_PD)
-def final_error_pd(pd: Outcome) -> Finding:
+def final_error_pd(pd: KeptRun) -> Finding:
     """e_f beside the printed numbers."""
     error = pd.metrics["final_error"]
     return Finding(f"{numbers(error)} m", ratio(error, FINAL_ERROR_PD))
@@ -269,7 +268,7 @@ def final_error_pd(pd: Outcome) -> Finding:
     FIVE,
     SHARP,
 )
-def proposed_does_not_saturate(five: Outcome, sharp: Outcome) -> Finding:
+def proposed_does_not_saturate(five: KeptRun, sharp: KeptRun) -> Finding:
     """With both values that the paper may mean."""
     runs = (five.metrics, sharp.metrics)
     return Finding(
@@ -279,7 +278,7 @@ def proposed_does_not_saturate(five: Outcome, sharp: Outcome) -> Finding:
 
 
 @claim("Fig. 5: the PD controller saturates", "saturation", FIVE_PD)
-def pd_saturates(pd: Outcome) -> Finding:
+def pd_saturates(pd: KeptRun) -> Finding:
     """All three actuators do."""
     shares = [100 * share for share in pd.metrics["saturated_fraction"]]
     return Finding(
@@ -294,7 +293,7 @@ def pd_saturates(pd: Outcome) -> Finding:
     FIVE,
     FIVE_PD,
 )
-def pd_chatters(five: Outcome, pd: Outcome) -> Finding:
+def pd_chatters(five: KeptRun, pd: KeptRun) -> Finding:
     """By the total variation of the applied signals."""
     proposed, baseline = sum(five.metrics["total_variation"]), sum(pd.metrics["total_variation"])
     return Finding(
@@ -309,14 +308,14 @@ def pd_chatters(five: Outcome, pd: Outcome) -> Finding:
     FIVE,
     FIVE_PD,
 )
-def pd_is_accurate(five: Outcome, pd: Outcome) -> Finding:
+def pd_is_accurate(five: KeptRun, pd: KeptRun) -> Finding:
     """Along every axis."""
     times = np.divide(five.metrics["final_error"], pd.metrics["final_error"])
     return Finding(f"{numbers(times.tolist())} times", said(bool((times > 1.0).all())))
 
 
 @claim("Fig. 6: from 100 m the PD controller chatters severely", "severe chattering", SIX, SIX_PD)
-def pd_chatters_severely(six: Outcome, pd: Outcome) -> Finding:
+def pd_chatters_severely(six: KeptRun, pd: KeptRun) -> Finding:
     """While both are on their way."""
     proposed, baseline = (total_variation_until(run.table, 60.0) for run in (six, pd))
     return Finding(
@@ -331,7 +330,7 @@ def pd_chatters_severely(six: Outcome, pd: Outcome) -> Finding:
     SHARP,
     FIVE,
 )
-def smoother_and_less_accurate(sharp: Outcome, five: Outcome) -> Finding:
+def smoother_and_less_accurate(sharp: KeptRun, five: KeptRun) -> Finding:
     """Total variation falls, e_f grows."""
     runs = (sharp.metrics, five.metrics)
     rough, smooth = (sum(run["total_variation"]) for run in runs)
@@ -348,7 +347,7 @@ def smoother_and_less_accurate(sharp: Outcome, five: Outcome) -> Finding:
     "a larger adaptive gain and more chattering",
     *SEVEN,
 )
-def more_effort(*sevens: Outcome) -> Finding:
+def more_effort(*sevens: KeptRun) -> Finding:
     """Effort, adaptive gain and total variation grow from (a) to (c)."""
     efforts = [float(np.linalg.norm(run.metrics["l2_effort"])) for run in sevens]
     estimates = [largest_estimate(run.table) for run in sevens]
@@ -365,7 +364,7 @@ def more_effort(*sevens: Outcome) -> Finding:
     "not tolerable and feasible",
     SEVEN[-1],
 )
-def intolerable_chattering(largest: Outcome) -> Finding:
+def intolerable_chattering(largest: KeptRun) -> Finding:
     """The largest disturbance that the paper shows."""
     saturates = any(largest.metrics["saturated_fraction"])
     return Finding(
@@ -378,7 +377,7 @@ def intolerable_chattering(largest: Outcome) -> Finding:
 
 
 @claim("Fig. 7: the performance degrades gradually", "errors grow from (a) to (c)", *SEVEN)
-def gradual_degradation(*sevens: Outcome) -> Finding:
+def gradual_degradation(*sevens: KeptRun) -> Finding:
     """By e_f."""
     errors = [max(run.metrics["final_error"]) for run in sevens]
     return Finding(f"largest e_f {numbers(errors)} m", said(bool((np.diff(errors) > 0).all())))
@@ -389,7 +388,7 @@ def gradual_degradation(*sevens: Outcome) -> Finding:
     "errors grow from (a) to (c)",
     *SEVEN,
 )
-def gradual_degradation_on_the_way(*sevens: Outcome) -> Finding:
+def gradual_degradation_on_the_way(*sevens: KeptRun) -> Finding:
     """By the largest error once the start is forgotten."""
     errors = [largest_error_after(run.table, 40.0) for run in sevens]
     return Finding(

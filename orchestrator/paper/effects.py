@@ -13,8 +13,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from auv_fmu.euler import STEP
 from auv_fmu.output_feedback import Gains
-from orchestrator.analysis.certificates import COLUMNS, certificates
-from orchestrator.analysis.figures import (
+from orchestrator.figures import (
     COLOURS,
     STYLES,
     Drawn,
@@ -22,13 +21,14 @@ from orchestrator.analysis.figures import (
     overlay,
     save,
 )
-from orchestrator.analysis.figures.style import WIDTH, styled
-from orchestrator.analysis.signals import ACTUATORS, AXES, limits
+from orchestrator.figures.style import WIDTH, styled
 from orchestrator.paper.claims import FIVE, FIVE_PD, QUIET, SEVEN
-from orchestrator.paper.formatting import actuator_values, numbers, picture, plain
-from orchestrator.paper.outcomes import Outcome
-from orchestrator.paper.published import EFFORT_PD, EFFORT_PROPOSED
-from orchestrator.paper.runs import Run
+from orchestrator.paper.kept_runs import KeptRun
+from orchestrator.paper.measures import EFFORT_PD, EFFORT_PROPOSED
+from orchestrator.paper.page import actuator_values, numbers, picture, plain
+from orchestrator.paper.variations import Variation
+from orchestrator.vehicle.certificates import COLUMNS, certificates
+from orchestrator.vehicle.signals import ACTUATORS, AXES, limits
 
 #: Levels of measurement noise to show the effect of [m].
 NOISE_LEVELS = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
@@ -41,7 +41,7 @@ LAMBDAS = (0.5, 1.0, 1.5, 2.1, 3.0, 4.0)
 
 _PRINTED = replace(FIVE, parameters={"controller.printed_jacobian": True})
 _JACOBI, _JACOBI_PD = (replace(run, order="jacobi") for run in (FIVE, FIVE_PD))
-_NOISY = tuple(Run("fig4", {"plant.noise.std": level}) for level in NOISE_LEVELS)
+_NOISY = tuple(Variation("fig4", {"plant.noise.std": level}) for level in NOISE_LEVELS)
 _QUICK = tuple(
     QUIET
     if value == Gains().lambda_
@@ -80,7 +80,7 @@ class Effect:
 
     name: str
     title: str
-    runs: tuple[Run, ...]
+    runs: tuple[Variation, ...]
     show: Callable[..., Shown]
 
 
@@ -89,7 +89,7 @@ EFFECTS: list[Effect] = []
 
 
 def effect(
-    name: str, title: str, *runs: Run
+    name: str, title: str, *runs: Variation
 ) -> Callable[[Callable[..., Shown]], Callable[..., Shown]]:
     """Register a function of the outcomes of some runs as an effect."""
 
@@ -100,7 +100,7 @@ def effect(
     return register
 
 
-def show_effect(name: str, outcomes: Sequence[Outcome], folder: Path) -> str:
+def show_effect(name: str, kept_runs: Sequence[KeptRun], folder: Path) -> str:
     """Draw the figure of an effect and give its text; a task for a worker.
 
     Args:
@@ -109,18 +109,18 @@ def show_effect(name: str, outcomes: Sequence[Outcome], folder: Path) -> str:
         folder: to write `NAME.png` into.
 
     """
-    for outcome in outcomes:
-        if outcome.failure is not None:
-            return f"A run ended early: {plain(outcome.failure)}"
+    for kept_run in kept_runs:
+        if kept_run.failure is not None:
+            return f"A run ended early: {plain(kept_run.failure)}"
     [found] = [effect for effect in EFFECTS if effect.name == name]
     with styled():
-        shown = found.show(*outcomes)
+        shown = found.show(*kept_runs)
         save(shown.figure, folder / f"{name}.png")
     return f"{shown.text}\n\n{picture(found.title, f'{folder.name}/{name}.png')}"
 
 
 @effect("effect-disturbance", "Fig. 7 in one figure", *SEVEN)
-def disturbance(*sevens: Outcome) -> Shown:
+def disturbance(*sevens: KeptRun) -> Shown:
     """The three levels of Fig. 7 over each other."""
     labels = ("(a)", "(b)", "(c)")
     runs = [Drawn(label, run.table) for label, run in zip(labels, sevens, strict=True)]
@@ -134,7 +134,7 @@ def disturbance(*sevens: Outcome) -> Shown:
 
 
 @effect("effect-jacobian", "(11) as printed against the full attitude", FIVE, _PRINTED)
-def jacobian(full: Outcome, printed: Outcome) -> Shown:
+def jacobian(full: KeptRun, printed: KeptRun) -> Shown:
     """What reading 3 changes."""
     saturated, rest = (100 * max(run.metrics["saturated_fraction"]) for run in (printed, full))
     return Shown(
@@ -148,7 +148,7 @@ def jacobian(full: Outcome, printed: Outcome) -> Shown:
 
 
 @effect("effect-order", "Jacobi against Gauss-Seidel", FIVE, _JACOBI, FIVE_PD, _JACOBI_PD)
-def order(full: Outcome, jacobi: Outcome, pd: Outcome, jacobi_pd: Outcome) -> Shown:
+def order(full: KeptRun, jacobi: KeptRun, pd: KeptRun, jacobi_pd: KeptRun) -> Shown:
     """What a delay of one step does to the two controllers."""
     variation = [sum(run.metrics["total_variation"]) for run in (full, jacobi, pd, jacobi_pd)]
     figure = Figure(figsize=(WIDTH, 4.5))
@@ -171,7 +171,7 @@ def order(full: Outcome, jacobi: Outcome, pd: Outcome, jacobi_pd: Outcome) -> Sh
 
 
 @effect("effect-step", "The step of 20 ms", *_STEPPED)
-def step(*runs: Outcome) -> Shown:
+def step(*runs: KeptRun) -> Shown:
     """What of the efforts is the scheme's doing, and not the controller's."""
     *stepped, exact = (run.metrics["l2_effort"] for run in runs)
     proposed, pd = np.reshape(stepped, (2, len(STEPS), len(ACTUATORS)))
@@ -209,7 +209,7 @@ def step(*runs: Outcome) -> Shown:
 
 
 @effect("effect-noise", "Measurement noise against effort", *_NOISY)
-def noise(*runs: Outcome) -> Shown:
+def noise(*runs: KeptRun) -> Shown:
     """Why the level of the noise, which is not given, matters."""
     one_mm, one_cm = (runs[NOISE_LEVELS.index(level)].metrics for level in (1e-3, 1e-2))
     figure = Figure(figsize=(WIDTH, 3.2))
@@ -246,7 +246,7 @@ def noise(*runs: Outcome) -> Shown:
 
 
 @effect("effect-lambda", "Condition (30) against the limits of (3)", *_QUICK)
-def condition_30(*runs: Outcome) -> Shown:
+def condition_30(*runs: KeptRun) -> Shown:
     """What the gains that Theorem 1 asks for command."""
     figure = Figure(figsize=(WIDTH, 3.2))
     peak, error = figure.subplots(1, 2)
@@ -278,7 +278,7 @@ def condition_30(*runs: Outcome) -> Shown:
 
 
 @effect("effect-saturation", "tanh against algebraic saturation", QUIET, _ALGEBRAIC)
-def saturation(tanh: Outcome, algebraic: Outcome) -> Shown:
+def saturation(tanh: KeptRun, algebraic: KeptRun) -> Shown:
     """Theorem 2 with another saturation function."""
     efforts = [actuator_values(run.metrics["l2_effort"], "·√s") for run in (tanh, algebraic)]
     errors = [numbers(run.metrics["final_error"]) for run in (tanh, algebraic)]
@@ -290,7 +290,7 @@ def saturation(tanh: Outcome, algebraic: Outcome) -> Shown:
 
 
 @effect("certificates", "Certificates along a run", QUIET)
-def certificates_along_a_run(quiet: Outcome) -> Shown:
+def certificates_along_a_run(quiet: KeptRun) -> Shown:
     """What the proof speaks of, along Fig. 4."""
     column = dict(zip(COLUMNS, certificates(quiet.table).T, strict=True))
     figure = Figure(figsize=(WIDTH, 5.5))

@@ -17,7 +17,7 @@ from auv_fmu.proof.attraction import Theorem, ball, theorem
 from auv_fmu.proof.zetas import at_least, coupling
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from auv_fmu.vehicle import Vehicle
-from orchestrator.analysis.gains import stated
+from orchestrator.vehicle.gains import stated
 
 _MODEL = "tests/unit/auv_fmu/proof/test_control_point_model.py"
 _ATTRACTION = "tests/unit/auv_fmu/proof/test_attraction.py"

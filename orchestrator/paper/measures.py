@@ -1,4 +1,4 @@
-"""Numbers of a run that claims speak of, beyond the indices of every run."""
+"""Measures of a run that the paper's claims are about, and the numbers that it prints."""
 
 from __future__ import annotations
 
@@ -7,9 +7,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from orchestrator.analysis.signals import APPLIED, THETA_HAT, tracking_error
-from orchestrator.master.table import Table
+from orchestrator.master.observers.table import Table
 from orchestrator.studies.engine import REACHED
+from orchestrator.vehicle.signals import APPLIED, THETA_HAT, tracking_error
+
+#: Control efforts of section 4.2, in the order u, q, r.
+EFFORT_PROPOSED, EFFORT_PD = (130.0, 40.0, 53.0), (235.0, 163.0, 172.0)
+
+#: e_f of section 4.2, in the order x, y, z [m].
+FINAL_ERROR_PROPOSED, FINAL_ERROR_PD = (0.01, 0.02, 0.06), (0.004, 0.001, 0.001)
+
+#: Turning radius of section 4.1 [m].
+TURNING_RADIUS = 0.6
 
 
 def sum_without_step(l2: Any, duration: Any, h: float) -> Any:
@@ -24,7 +33,7 @@ def sum_without_step(l2: Any, duration: Any, h: float) -> Any:
     return l2 / np.sqrt(h * duration)
 
 
-class Way(NamedTuple):
+class Approach(NamedTuple):
     """The vehicle's way to the reference.
 
     Attributes:
@@ -53,7 +62,7 @@ class Way(NamedTuple):
         return (self.impulse / effort) ** 2
 
 
-def way_of(table: Table, error: np.ndarray | None = None) -> Way | None:
+def approach_of(table: Table, error: np.ndarray | None = None) -> Approach | None:
     """The way of a run to its reference; None if it does not come there, or is there already.
 
     Args:
@@ -69,7 +78,7 @@ def way_of(table: Table, error: np.ndarray | None = None) -> Way | None:
         return None
     # A row holds what was applied in the step that ends there: the first one holds none.
     force = table[APPLIED[0]][1 : first + 1]
-    return Way(float(table.time[first]), float(force @ np.diff(table.time[: first + 1])))
+    return Approach(float(table.time[first]), float(force @ np.diff(table.time[: first + 1])))
 
 
 def turning_radius(table: Table) -> float:

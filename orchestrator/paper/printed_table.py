@@ -1,15 +1,20 @@
-"""The printed table of section 4.2 beside every reading of it, in Markdown."""
+"""The printed table of effort and error beside ours: `auv-fmu table`."""
 
 from __future__ import annotations
 
+import csv
+import platform
 from collections.abc import Iterator, Sequence
+from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 
 from auv_fmu.euler import STEP
-from orchestrator.analysis.signals import ACTUATORS, AXES
+from orchestrator.machine.ledger import RECORD
+from orchestrator.machine.workers import workers
 from orchestrator.paper.choices import AGAINST_FIVE, END_TIMES, FIVE, PD, PROPOSED, VEHICLE
-from orchestrator.paper.formatting import numbers, plain, table
+from orchestrator.paper.page import numbers, plain, table
 from orchestrator.paper.sensitivity import (
     FARTHEST,
     PUBLISHED,
@@ -17,12 +22,16 @@ from orchestrator.paper.sensitivity import (
     SAME,
     SEARCHED,
     SHOWN,
+    Bounds,
     Found,
-    Range,
     Sensitivity,
     Variant,
 )
+from orchestrator.paper.variants import all_variants
+from orchestrator.runs.folder import replaced
+from orchestrator.runs.record import PACKAGES, Stopwatch, write_files
 from orchestrator.studies.engine import REACHED
+from orchestrator.vehicle.signals import ACTUATORS, AXES
 
 #: The score is told of so much less and more than T_f [s], for e_f moves with the waves.
 _AROUND = 10
@@ -113,7 +122,7 @@ def _cell(variant: Variant, scenario: str, i: int) -> str:
     return f"{text} ({_number(low[i])} to {_number(high[i])})"
 
 
-def _range(span: Range, published: np.ndarray, i: int) -> str:
+def _range(span: Bounds, published: np.ndarray, i: int) -> str:
     """From the smallest to the largest; bold if what is printed lies outside."""
     text = f"{_number(span.low[i])} to {_number(span.high[i])}"
     return text if span.low[i] <= published[i] <= span.high[i] else f"**{text}**"
@@ -210,13 +219,13 @@ def _impulses(found: Sensitivity) -> str:
 
 def _impulse(found: Sensitivity, scenario: str) -> str:
     """What the way to the reference asks of the effort of the surge force."""
-    ways, printed = found.ways_of(scenario), PUBLISHED[scenario][0]
+    approaches, printed = found.ways_of(scenario), PUBLISHED[scenario][0]
     duration, impulse, least = (
         (min(values), max(values))
-        for values in zip(*((*way, way.least_effort) for way in ways), strict=True)
+        for values in zip(*((*way, way.least_effort) for way in approaches), strict=True)
     )
-    soonest = min(way.soonest(printed) for way in ways)
-    free = min(way.contradicts_until(printed, STEP) for way in ways)
+    soonest = min(way.soonest(printed) for way in approaches)
+    free = min(way.contradicts_until(printed, STEP) for way in approaches)
     return (
         f"the {_CONTROLLERS[scenario]} controller brings the vehicle to the reference, to |e| of "
         f"{REACHED:g} m, in {duration[0]:.3g} to {duration[1]:.3g} s, with an impulse of tau_u of "
@@ -236,3 +245,66 @@ def _options(found: Found) -> Iterator[list[str]]:
         if choice.name == VEHICLE:
             score = f"{found.printed[-1].score:.2f}, of medians"
             yield [plain(choice.name), plain(FIVE.text), "", score, plain(AGAINST_FIVE)]
+
+
+#: The files.
+_NAMES = _TEXT, _VARIANTS = "table.md", "variants.csv"
+
+
+def write_table(folder: Path, command: Sequence[str], force: bool = False) -> tuple[Path, Path]:
+    """Make all variants, and write `table.md` and `variants.csv`.
+
+    Args:
+        folder: to write into.
+        command: for the record.
+        force: move aside files of the user's that have names of these.
+
+    Returns:
+        The two files.
+
+    Raises:
+        InputError: a package is missing, or the folder cannot be written.
+        KeyboardInterrupt: the user does not want to wait.
+
+    """
+    clock = Stopwatch()
+    with replaced(folder, (*_NAMES, RECORD), force=force) as unfinished:
+        with workers() as crew:
+            found = all_variants(crew)
+        text = f"# The printed table of section 4.2\n\n{section(found)}\n"
+        (unfinished / _TEXT).write_text(text, encoding="utf-8")
+        write_variants(unfinished / _VARIANTS, found)
+        write_files(unfinished, _record(command, clock))
+    return folder / _TEXT, folder / _VARIANTS
+
+
+def _record(command: Sequence[str], clock: Stopwatch) -> dict[str, object]:
+    return {
+        "command": list(command),
+        **clock.times(),
+        "versions": {"python": platform.python_version()}
+        | {package: version(package) for package in (*PACKAGES, "numba")},
+        "platform": platform.platform(),
+    }
+
+
+def write_variants(path: Path, found: Found) -> None:
+    """A row for each combination of options of the runs, as its numbers score best when read."""
+    names = [name for scenario in PUBLISHED for name in NUMBERS[scenario]]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([*(choice.name for choice in found.six.choices), "score", *names])
+        for held in (found.six, found.five):
+            of_runs = held.scores.shape[: len(held.of_runs)]
+            for options in np.ndindex(of_runs):
+                scores = held.scores[options]
+                reading = np.unravel_index(int(scores.argmin()), scores.shape)
+                variant = held.variant((*options, *map(int, reading)))
+                chosen = zip(held.choices, variant.options, strict=True)
+                writer.writerow(
+                    [
+                        *(choice.options[i].text for choice, i in chosen),
+                        variant.score,
+                        *(value for scenario in PUBLISHED for value in variant.numbers[scenario]),
+                    ]
+                )

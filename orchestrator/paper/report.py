@@ -10,21 +10,27 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from orchestrator.analysis import gains
-from orchestrator.experiments.bundle import PYTHON, current_fmus
-from orchestrator.experiments.folder import inner, replaced
-from orchestrator.experiments.record import PACKAGES, Clock, write_files
-from orchestrator.experiments.wiring import closed_loop
-from orchestrator.paper import errata, printed_table, readings, studies
+from orchestrator.machine.ledger import RECORD
+from orchestrator.machine.workers import Workers, workers
+from orchestrator.paper import errata, printed_table, readings
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS, show_effect
-from orchestrator.paper.formatting import table
-from orchestrator.paper.outcomes import Outcomes
-from orchestrator.paper.page import contents, html
-from orchestrator.paper.sections import Section, draw_section, sections, written
+from orchestrator.paper.kept_runs import KeptRuns
+from orchestrator.paper.page import contents, html, table
+from orchestrator.paper.sections import (
+    Section,
+    draw_section,
+    make_studies,
+    sections,
+    study_sections,
+    written,
+)
 from orchestrator.paper.variants import all_variants
-from orchestrator.paper.workers import Workers, workers
-from orchestrator.system.ledger import RECORD
+from orchestrator.runs.bundle import PYTHON, current_fmus
+from orchestrator.runs.folder import inner, replaced
+from orchestrator.runs.record import PACKAGES, Stopwatch, write_files
+from orchestrator.runs.wiring import closed_loop
+from orchestrator.vehicle import gains
 
 #: Folders within the report's: figures, and outcomes that the next report can use again.
 _FIGURES, _RUNS, _STUDIES = "figures", "runs", "studies"
@@ -85,15 +91,15 @@ def write_report(
         KeyboardInterrupt: the user does not want to wait; runs that are finished are kept.
 
     """
-    clock = Clock()
+    clock = Stopwatch()
     # Built before there are processes that would each build them.
     fmus = current_fmus(kind)
     chapters = sections(scenarios, kind)
-    outcomes = Outcomes(inner(folder, _RUNS), stop_time, kind, force)
-    made = studies.make_studies(ready, inner(folder, _STUDIES), kind, command, force)
+    kept_runs = KeptRuns(inner(folder, _RUNS), stop_time, kind, force)
+    made = make_studies(ready, inner(folder, _STUDIES), kind, command, force)
     with replaced(folder, (*_NAMES, RECORD), force=force) as unfinished:
         with workers() as crew:
-            outcomes.make(
+            kept_runs.make(
                 [
                     *(run for section in chapters for run in section.runs.values()),
                     *(run for claim in CLAIMS for run in claim.runs),
@@ -101,34 +107,34 @@ def write_report(
                 ],
                 crew,
             )
-            notes, effects = _draw(chapters, outcomes, unfinished, crew)
+            notes, effects = _draw(chapters, kept_runs, unfinished, crew)
             held = printed_table.section(all_variants(crew)) if variants else _NO_VARIANTS
-        shown = list(studies.sections(made, folder / _STUDIES, unfinished))
-        parts = _text(chapters, outcomes, notes, effects, command, unfinished, fmus, shown, held)
+        shown = list(study_sections(made, folder / _STUDIES, unfinished))
+        parts = _text(chapters, kept_runs, notes, effects, command, unfinished, fmus, shown, held)
         body = "\n\n".join(parts)
         body = readings.linked(body)
         text = f"{_TITLE}\n\n{readings.linked(_INTRODUCTION)}\n\n{contents(body)}\n\n{body}\n"
         (unfinished / _MARKDOWN).write_text(text, encoding="utf-8")
         (unfinished / _PAGE).write_text(html(text, unfinished), encoding="utf-8")
-        write_files(unfinished, _record(command, clock, outcomes))
-    outcomes.forget_others()
+        write_files(unfinished, _record(command, clock, kept_runs))
+    kept_runs.forget_others()
     return folder / _PAGE, folder / _MARKDOWN
 
 
 def _draw(
-    chapters: Sequence[Section], outcomes: Outcomes, folder: Path, crew: Workers
+    chapters: Sequence[Section], kept_runs: KeptRuns, folder: Path, crew: Workers
 ) -> tuple[dict[str, list[str]], dict[str, str]]:
     """Draw all figures; give the notes on those of the sections, and the texts of the effects."""
     figures = folder / _FIGURES
     figures.mkdir()
     tasks: dict[tuple[str, str], Callable[[], Any]] = {}
     for section in chapters:
-        made = [outcomes[run] for run in section.runs.values()]
+        made = [kept_runs[run] for run in section.runs.values()]
         tasks["section", section.name] = partial(
             draw_section, section, made, figures / section.name
         )
     for effect in EFFECTS:
-        made = [outcomes[run] for run in effect.runs]
+        made = [kept_runs[run] for run in effect.runs]
         tasks["effect", effect.name] = partial(show_effect, effect.name, made, figures)
     results = dict(crew.results(tasks, "figure"))
     notes = {section.name: results["section", section.name] for section in chapters}
@@ -137,7 +143,7 @@ def _draw(
 
 def _text(
     chapters: Sequence[Section],
-    outcomes: Outcomes,
+    kept_runs: KeptRuns,
     notes: dict[str, list[str]],
     effects: dict[str, str],
     command: Sequence[str],
@@ -147,18 +153,18 @@ def _text(
     held: str,
 ) -> Iterator[str]:
     yield "## Every printed number and claim"
-    yield _claims(outcomes)
+    yield _claims(kept_runs)
     yield _WHY_NUMBERS_DIFFER
     yield "## The printed table against every reading"
     yield held
     yield "## Figures"
     for section in chapters:
-        yield from written(section, outcomes, notes[section.name], folder)
+        yield from written(section, kept_runs, notes[section.name], folder)
     yield "## Effects that the paper does not show"
     for effect in EFFECTS:
         yield f"### {effect.title}"
         yield effects[effect.name]
-        yield "\n".join(f"- `auv-fmu run {outcomes.label(run)}`" for run in effect.runs)
+        yield "\n".join(f"- `auv-fmu run {kept_runs.label(run)}`" for run in effect.runs)
     yield "## Studies of many vehicles"
     yield from shown
     yield "## Gain conditions"
@@ -171,25 +177,25 @@ def _text(
     versions = ", ".join(f"{package} {version(package)}" for package in PACKAGES)
     yield f"Python {platform.python_version()}, {versions}. Written by `{shlex.join(command)}`."
     yield "Each of these commands makes a run of this report:"
-    yield "```\n" + "\n".join(f"auv-fmu run {label}" for label in outcomes.labels) + "\n```"
+    yield "```\n" + "\n".join(f"auv-fmu run {label}" for label in kept_runs.labels) + "\n```"
 
 
-def _claims(outcomes: Outcomes) -> str:
+def _claims(kept_runs: KeptRuns) -> str:
     rows = []
     for claim in CLAIMS:
-        finding = claim.finding([outcomes[run] for run in claim.runs])
+        finding = claim.finding([kept_runs[run] for run in claim.runs])
         cells = [claim.title, claim.published, finding.ours, finding.verdict]
-        runs = ", ".join(f"`{outcomes.label(run)}`" for run in claim.runs)
+        runs = ", ".join(f"`{kept_runs.label(run)}`" for run in claim.runs)
         rows.append([cell.replace("|", "\\|") for cell in (*cells, runs)])
     return table(["claim", "paper", "ours", "verdict", "run"], rows)
 
 
-def _record(command: Sequence[str], clock: Clock, outcomes: Outcomes) -> dict[str, object]:
+def _record(command: Sequence[str], clock: Stopwatch, kept_runs: KeptRuns) -> dict[str, object]:
     return {
         "title": _TITLE.removeprefix("# "),
         "command": list(command),
         **clock.times(),
-        "runs": [f"auv-fmu run {label}" for label in outcomes.labels],
+        "runs": [f"auv-fmu run {label}" for label in kept_runs.labels],
         "versions": {"python": platform.python_version()}
         | {package: version(package) for package in PACKAGES},
         "platform": platform.platform(),

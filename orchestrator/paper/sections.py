@@ -1,22 +1,26 @@
-"""A section of the report for each scenario: its figure, its indices, and what in it is ours."""
+"""Sections of the report: a scenario with its figure and indices, a study with its figures."""
 
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from orchestrator.analysis.figures import FIGURES, Drawn, draw
-from orchestrator.errors import InputError, did_you_mean
-from orchestrator.experiments.bundle import PYTHON
-from orchestrator.experiments.scenario import Scenario, read_scenario
-from orchestrator.paper.formatting import actuator_values, numbers, picture, plain, table
-from orchestrator.paper.outcomes import Outcome, Outcomes
-from orchestrator.paper.runs import Run
-from orchestrator.system.names import port_name
+from orchestrator.figures import FIGURES, Drawn, draw
+from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.paper.kept_runs import KeptRun, KeptRuns
+from orchestrator.paper.page import actuator_values, numbers, picture, plain, table
+from orchestrator.paper.variations import Variation
+from orchestrator.runs.bundle import PYTHON
+from orchestrator.runs.folder import inner
+from orchestrator.runs.scenario import Scenario, read_scenario
+from orchestrator.studies.study import Study, read_study, ready_studies
+from orchestrator.studies.sweep import Means, swept
+from orchestrator.system.names import file_name, port_name
 
 #: The parameter that decides whether a run has a twin without noise.
 _NOISE = "plant.noise.std"
@@ -45,7 +49,7 @@ class Section:
 
     name: str
     scenario: Scenario
-    runs: Mapping[str, Run]
+    runs: Mapping[str, Variation]
 
     @property
     def title(self) -> str:
@@ -81,9 +85,9 @@ def _numbered(name: str) -> Iterator[str]:
         n += 1
 
 
-def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Run]:
+def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Variation]:
     """The run of a scenario and what it is drawn with: its companion, or its twin without noise."""
-    run = Run(reference, kind=kind)
+    run = Variation(reference, kind=kind)
     try:
         system = run.prepared().system
     except InputError:
@@ -100,7 +104,7 @@ def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Run]:
     return {scenario.legend: run}
 
 
-def draw_section(section: Section, outcomes: Sequence[Outcome], folder: Path) -> list[str]:
+def draw_section(section: Section, kept_runs: Sequence[KeptRun], folder: Path) -> list[str]:
     """Draw the figures of a section and give notes on what is left out; a task for a worker.
 
     Args:
@@ -113,9 +117,9 @@ def draw_section(section: Section, outcomes: Sequence[Outcome], folder: Path) ->
     if kind not in FIGURES:
         return [f"no figure: there is none of the name {kind!r}{did_you_mean(kind, FIGURES)}"]
     runs = [
-        Drawn(label, outcome.table, section.scenario.z_up)
-        for label, outcome in zip(section.runs, outcomes, strict=True)
-        if len(outcome.table)
+        Drawn(label, kept_run.table, section.scenario.z_up)
+        for label, kept_run in zip(section.runs, kept_runs, strict=True)
+        if len(kept_run.table)
     ]
     if not runs:
         return []
@@ -125,7 +129,7 @@ def draw_section(section: Section, outcomes: Sequence[Outcome], folder: Path) ->
 
 
 def written(
-    section: Section, outcomes: Outcomes, notes: Sequence[str], folder: Path
+    section: Section, kept_runs: KeptRuns, notes: Sequence[str], folder: Path
 ) -> Iterator[str]:
     """A section in Markdown.
 
@@ -136,7 +140,7 @@ def written(
         folder: of the report, in which its figures are.
 
     """
-    scenario, own = section.scenario, outcomes[next(iter(section.runs.values()))]
+    scenario, own = section.scenario, kept_runs[next(iter(section.runs.values()))]
     yield f"### {section.title}"
     # By their stems: `fig4` comes before `fig4-velocity`.
     files = Path(folder, "figures", section.name).glob("*.png")
@@ -145,19 +149,19 @@ def written(
     yield from (f"Note: {plain(note)}." for note in notes)
     if scenario.remark:
         yield scenario.remark
-    made = {label: outcomes[run] for label, run in section.runs.items()}
-    for label, outcome in made.items():
-        if outcome.failure is not None:
-            yield f"**The run {plain(label)} ended early:** {plain(outcome.failure)}"
-    if rows := list(_indices([outcome.metrics for outcome in made.values()])):
+    made = {label: kept_runs[run] for label, run in section.runs.items()}
+    for label, kept_run in made.items():
+        if kept_run.failure is not None:
+            yield f"**The run {plain(label)} ended early:** {plain(kept_run.failure)}"
+    if rows := list(_indices([kept_run.metrics for kept_run in made.values()])):
         yield table(["index", *map(plain, made)], rows)
     reaching = own.metrics.get("velocities_reaching_controller")
     if reaching is not None:
         names = ", ".join(f"`{name}`" for name in reaching) or "none"
         yield f"Velocities of the vehicle that reach the controller: {names}."
     yield "\n".join(
-        f"- {plain(label)}: `auv-fmu run {outcomes.label(run)}`"
-        + (f", until {time:g} s" if (time := outcomes[run].metrics.get("stop_time")) else "")
+        f"- {plain(label)}: `auv-fmu run {kept_runs.label(run)}`"
+        + (f", until {time:g} s" if (time := kept_runs[run].metrics.get("stop_time")) else "")
         for label, run in section.runs.items()
     )
     if scenario.ours:
@@ -179,3 +183,59 @@ def _ours(scenario: Scenario) -> Iterator[str]:
         is_short = value is not None and not isinstance(value, Mapping)
         stated = f"{name} = {json.dumps(value, default=str)}" if is_short else name
         yield f"- `{stated}`: {plain(why)}"
+
+
+_WITHOUT = (
+    f"Not in this report: {', '.join(ready_studies())}, each 10,000 runs or more. "
+    "`auv-fmu report --studies` makes them, or what is missing of them."
+)
+
+
+def make_studies(
+    names: Sequence[str], folder: Path, kind: str, command: Sequence[str], force: bool = False
+) -> list[Study]:
+    """Make what is missing of some studies.
+
+    Args:
+        names: of ready studies, or paths of files.
+        folder: in which each has a folder, from one report to the next.
+        kind: of the bundle's FMUs.
+        command: for the record.
+        force: move aside files of the user's that are in the way.
+
+    Raises:
+        InputError: something about a study is not usable, or cannot be written.
+        KeyboardInterrupt: somebody wants it to stop; what is done is kept.
+
+    """
+    studies = [read_study(name) for name in names]
+    for study in studies:
+        place = inner(folder, study.stem)
+        swept(study, Means(kind=kind, force=force), place, command, progress=True)
+    return studies
+
+
+def study_sections(studies: Sequence[Study], kept: Path, folder: Path) -> Iterator[str]:
+    """A section for each study, in Markdown.
+
+    Args:
+        studies: that were made.
+        kept: the folder that has their folders.
+        folder: of the report, into which their figures go.
+
+    """
+    if not studies:
+        yield _WITHOUT
+    for study in studies:
+        title = plain(study.title or study.name)
+        yield f"### {title}"
+        figures = Path("figures", "studies", study.stem)
+        (folder / figures).mkdir(parents=True)
+        for figure in study.figures:
+            file = kept / study.stem / f"{file_name(figure)}.png"
+            if file.is_file():
+                shutil.copy(file, folder / figures)
+                yield picture(f"{title}: {figure}", (figures / file.name).as_posix())
+        if study.remark:
+            yield study.remark.strip()
+        yield f"- `auv-fmu sweep {study.name}`"

@@ -22,12 +22,13 @@ from orchestrator.paper.choices import (
     Choice,
     options_of,
 )
-from orchestrator.paper.measures import Way, sum_without_step
-from orchestrator.paper.published import (
+from orchestrator.paper.measures import (
     EFFORT_PD,
     EFFORT_PROPOSED,
     FINAL_ERROR_PD,
     FINAL_ERROR_PROPOSED,
+    Approach,
+    sum_without_step,
 )
 from orchestrator.studies.engine import REACHED
 
@@ -78,7 +79,7 @@ class Variant(NamedTuple):
     options: tuple[int, ...]
     score: float
     numbers: Mapping[str, np.ndarray]
-    bands: Mapping[str, Range] | None = None
+    bands: Mapping[str, Bounds] | None = None
 
     @property
     def factor(self) -> float:
@@ -86,7 +87,7 @@ class Variant(NamedTuple):
         return float(np.exp(self.score / sum(map(len, self.numbers.values()))))
 
 
-class Range(NamedTuple):
+class Bounds(NamedTuple):
     """Smallest and largest of six numbers."""
 
     low: np.ndarray
@@ -102,13 +103,13 @@ class Sensitivity:
             SIGNALS, END_TIMES and the six. A choice that a scenario has not has one element, and a
             run that has failed has NaN.
         ways: to the reference, by scenario; an axis for each of `of_runs`, then the two numbers of
-            :class:`.Way`. Those of a run that has not come there are NaN.
+            :class:`.Approach`. Those of a run that has not come there are NaN.
         of_runs: choices that the runs depend on.
 
     """
 
     numbers: Mapping[str, np.ndarray]
-    ways: Mapping[str, np.ndarray]
+    approaches: Mapping[str, np.ndarray]
     of_runs: Sequence[Choice] = OF_RUNS
 
     @property
@@ -192,7 +193,7 @@ class Sensitivity:
         """What contradicts nothing that is printed, with axes as :meth:`_arrived` has them."""
         return contradicts_nothing(scenario, (*self.of_runs, _SIGNALS, _T_FS))
 
-    def span(self, scenario: str, consistent: bool, formula: int | None = None) -> Range:
+    def span(self, scenario: str, consistent: bool, formula: int | None = None) -> Bounds:
         """Over what has come to the reference by its end.
 
         Args:
@@ -211,13 +212,13 @@ class Sensitivity:
             and not (consistent and ORDERS_OF_EFFORTS[reading[0]].against)
         )
         lows, highs = zip(*((six.min(axis=0), six.max(axis=0)) for six in sixes), strict=True)
-        return Range(np.min(lows, axis=0), np.max(highs, axis=0))
+        return Bounds(np.min(lows, axis=0), np.max(highs, axis=0))
 
-    def ways_of(self, scenario: str) -> list[Way]:
+    def ways_of(self, scenario: str) -> list[Approach]:
         """The ways to the reference of the runs that contradict nothing that is printed."""
-        ways = self.ways[scenario]
-        taken = contradicts_nothing(scenario, self.of_runs) & ~np.isnan(ways[..., 0])
-        return [Way(*way) for way in ways[taken].tolist()]
+        approaches = self.approaches[scenario]
+        taken = contradicts_nothing(scenario, self.of_runs) & ~np.isnan(approaches[..., 0])
+        return [Approach(*way) for way in approaches[taken].tolist()]
 
     def _scores(self, consistent: bool) -> np.ndarray:
         if not consistent:
@@ -250,7 +251,7 @@ class Sensitivity:
             return variant
         medians = {scenario: median for scenario, (_, median, _) in found.items()}
         score = sum(_distance(six, PUBLISHED[scenario]) for scenario, six in medians.items())
-        bands = {scenario: Range(low, high) for scenario, (low, _, high) in found.items()}
+        bands = {scenario: Bounds(low, high) for scenario, (low, _, high) in found.items()}
         return Variant(variant.options, float(score), medians, bands)
 
 

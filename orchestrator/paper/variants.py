@@ -7,19 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from orchestrator.analysis.metrics import LAST_SECONDS
-from orchestrator.analysis.signals import (
-    APPLIED,
-    ATTITUDE,
-    AXES,
-    COMMANDED,
-    ELL,
-    POSITION,
-    Y_D,
-    parameter,
-)
-from orchestrator.experiments.preparation import loaded
-from orchestrator.master.table import Table
+from orchestrator.machine.workers import Workers
+from orchestrator.master.observers.table import Table
 from orchestrator.paper.choices import (
     END_TIMES,
     OF_RUNS,
@@ -29,7 +18,7 @@ from orchestrator.paper.choices import (
     options_of,
     runs,
 )
-from orchestrator.paper.measures import Way, way_of
+from orchestrator.paper.measures import Approach, approach_of
 from orchestrator.paper.sensitivity import (
     FARTHEST,
     PUBLISHED,
@@ -40,10 +29,21 @@ from orchestrator.paper.sensitivity import (
     Sensitivity,
     Variant,
 )
-from orchestrator.paper.workers import Workers
+from orchestrator.runs.preparation import loaded
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import Run
+from orchestrator.studies.engine import Point
 from orchestrator.studies.sweep import check_installed
+from orchestrator.vehicle.metrics import LAST_SECONDS
+from orchestrator.vehicle.signals import (
+    APPLIED,
+    ATTITUDE,
+    AXES,
+    COMMANDED,
+    ELL,
+    POSITION,
+    Y_D,
+    parameter,
+)
 
 #: Runs that a worker makes at a time.
 _BLOCK = 16
@@ -102,13 +102,13 @@ def _six(crew: Workers, engine: BatchEngine, of_runs: Sequence[Choice]) -> Sensi
         for first in range(0, len(found), _BLOCK)
     }
     taken = dict(crew.results(blocks, "block of runs"))
-    numbers, ways = {}, {}
+    numbers, approaches = {}, {}
     for scenario in PUBLISHED:
         parts = (taken[block] for block in blocks if block[0] == scenario)
         sixes, pairs = map(np.concatenate, zip(*parts, strict=True))
         numbers[scenario] = _by_choice(sixes, scenario, of_runs)
-        ways[scenario] = _by_choice(pairs, scenario, of_runs)
-    return Sensitivity(numbers, ways, of_runs)
+        approaches[scenario] = _by_choice(pairs, scenario, of_runs)
+    return Sensitivity(numbers, approaches, of_runs)
 
 
 def _five(
@@ -122,12 +122,14 @@ def _five(
     }
     taken = dict(crew.results(tasks, "variant of five degrees of freedom"))
     middle = QUANTILES.index(0.5)
-    numbers, ways = {}, {}
+    numbers, approaches = {}, {}
     for scenario in PUBLISHED:
         medians = np.stack([taken[task][middle] for task in tasks if task[0] == scenario])
         numbers[scenario] = _by_choice(medians, scenario, of_runs)
-        ways[scenario] = np.full((*numbers[scenario].shape[:-3], len(Way._fields)), np.nan)
-    return Sensitivity(numbers, ways, of_runs)
+        approaches[scenario] = np.full(
+            (*numbers[scenario].shape[:-3], len(Approach._fields)), np.nan
+        )
+    return Sensitivity(numbers, approaches, of_runs)
 
 
 def _by_choice(found: np.ndarray, scenario: str, of_runs: Sequence[Choice]) -> np.ndarray:
@@ -135,7 +137,7 @@ def _by_choice(found: np.ndarray, scenario: str, of_runs: Sequence[Choice]) -> n
     return found.reshape(*(len(options_of(each, scenario)) for each in of_runs), *found.shape[1:])
 
 
-def _run_of(found: Sensitivity, variant: Variant, scenario: str) -> Run:
+def _run_of(found: Sensitivity, variant: Variant, scenario: str) -> Point:
     """The run of a variant in a scenario."""
     shape = found.numbers[scenario].shape[: len(found.of_runs)]
     options = np.minimum(variant.options[: len(shape)], np.subtract(shape, 1))
@@ -143,24 +145,24 @@ def _run_of(found: Sensitivity, variant: Variant, scenario: str) -> Run:
     return all_runs[int(np.ravel_multi_index(tuple(options), shape))]
 
 
-def taken_of(engine: BatchEngine, block: Sequence[Run]) -> tuple[np.ndarray, np.ndarray]:
+def taken_of(engine: BatchEngine, block: Sequence[Point]) -> tuple[np.ndarray, np.ndarray]:
     """Numbers and ways of some runs, an axis for the runs first; a task for a worker.
 
     Those of a run that has failed are not numbers, nor is the way of one that has not arrived.
     """
     tables = [engine.table(run) for run in block]
-    ways = [way_of(table, errors(table)) or (np.nan, np.nan) for table in tables]
-    return np.stack([numbers_of(table) for table in tables]), np.array(ways)
+    approaches = [approach_of(table, errors(table)) or (np.nan, np.nan) for table in tables]
+    return np.stack([numbers_of(table) for table in tables]), np.array(approaches)
 
 
-def quantiles_of(engine: BatchEngine, run: Run, starts: Sequence[int]) -> np.ndarray:
+def quantiles_of(engine: BatchEngine, run: Point, starts: Sequence[int]) -> np.ndarray:
     """The numbers of a run from moved starts, an axis for QUANTILES first; a task for a worker."""
     found = [numbers_of(engine.table(each)) for each in moved(engine, run, starts)]
     quantiles: np.ndarray = np.quantile(found, QUANTILES, axis=0)
     return quantiles
 
 
-def moved(engine: BatchEngine, run: Run, starts: Sequence[int]) -> Iterator[Run]:
+def moved(engine: BatchEngine, run: Point, starts: Sequence[int]) -> Iterator[Point]:
     """A run from starts that are moved by :data:`FARTHEST` at most, each by its number."""
     start = engine.setting(run).plant.eta0[: len(AXES)]
     for number in starts:

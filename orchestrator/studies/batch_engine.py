@@ -14,15 +14,13 @@ import numpy as np
 from auv_fmu.closed_loop import Setting, splits
 from auv_fmu.euler import MOST_INTERNAL_STEPS
 from auv_fmu.output_feedback import Gains
-from orchestrator.analysis.metrics import LAST_SECONDS
-from orchestrator.analysis.signals import ACTUATORS, AXES, DY_HAT
-from orchestrator.errors import InputError
-from orchestrator.experiments.bundle import PYTHON, current_fmus
+from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import digest_of
-from orchestrator.master.observer import Ending, Header
+from orchestrator.master.observers.observer import Ending, Header
+from orchestrator.master.observers.table import Table
 from orchestrator.master.schedule import stages
-from orchestrator.master.table import Table
+from orchestrator.runs.bundle import PYTHON, current_fmus
 from orchestrator.studies.batch import tally
 from orchestrator.studies.batch.columns import COLUMNS
 from orchestrator.studies.batch.kernel import Moment, Plan
@@ -35,9 +33,11 @@ from orchestrator.studies.batch.verdict import (
     refused_at_once,
     refused_at_start,
 )
-from orchestrator.studies.engine import Outcome, Run
+from orchestrator.studies.engine import Outcome, Point
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
+from orchestrator.vehicle.metrics import LAST_SECONDS
+from orchestrator.vehicle.signals import ACTUATORS, AXES, DY_HAT
 
 #: What makes every system.
 _OTHER = "use --engine fmu"
@@ -75,13 +75,13 @@ class BatchEngine:
         """Of the equations, and of what compiles them."""
         return digest_of({"equations": digest(), "numba": version("numba")})
 
-    def outcomes(self, runs: Iterable[Run]) -> Iterator[Outcome]:
+    def outcomes(self, runs: Iterable[Point]) -> Iterator[Outcome]:
         """Make some runs, in their order."""
         for run in runs:
             [outcome] = self.outcomes_at(run, [run.stop_time])
             yield outcome
 
-    def outcomes_at(self, run: Run, stop_times: Sequence[float]) -> list[Outcome]:
+    def outcomes_at(self, run: Point, stop_times: Sequence[float]) -> list[Outcome]:
         """What would have come out of a run with other stop times, all from one run.
 
         Args:
@@ -103,7 +103,7 @@ class BatchEngine:
             for end, found in zip(ends, tallies, strict=True)
         ]
 
-    def setting(self, run: Run) -> Setting:
+    def setting(self, run: Point) -> Setting:
         """The setting of the straight line that makes the same numbers as a run.
 
         Raises:
@@ -112,7 +112,7 @@ class BatchEngine:
         """
         return _job(self._systems[run.scenario], run).setting
 
-    def table(self, run: Run) -> Table:
+    def table(self, run: Point) -> Table:
         """A run with its rows, those of the columns :data:`.columns.COLUMNS` that it has.
 
         Raises:
@@ -145,7 +145,7 @@ class _Job(NamedTuple):
         return isinstance(self.setting.controller, Gains)
 
 
-def _job(system: System, run: Run) -> _Job:
+def _job(system: System, run: Point) -> _Job:
     """A run, ready to be made.
 
     Raises:

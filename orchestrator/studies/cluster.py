@@ -37,12 +37,12 @@ from distributed.comm import connect, get_address_host_port
 from distributed.utils import silence_logging_cmgr
 
 from auv_fmu import __version__
-from orchestrator.errors import InputError, reason
-from orchestrator.master.interrupts import without_interrupt
-from orchestrator.studies.engine import Engine, Outcome, Run
+from orchestrator.machine import cache
+from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.interrupts import without_interrupt
+from orchestrator.machine.locks import process_folder
+from orchestrator.studies.engine import Engine, Outcome, Point
 from orchestrator.studies.sockets import LocalScheduler, LocalWorker, place_in
-from orchestrator.system import cache
-from orchestrator.system.leftovers import process_folder
 
 #: How long a block shall take [s]: long beside the millisecond that a task costs, short for who
 #: waits for the last one, or loses it. One that takes so many times as long, because its runs take
@@ -75,7 +75,7 @@ FATAL = "every process that made it died"
 @contextmanager
 def making(
     engine: Engine,
-    runs: Iterable[Run],
+    runs: Iterable[Point],
     *,
     scheduler: str | None = None,
     workers: int | None = None,
@@ -226,7 +226,7 @@ class _Share(WorkerPlugin):  # type: ignore[misc]
             for stream in (1, 2):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
 
-    def outcomes(self, runs: list[Run], limit: float) -> tuple[float, list[Outcome]]:
+    def outcomes(self, runs: list[Point], limit: float) -> tuple[float, list[Outcome]]:
         """How long runs have taken [s], and what has come out of them.
 
         Args:
@@ -263,9 +263,9 @@ class _Making:
         self._pace = float("inf")  # seconds for a step
         self._threads, self._counted, self._seen = 1, float("-inf"), monotonic()
 
-    def outcomes(self, runs: Iterable[Run]) -> Iterator[list[Outcome]]:
+    def outcomes(self, runs: Iterable[Point]) -> Iterator[list[Outcome]]:
         """The outcomes of runs, block by block as they are done."""
-        lost: list[Run] = []
+        lost: list[Point] = []
         for block, outcomes in self._made(self._blocks(runs), self._room):
             if outcomes is None:
                 lost.extend(block)
@@ -275,9 +275,9 @@ class _Making:
         for (run,), outcomes in self._made(([run] for run in lost), lambda: 1):
             yield outcomes or [Outcome(run.number, {}, FATAL)]
 
-    def _blocks(self, runs: Iterable[Run]) -> Iterator[list[Run]]:
+    def _blocks(self, runs: Iterable[Point]) -> Iterator[list[Point]]:
         """Runs in their order, as many together as make a task of a good length."""
-        block: list[Run] = []
+        block: list[Point] = []
         steps = 0.0
         for run in runs:
             block.append(run)
@@ -289,8 +289,8 @@ class _Making:
             yield block
 
     def _made(
-        self, blocks: Iterator[list[Run]], room: Callable[[], int]
-    ) -> Iterator[tuple[list[Run], list[Outcome] | None]]:
+        self, blocks: Iterator[list[Point]], room: Callable[[], int]
+    ) -> Iterator[tuple[list[Point], list[Outcome] | None]]:
         """Blocks as they are done and their outcomes, or None where each worker has died.
 
         Args:
@@ -298,9 +298,9 @@ class _Making:
             room: how many blocks may be under way.
 
         """
-        under_way: dict[Future, list[Run]] = {}
+        under_way: dict[Future, list[Point]] = {}
         done: SimpleQueue[Future] = SimpleQueue()
-        rests: deque[list[Run]] = deque()
+        rests: deque[list[Point]] = deque()
         while True:
             while len(under_way) < room():
                 block = rests.popleft() if rests else next(blocks, None)
@@ -319,7 +319,7 @@ class _Making:
                 rests.extend(block[i : i + n] for i in range(n, len(block), n))
             yield block, outcomes
 
-    def _sent(self, block: list[Run]) -> Future:
+    def _sent(self, block: list[Point]) -> Future:
         limit = _OVERTIME * self._seconds
         return self._client.submit(_outcomes, self._name, pickle.dumps(block), limit, pure=False)
 
@@ -358,7 +358,7 @@ class _Making:
         elif now - self._seen > _PATIENCE:
             raise _gone("last worker")
 
-    def _result(self, future: Future, block: list[Run]) -> list[Outcome] | None:
+    def _result(self, future: Future, block: list[Point]) -> list[Outcome] | None:
         try:
             seconds, outcomes = future.result(_PATIENCE)
         except KilledWorker:

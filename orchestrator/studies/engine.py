@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
-from orchestrator.analysis.signals import ACTUATORS, AXES
 from orchestrator.master.experiment import ORDERS, Order
+from orchestrator.vehicle.signals import ACTUATORS, AXES
 
 #: An error of tracking that counts as having reached the reference [m].
 REACHED = 1.0
@@ -54,7 +54,7 @@ INDICES: tuple[str, ...] = (
 )
 
 
-class Run(NamedTuple):
+class Point(NamedTuple):
     """One run of a study.
 
     Attributes:
@@ -106,7 +106,7 @@ class Engine(Protocol):
         """A text in hexadecimal digits."""
         ...
 
-    def outcomes(self, runs: Sequence[Run]) -> Iterator[Outcome]:
+    def outcomes(self, runs: Sequence[Point]) -> Iterator[Outcome]:
         """Make some runs, in their order.
 
         Args:

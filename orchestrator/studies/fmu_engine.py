@@ -7,16 +7,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import InputError
-from orchestrator.experiments.preparation import Prepared
+from orchestrator.machine.archives import archive_of
+from orchestrator.machine.errors import InputError
+from orchestrator.machine.locks import process_folder
 from orchestrator.master.identity import code_of
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, chosen
 from orchestrator.master.simulation import simulate
-from orchestrator.studies.engine import Outcome, Run
+from orchestrator.runs.preparation import Prepared
+from orchestrator.studies.engine import Outcome, Point
 from orchestrator.studies.indices import Indices
-from orchestrator.system.leftovers import process_folder
 from orchestrator.system.names import port_name
-from orchestrator.system.unpacking import archive_of
 
 
 class FmuEngine:
@@ -37,9 +37,9 @@ class FmuEngine:
     @property
     def digest(self) -> str:
         """Of the code that says what comes out of rows."""
-        return code_of("orchestrator.analysis", "orchestrator.studies")
+        return code_of("orchestrator.vehicle", "orchestrator.studies")
 
-    def outcomes(self, runs: Sequence[Run]) -> Iterator[Outcome]:
+    def outcomes(self, runs: Sequence[Point]) -> Iterator[Outcome]:
         """Make some runs, in their order.
 
         Raises:
@@ -52,7 +52,7 @@ class FmuEngine:
             except InputError as error:
                 yield Outcome(run.number, {}, str(error))
 
-    def _outcome(self, run: Run) -> Outcome:
+    def _outcome(self, run: Point) -> Outcome:
         prepared = self._prepared[run.scenario]
         system = prepared.system.with_parameters(
             {port_name(name): value for name, value in run.parameters.items()}
@@ -66,7 +66,7 @@ class FmuEngine:
             experiment,
             [indices],
             loop=chosen(self._loop, experiment),
-            attendants=prepared.attendants(),
+            hooks=prepared.hooks(),
         )
         if ending.signals:
             raise KeyboardInterrupt

@@ -7,8 +7,11 @@ from math import sqrt
 
 import numpy as np
 
-from orchestrator.analysis.metrics import Metrics, continued
-from orchestrator.analysis.signals import (
+from orchestrator.master.observers.observer import Ending, Header
+from orchestrator.master.observers.table import Table
+from orchestrator.studies.engine import REACHED
+from orchestrator.vehicle.metrics import Metrics, continued
+from orchestrator.vehicle.signals import (
     ACTUATORS,
     AXES,
     DRIFT,
@@ -18,9 +21,6 @@ from orchestrator.analysis.signals import (
     TRACKING,
     tracking_error,
 )
-from orchestrator.master.observer import Ending, Header
-from orchestrator.master.table import Table
-from orchestrator.studies.engine import REACHED
 
 
 class Indices:

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from orchestrator.errors import InputError, reason, shortened
-from orchestrator.experiments.entries import is_finite
-from orchestrator.experiments.preparation import Prepared, Request, prepare
-from orchestrator.experiments.scenario import Scenario
-from orchestrator.studies.engine import Run
+from orchestrator.machine.errors import InputError, reason, shortened
+from orchestrator.runs.entries import is_finite
+from orchestrator.runs.preparation import Prepared, Request, prepare
+from orchestrator.runs.scenario import Scenario
+from orchestrator.studies.engine import Point
 from orchestrator.studies.study import (
     LATIN_HYPERCUBE,
     LOG,
@@ -122,13 +122,13 @@ class Space:
         """How many runs there are."""
         return self._n
 
-    def __getitem__(self, number: int) -> Run:
+    def __getitem__(self, number: int) -> Point:
         """One of the runs."""
         if not 0 <= number < self._n:
             raise IndexError(number)
         scenario, point = self.point(number)
         experiment, has = self.prepared[scenario].experiment, self._has[scenario]
-        return Run(
+        return Point(
             number,
             scenario,
             {name: value for name, value in {**self._constants, **point}.items() if name in has},

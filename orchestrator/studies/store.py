@@ -23,11 +23,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from orchestrator.errors import InputError, did_you_mean, reason
-from orchestrator.experiments.folder import opened
+from orchestrator.machine.errors import InputError, did_you_mean, reason
+from orchestrator.machine.ledger import Ledger, is_changed, located, moved_aside
+from orchestrator.runs.folder import opened
 from orchestrator.studies.engine import INDICES, Outcome
 from orchestrator.studies.space import Space
-from orchestrator.system.ledger import Ledger, is_changed, located, moved_aside
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,8 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from orchestrator.errors import InputError, did_you_mean, shortened
-from orchestrator.experiments.entries import (
+from orchestrator.machine.errors import InputError, did_you_mean, shortened
+from orchestrator.machine.user_files import explained, text_of
+from orchestrator.master.experiment import ORDERS
+from orchestrator.runs.entries import (
     Entry,
     are_names,
     check_entries,
@@ -21,10 +23,8 @@ from orchestrator.experiments.entries import (
     is_table,
     is_text,
 )
-from orchestrator.experiments.named import names_in, path_of
-from orchestrator.experiments.preparation import is_path
-from orchestrator.master.experiment import ORDERS
-from orchestrator.reading import explained, text_of
+from orchestrator.runs.named import names_in, path_of
+from orchestrator.runs.preparation import is_path
 from orchestrator.system.names import file_name, port_name
 
 #: Studies that come with the program.

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from string import Template
 
-from orchestrator.experiments.entries import Entry
-from orchestrator.experiments.scenario_page import table
+from orchestrator.runs.entries import Entry
+from orchestrator.runs.scenario_page import table
 from orchestrator.studies.engine import REACHED
-from orchestrator.studies.figures import entries as figures
+from orchestrator.studies.figures import figure_entries as figures
 from orchestrator.studies.study import ENTRIES, read_study, ready_studies
 
 _FILES = (

@@ -15,14 +15,14 @@ from typing import Any
 
 from tqdm import tqdm
 
-from orchestrator.errors import InputError
-from orchestrator.experiments.bundle import PYTHON
-from orchestrator.experiments.preparation import Prepared, loaded
-from orchestrator.experiments.scenario import Scenario
+from orchestrator.machine.compiler import machines_compiler
+from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import PACKAGES, digest_of
-from orchestrator.master.library import machines_compiler
 from orchestrator.master.loop import LOOPS
+from orchestrator.runs.bundle import PYTHON
+from orchestrator.runs.preparation import Prepared, loaded
+from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Engine
 from orchestrator.studies.figures import draw_figures, figure_files, read_figures
@@ -179,7 +179,7 @@ def _engine(name: str, prepared: Mapping[str, Prepared], means: Means) -> Engine
     if name not in ENGINES:
         raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
     for scenario, one in prepared.items():
-        if one.course is not None:
+        if one.input_table is not None:
             raise InputError(f"{scenario}: has a table of inputs, which no study can follow")
         if name == BATCH and one.events:
             raise InputError(f"{scenario}: has events, which engine {BATCH!r} cannot have happen")

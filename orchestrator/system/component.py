@@ -10,10 +10,9 @@ from pathlib import Path
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from orchestrator.errors import InputError, did_you_mean
-from orchestrator.findings import Findings
+from orchestrator.machine.archives import folder_of, unpacked
+from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.system.description import described
-from orchestrator.system.unpacking import folder_of, unpacked
 from orchestrator.system.values import Value, finite, typed
 
 #: The versions of FMI that a system can be written with, and those that the master can step.

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import fmpy
 from fmpy.model_description import ModelDescription, ValidationError
 
-from orchestrator.errors import InputError, reason, shortened
+from orchestrator.machine.errors import InputError, reason, shortened
 from orchestrator.system.values import integer, real
 
 _CAUSALITIES = {"parameter", "calculatedParameter", "input", "output", "local", "independent"}

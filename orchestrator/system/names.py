@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from hashlib import sha256
 
-from orchestrator.errors import InputError
+from orchestrator.machine.errors import InputError
 
 #: What may be in the name of a file on every system, words that Windows keeps for itself, and how
 #: long a name may be [bytes] to leave room for what follows it.

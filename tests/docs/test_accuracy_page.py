@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator import simulate
-from orchestrator.analysis.signals import true_control_point
+from orchestrator.vehicle.signals import true_control_point
 from support.markdown import DOCS
 
 PAGE = (DOCS / "accuracy.md").read_text(encoding="utf-8")

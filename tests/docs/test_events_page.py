@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.experiments.scenario import read_scenario
+from orchestrator.runs.scenario import read_scenario
 from support.markdown import DOCS, blocks
 
 PAGE = DOCS / "events.md"

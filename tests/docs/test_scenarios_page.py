@@ -7,7 +7,7 @@ import json
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.experiments.scenario_page import scenario_page
+from orchestrator.runs.scenario_page import scenario_page
 from support.markdown import DOCS, blocks
 
 PAGE = DOCS / "scenarios.md"

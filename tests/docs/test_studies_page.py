@@ -9,7 +9,7 @@ from inspect import signature
 import pytest
 
 from orchestrator import sweep
-from orchestrator.experiments.preparation import loaded
+from orchestrator.runs.preparation import loaded
 from orchestrator.studies.engine import INDICES
 from orchestrator.studies.figures import read_figures
 from orchestrator.studies.space import Space

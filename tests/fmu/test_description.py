@@ -192,7 +192,7 @@ def test_terminals_are_the_groups_of_inputs_and_outputs(fmi3: Path):
 
 
 def test_connecting_terminals_by_name_wires_the_closed_loop():
-    content = (package_folder("orchestrator") / "experiments" / "closed_loop.toml").read_text()
+    content = (package_folder("orchestrator") / "runs" / "closed_loop.toml").read_text()
     loop = tomllib.loads(content)
     components_of = loop["components"]
     fed = set()

@@ -20,10 +20,10 @@ from fmpy.build import build_platform_binary
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
-from orchestrator.experiments import bundle
-from orchestrator.experiments.scenario import read_scenario
-from orchestrator.experiments.wiring import closed_loop
 from orchestrator.master.experiment import Experiment
+from orchestrator.runs import bundle
+from orchestrator.runs.scenario import read_scenario
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.structure import System
 from support.cells import has_call
 from support.fmi3 import Fmi3Library, Logger, trials

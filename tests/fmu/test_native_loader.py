@@ -13,7 +13,7 @@ import pytest
 
 from fmus.packaging.loader import FLAGS, FOLDER, compiler
 from fmus.packaging.own import build_own
-from orchestrator.experiments import bundle
+from orchestrator.runs import bundle
 from support.instances import NAMES
 from support.tiers import slow
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from orchestrator.experiments import bundle
+from orchestrator.runs import bundle
 from support.calls import CASES, MODEL_EXCHANGE_FUNCTIONS
 from support.cells import has_call
 from support.instances import NAMES, REPRESENTATIVES

@@ -19,11 +19,11 @@ from fmus.packaging.compilers import FLAGS
 from fmus.packaging.platforms import TARGETS
 from orchestrator.exchange import c_host
 from orchestrator.exchange.verify import verify
-from orchestrator.experiments import bundle
-from orchestrator.experiments.scenario import read_scenario
-from orchestrator.experiments.wiring import closed_loop
+from orchestrator.machine.compiler import machines_compiler
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.library import machines_compiler
+from orchestrator.runs import bundle
+from orchestrator.runs.scenario import read_scenario
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import Component
 from orchestrator.system.structure import System
 from support.instances import NAMES

@@ -39,19 +39,19 @@ import numpy as np
 
 from orchestrator import Result, simulate
 from orchestrator.commands.main import main as auv_fmu
-from orchestrator.errors import InputError
 from orchestrator.exchange import verify
-from orchestrator.experiments.bundle import current_fmus
-from orchestrator.experiments.scenario import FOLDER as SCENARIOS
-from orchestrator.experiments.scenario import read_scenario
-from orchestrator.experiments.wiring import closed_loop
+from orchestrator.formats.ssp.writer import ssp_bytes
+from orchestrator.machine import archives as unpacking
+from orchestrator.machine.errors import InputError
+from orchestrator.machine.locks import _process_folder
 from orchestrator.master.experiment import ORDERS, Exchange, Experiment
-from orchestrator.master.files import CsvFile
-from orchestrator.master.observer import Observer
-from orchestrator.master.table import Table
-from orchestrator.system import unpacking
-from orchestrator.system.leftovers import _process_folder
-from orchestrator.system.ssp.writing import ssp_bytes
+from orchestrator.master.observers.files import CsvFile
+from orchestrator.master.observers.observer import Observer
+from orchestrator.master.observers.table import Table
+from orchestrator.runs.bundle import current_fmus
+from orchestrator.runs.scenario import FOLDER as SCENARIOS
+from orchestrator.runs.scenario import read_scenario
+from orchestrator.runs.wiring import closed_loop
 
 from . import files_mutators as mutators
 from .files_oracle import agreement

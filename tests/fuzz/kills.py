@@ -26,11 +26,11 @@ from unittest.mock import patch
 from tqdm import trange
 
 from orchestrator.commands.main import main as auv_fmu
-from orchestrator.experiments.bundle import current_fmus
-from orchestrator.experiments.folder import opened
+from orchestrator.machine.ledger import LEDGER
+from orchestrator.machine.locks import process_folder
 from orchestrator.paper import report
-from orchestrator.system.ledger import LEDGER
-from orchestrator.system.leftovers import process_folder
+from orchestrator.runs.bundle import current_fmus
+from orchestrator.runs.folder import opened
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from support.machine import contents, ended, forked, is_over

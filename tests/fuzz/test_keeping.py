@@ -29,18 +29,18 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from orchestrator.analysis.figures import figure_files
 from orchestrator.commands import paper
 from orchestrator.commands.main import main
-from orchestrator.experiments import bundle, own_controller, run
-from orchestrator.experiments.bundle import MANIFEST, current_fmus
-from orchestrator.master.checkpoint import Checkpoints
+from orchestrator.figures import figure_files
+from orchestrator.machine.ledger import LEDGER
+from orchestrator.machine.workers import Workers
+from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.paper import report
 from orchestrator.paper.sections import Section
-from orchestrator.paper.workers import Workers
-from orchestrator.studies.engine import Engine, Outcome, Run
+from orchestrator.runs import bundle, own_controller, run
+from orchestrator.runs.bundle import MANIFEST, current_fmus
+from orchestrator.studies.engine import Engine, Outcome, Point
 from orchestrator.studies.store import Store
-from orchestrator.system.ledger import LEDGER
 from support.machine import contents, ended, forked
 
 #: Examples of each command; with the profile `attack` some hundred times as many.
@@ -184,7 +184,7 @@ def quick(here: Path) -> Iterator[None]:
         return drawn(section.scenario.figure, "", made, folder, section.name)
 
     @contextmanager
-    def making(engine: Engine, runs: Iterable[Run], **_: object) -> Iterator[list[list[Outcome]]]:
+    def making(engine: Engine, runs: Iterable[Point], **_: object) -> Iterator[list[list[Outcome]]]:
         yield [list(engine.outcomes([run])) for run in runs]
 
     with ExitStack() as stack:

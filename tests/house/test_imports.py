@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 #: Rooms, each of which may import those before it.
 FLOORS = {
     "orchestrator": (
-        "errors", "findings", "reading", "system", "master", "analysis", "experiments", "exchange",
+        "machine", "system", "formats", "master", "vehicle", "figures", "runs", "exchange",
         "studies", "paper", "commands",
     ),
     "fmus": ("ports", "slave", "native", "components", "packaging"),
@@ -36,7 +36,7 @@ ALLOWED = {
 }  # fmt: skip
 
 #: Rooms that run any system.
-GENERAL = ("errors", "findings", "reading", "system", "master")
+GENERAL = ("machine", "system", "formats", "master")
 
 
 def folder_of(package: str) -> Path:
@@ -115,7 +115,7 @@ def ports() -> set[str]:
 
 
 def test_the_general_half_names_no_component_and_no_port_of_this_vehicle():
-    wiring = (folder_of("orchestrator") / "experiments/closed_loop.toml").read_text()
+    wiring = (folder_of("orchestrator") / "runs/closed_loop.toml").read_text()
     instances = set(re.findall(r"^(\w+) = \"\w+\"$", wiring.split("[wires]")[0], re.MULTILINE))
     assert "plant" in instances
     words = instances - {"name"} | set(components())

@@ -231,7 +231,7 @@ class Evaluation:
     def _responds(self, name: str) -> bool:
         """Whether any output that is a Real follows any input that is one, at once."""
         part = self.drawn.parts[name]
-        if not part.fmu.responds or part.pace > 1:
+        if not part.fmu.responds or part.every > 1:
             return False
         return any(
             part.fmu.named(one).type == "Real"
@@ -451,14 +451,14 @@ class Evaluation:
             before = dict(shown)
             for batch in batches:
                 for members in batch:
-                    pace = drawn.parts[members[0]].pace
-                    if k % pace:
+                    every = drawn.parts[members[0]].every
+                    if k % every:
                         continue
-                    end = min(k + pace, len(spans))
+                    end = min(k + every, len(spans))
                     self._advance(members, t, spans[end - 1][1], shown, before)
                     for port, value in self._computed(members).items():
                         waiting[port] = end, value
-                        if pace == 1 or self._at_once(port):
+                        if every == 1 or self._at_once(port):
                             shown[port] = value
                 for members in batch if self.order != JACOBI else ():
                     self._renew(members, shown)

@@ -186,7 +186,7 @@ class Part:
     fmu: Fmu
     values: dict[str, Any] = field(default_factory=dict)
     hidden: dict[str, Any] = field(default_factory=dict)
-    pace: int = 1
+    every: int = 1
 
     @property
     def group(self) -> str:
@@ -315,7 +315,7 @@ class _Draw:
         step = random.choice((0.1, 0.05, 0.02, 0.125))
         slow = self.chance(0.1 if self.tight else 0.3)
         for part in self.parts.values():
-            part.pace = random.choice((1, 1, 2, 3)) if slow else 1
+            part.every = random.choice((1, 1, 2, 3)) if slow else 1
         start = 0.0 if self.as_scenario else random.choice((0.0, 0.0, 0.0, 3.0, 1.1, -2.5))
         steps = random.randint(3, 9) + (random.choice((0.0, 0.0, 0.5, 0.25)))
         stop = start + steps * step
@@ -847,7 +847,7 @@ def _scenario(drawn: Drawn, folder: Path) -> Path:
         *table("parameters", values),
         *table(
             "steps",
-            [f"{part.name} = {part.pace * drawn.step!r}" for part in parts if part.pace > 1],
+            [f"{part.name} = {part.every * drawn.step!r}" for part in parts if part.every > 1],
         ),
     ]
     path = folder / "system.toml"
@@ -895,8 +895,8 @@ def _archive(drawn: Drawn, folder: Path, fmus: list[str]) -> Path:
                 bindings, further = bound(part)
                 outer |= further
                 hint = ""
-                if part.pace > 1:
-                    hint = _hint(part.pace * drawn.step)
+                if part.every > 1:
+                    hint = _hint(part.every * drawn.step)
                 own[part.name] = [
                     archives.component(
                         part.name.rpartition(".")[2],

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from fmus.packaging.kinds import NATIVE, PYTHON
-from orchestrator.errors import InputError
-from orchestrator.experiments.scenario import read_scenario
-from orchestrator.experiments.wiring import closed_loop
+from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.observer import Ending
+from orchestrator.master.observers.observer import Ending
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs.scenario import read_scenario
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import port_name
 
 #: The fixtures with the FMUs of each kind.

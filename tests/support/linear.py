@@ -10,8 +10,8 @@ from zipfile import ZipFile
 import numpy as np
 
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import Connection, System

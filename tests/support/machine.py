@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.system.ledger import LEDGER
+from orchestrator.machine.ledger import LEDGER
 
 #: Numbers from <linux/prctl.h> and <linux/capability.h>: what lets root write where it may not,
 #: and exceed limits.

@@ -11,11 +11,11 @@ from zipfile import ZipFile
 
 from hypothesis import strategies as st
 
-from orchestrator.master.events import Alter, Event
+from orchestrator.master.hooks.events import Alter, Event
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.transformation import Linear, Mapped
+from orchestrator.system.units import Linear, Mapped
 from support.compiled import library_of
 
 _SOURCE = Path(__file__).with_name("mixed.c")

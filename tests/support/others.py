@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from zipfile import ZipFile
 
-from orchestrator.master.attendant import Attendant
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.isolated import Isolation
+from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.loop import chosen
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
@@ -109,10 +109,10 @@ def run(
     loop: str = "python",
     isolation: Isolation | None = None,
     order: str = "jacobi",
-    attendants: Sequence[Attendant] = (),
+    hooks: Sequence[Hook] = (),
 ) -> Table:
     """All rows of a run."""
     table, experiment = Table(), Experiment(stop_time, step, order)
     how = chosen(loop, experiment, isolation)
-    simulate(system, experiment, [table], isolation, how, attendants)
+    simulate(system, experiment, [table], isolation, how, hooks)
     return table

@@ -10,7 +10,7 @@ from zipfile import ZipFile
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.transformation import Linear, Mapped, Transformation
+from orchestrator.system.units import Linear, Mapped, Transformation
 from support.compiled import library_of
 
 _SOURCE = Path(__file__).with_name("relay.c")
@@ -125,7 +125,7 @@ class Clock(NamedTuple):
 def expected(
     system: System,
     clock: Clock,
-    paces: Mapping[str, int],
+    decimations: Mapping[str, int],
     order: Sequence[str] | None,
     start: Mapping[PortName, float],
 ) -> list[dict[str, float]]:
@@ -158,7 +158,7 @@ def expected(
         before = {name: value(name, k) for name in known}
         stepped: set[str] = set()
         for name in order or system.components:
-            if k % paces[name]:
+            if k % decimations[name]:
                 continue
             for target in (PortName(name, port) for port in INPUTS):
                 if wire := fed.get(target):
@@ -167,7 +167,7 @@ def expected(
                     new = at_once(source) and source.component in stepped
                     seen = known[source][-1][1] if new else before[source]
                     inputs[target] = transformed(wire.transformation, seen)
-            end = min(k + paces[name], clock.steps)
+            end = min(k + decimations[name], clock.steps)
             u, v = (inputs[PortName(name, port)] for port in INPUTS)
             a, c = (float(system.value(PortName(name, port)) or 0.0) for port in PARAMETERS)
             t, h = clock.time(k), clock.length(k, end)

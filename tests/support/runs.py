@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.analysis.metrics import indices
-from orchestrator.experiments.preparation import Prepared, Request, loaded, prepare
 from orchestrator.master.experiment import Experiment, Order
-from orchestrator.master.files import CsvFile
 from orchestrator.master.loop import chosen
+from orchestrator.master.observers.files import CsvFile
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs.preparation import Prepared, Request, loaded, prepare
 from orchestrator.system.structure import System
+from orchestrator.vehicle.metrics import indices
 
 
 def run(

@@ -6,7 +6,11 @@ from collections.abc import Collection
 
 import numpy as np
 
-from orchestrator.analysis.signals import (
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.observers.observer import Header
+from orchestrator.master.observers.table import Table
+from orchestrator.system.names import port_name
+from orchestrator.vehicle.signals import (
     COMMANDED,
     DY,
     DY_HAT,
@@ -18,10 +22,6 @@ from orchestrator.analysis.signals import (
     UPPER_LIMITS,
     Y_D,
 )
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.observer import Header
-from orchestrator.master.table import Table
-from orchestrator.system.names import port_name
 
 COLUMNS = (*POSTURE, *NU, *DY, *COMMANDED, *Y_D, *DY_HAT, *THETA_HAT)
 STEP = 0.02

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from orchestrator.studies.engine import Outcome, Run
+from orchestrator.studies.engine import Outcome, Point
 
 
 class Toy(NamedTuple):
@@ -21,7 +21,7 @@ class Toy(NamedTuple):
 
     seconds: float = 0.0
 
-    def outcomes(self, runs: Sequence[Run]) -> Iterator[Outcome]:
+    def outcomes(self, runs: Sequence[Point]) -> Iterator[Outcome]:
         for run in runs:
             time.sleep(run.parameters.get("toy.seconds", self.seconds))
             if run.parameters.get("toy.talks"):
@@ -32,11 +32,11 @@ class Toy(NamedTuple):
             yield outcome(run, os.getpid())
 
 
-def outcome(run: Run, process: int = 0) -> Outcome:
+def outcome(run: Point, process: int = 0) -> Outcome:
     """What a run comes to."""
     return Outcome(run.number, {"square": run.parameters["toy.x"] ** 2, "process": process})
 
 
-def run(number: int, parameters: Mapping[str, Any] = {}) -> Run:
+def run(number: int, parameters: Mapping[str, Any] = {}) -> Point:
     """A run of a second's steps."""
-    return Run(number, "toy", {"toy.x": 0.1 * number, **parameters}, 1.0, 0.02)
+    return Point(number, "toy", {"toy.x": 0.1 * number, **parameters}, 1.0, 0.02)

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.errors import InputError
-from orchestrator.system import unpacking
+from orchestrator.formats.ssp.reader import read_ssp
+from orchestrator.machine import archives as unpacking
+from orchestrator.machine.errors import InputError
+from orchestrator.machine.locks import process_folder
 from orchestrator.system.component import read_component
-from orchestrator.system.leftovers import process_folder
-from orchestrator.system.ssp.reading import read_ssp
 from support.archives import component, described, system
 
 STRUCTURE, DESCRIPTION = "SystemStructure.ssd", "modelDescription.xml"

@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator.errors import InputError
-from orchestrator.experiments.bundle import current_fmus
-from orchestrator.experiments.preparation import load, loaded
-from orchestrator.experiments.scenario import read_scenario
-from orchestrator.experiments.wiring import closed_loop
+from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs.bundle import current_fmus
+from orchestrator.runs.preparation import load, loaded
+from orchestrator.runs.scenario import read_scenario
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import Run
+from orchestrator.studies.engine import Point
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import read_study, ready_studies
@@ -51,7 +51,7 @@ def engines(*names: str) -> tuple[BatchEngine, FmuEngine]:
 
 
 @cache
-def sampled(name: str) -> list[Run]:
+def sampled(name: str) -> list[Point]:
     """Some runs of a ready study, cut short, every second one in the other order."""
     study = read_study(name)
     space = Space(study, {scenario: loaded(scenario, KIND) for scenario in study.scenario})
@@ -67,7 +67,7 @@ def bits(rows: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(rows).view(np.int64)
 
 
-def compare_with_straight_line(engine: BatchEngine, run: Run) -> None:
+def compare_with_straight_line(engine: BatchEngine, run: Point) -> None:
     table = engine.table(run)
     straight = straight_rows(engine.setting(run), len(table) - 1, run.order == "jacobi")
     different = np.argwhere(bits(table.rows) != bits(straight))
@@ -114,7 +114,7 @@ ADDITIONS: list[dict[str, Any]] = [
 @pytest.mark.parametrize("values", ADDITIONS, ids=", ".join)
 def test_additions_are_those_of_the_straight_line(values, order):
     engine, _ = engines("fig4")
-    compare_with_straight_line(engine, Run(0, "fig4", values, 2.0, 0.02, order))
+    compare_with_straight_line(engine, Point(0, "fig4", values, 2.0, 0.02, order))
 
 
 #: What components refuse: values, values that do not fit, starts, steps.
@@ -139,7 +139,7 @@ REFUSED: list[dict[str, Any]] = [
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("values", REFUSED, ids=", ".join)
 def test_what_fmus_refuse_is_refused_in_their_words(values, order):
-    run = Run(5, "fig4", values, 3.0, 0.02, order)
+    run = Point(5, "fig4", values, 3.0, 0.02, order)
     for batch, fmus in zip(*(engine.outcomes([run]) for engine in engines("fig4")), strict=True):
         assert batch == fmus
         assert batch.failure and not batch.indices
@@ -149,7 +149,7 @@ def test_what_fmus_refuse_is_refused_in_their_words(values, order):
 @pytest.mark.parametrize("scenario", ["fig4", "fig5-pd"])
 def test_indices_are_those_of_the_rows_of_fmus(scenario, order):
     """With noise, and a shorter step at the end."""
-    run = Run(0, scenario, {"plant.noise.std": 0.001}, 30.01, 0.02, order)
+    run = Point(0, scenario, {"plant.noise.std": 0.001}, 30.01, 0.02, order)
     for batch, fmus in zip(*(engine.outcomes([run]) for engine in engines(scenario)), strict=True):
         assert batch == fmus
         assert batch.failure is None
@@ -157,7 +157,7 @@ def test_indices_are_those_of_the_rows_of_fmus(scenario, order):
 
 
 def test_rows_are_those_of_the_fmus():
-    run = Run(0, "fig5-pd", {"plant.noise.std": 0.001}, 1.01, 0.02)
+    run = Point(0, "fig5-pd", {"plant.noise.std": 0.001}, 1.01, 0.02)
     batch, _ = engines("fig5-pd")
     [system], table = systems("fig5-pd").values(), Table()
     changes = {port_name(name): value for name, value in run.parameters.items()}
@@ -170,7 +170,7 @@ def test_rows_are_those_of_the_fmus():
 
 def test_one_run_gives_what_came_of_shorter_ones():
     batch, _ = engines("fig5-pd")
-    run = Run(3, "fig5-pd", {"plant.m66": 0.4}, 20.0, 0.02)
+    run = Point(3, "fig5-pd", {"plant.m66": 0.4}, 20.0, 0.02)
     ends = [2.0, 7.5, 20.0]
     alone = [next(batch.outcomes([run._replace(stop_time=end)])) for end in ends]
     assert batch.outcomes_at(run, ends) == alone
@@ -178,7 +178,7 @@ def test_one_run_gives_what_came_of_shorter_ones():
 
 def test_ends_between_steps_are_refused():
     batch, _ = engines("fig4")
-    run = Run(0, "fig4", {}, 1.0, 0.02)
+    run = Point(0, "fig4", {}, 1.0, 0.02)
     for end in (0.515, 1.5):
         [outcome] = batch.outcomes_at(run, [end])
         assert outcome.failure == (
@@ -189,7 +189,7 @@ def test_ends_between_steps_are_refused():
 def test_runs_that_failed_later_have_come_to_their_earlier_ends():
     batch, _ = engines("fig4")
     early, late = batch.outcomes_at(
-        Run(0, "fig4", {"planner.tau_d.q": 40.0}, 3.0, 0.02), [1.0, 3.0]
+        Point(0, "fig4", {"planner.tau_d.q": 40.0}, 3.0, 0.02), [1.0, 3.0]
     )
     assert early.failure is None and early.indices
     assert "SteepReference" in str(late.failure)
@@ -197,7 +197,7 @@ def test_runs_that_failed_later_have_come_to_their_earlier_ends():
 
 def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus():
     batch, _ = engines("fig4")
-    run = Run(0, "fig4", {}, 0.5, 0.02)
+    run = Point(0, "fig4", {}, 0.5, 0.02)
     copy = pickle.loads(pickle.dumps(batch))
     assert copy.digest == batch.digest
     assert list(copy.outcomes([run])) == list(batch.outcomes([run]))
@@ -206,7 +206,7 @@ def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus():
 
 def test_threads_have_noise_of_their_own():
     batch, _ = engines("fig4")
-    runs = [Run(i, "fig4", {"plant.noise.seed": i}, 5.0, 0.02) for i in range(20)]
+    runs = [Point(i, "fig4", {"plant.noise.seed": i}, 5.0, 0.02) for i in range(20)]
     with ThreadPoolExecutor(4) as pool:
         side_by_side = list(pool.map(lambda run: next(batch.outcomes([run])), runs))
     assert side_by_side == list(batch.outcomes(runs))
@@ -249,7 +249,7 @@ def test_another_process_finds_the_kernel_compiled():
         "print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))\n"
     )
     batch, _ = engines("fig4")
-    list(batch.outcomes([Run(0, "fig4", {}, 0.1, 0.02)]))
+    list(batch.outcomes([Point(0, "fig4", {}, 0.1, 0.02)]))
     said = subprocess.run(
         [sys.executable, "-c", text], input=pickle.dumps(batch), capture_output=True, check=True
     )
@@ -260,7 +260,7 @@ def test_fmus_that_lie_in_another_folder_are_the_same(tmp_path):
     """As where two processes have built them at the same moment."""
     copies = copytree(current_fmus(KIND), tmp_path / "copies")
     system = closed_loop(copies, read_scenario("fig5-pd"))
-    run = Run(0, "fig5-pd", {}, 0.2, 0.02)
+    run = Point(0, "fig5-pd", {}, 0.2, 0.02)
     [one] = BatchEngine({"fig5-pd": system}, KIND).outcomes([run])
     [other] = engines("fig5-pd")[0].outcomes([run])
     assert one == other

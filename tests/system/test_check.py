@@ -11,14 +11,14 @@ import fmpy
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError
-from orchestrator.experiments.preparation import Request, load, loaded, prepare
-from orchestrator.experiments.result import simulate
-from orchestrator.experiments.scenario import names
+from orchestrator.formats.examination import open_inputs
+from orchestrator.formats.ssp import STRUCTURE
+from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.machine.errors import InputError
+from orchestrator.runs.preparation import Request, load, loaded, prepare
+from orchestrator.runs.result import simulate
+from orchestrator.runs.scenario import names
 from orchestrator.system.component import read_component
-from orchestrator.system.examination import open_inputs
-from orchestrator.system.ssp import STRUCTURE
-from orchestrator.system.ssp.writing import write_ssp
 from orchestrator.system.structure import System
 from support.others import build
 

@@ -13,10 +13,10 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.experiments.bundle import current_fmus
-from orchestrator.master.attendant import Run
-from orchestrator.master.checkpoint import Checkpoints
-from orchestrator.master.observer import Ending
+from orchestrator.master.hooks.checkpoint import Checkpoints
+from orchestrator.master.hooks.hook import Run
+from orchestrator.master.observers.observer import Ending
+from orchestrator.runs.bundle import current_fmus
 from orchestrator.system.structure import System
 from support import others
 from support.machine import LOOPS, contents, ended, eventually, forked, killed_at, start
@@ -272,7 +272,7 @@ def stopped(system: System, stop_time: float = 2.0) -> None:
 
     def doomed() -> None:
         def kill(self: Checkpoints, ending: Ending) -> None:
-            self._spool.to_disk()
+            self._row_log.to_disk()
             os.kill(os.getpid(), signal.SIGKILL)
 
         Checkpoints.end = kill

@@ -17,12 +17,12 @@ from auv_fmu.observer import EXACT, INTEGRAL
 from auv_fmu.output_feedback import Gains
 from auv_fmu.plant import RollAxis
 from auv_fmu.saturation import ARCTAN
-from orchestrator.analysis.metrics import indices
-from orchestrator.analysis.signals import tracking_error, true_control_point
-from orchestrator.experiments.wiring import closed_loop as wired
-from orchestrator.master.table import Table
+from orchestrator.master.observers.table import Table
+from orchestrator.runs.wiring import closed_loop as wired
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
+from orchestrator.vehicle.metrics import indices
+from orchestrator.vehicle.signals import tracking_error, true_control_point
 from support.instances import unpacked
 from support.runs import final_error, run
 

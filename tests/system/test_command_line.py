@@ -13,11 +13,11 @@ import pytest
 from fmpy.util import read_csv
 
 from orchestrator.commands.main import main
-from orchestrator.experiments import bundle
-from orchestrator.experiments.scenario import FOLDER as SCENARIOS
-from orchestrator.experiments.scenario import names, read_scenario
-from orchestrator.system.cache import users_folder
-from orchestrator.system.ledger import LEDGER
+from orchestrator.machine.cache import users_folder
+from orchestrator.machine.ledger import LEDGER
+from orchestrator.runs import bundle
+from orchestrator.runs.scenario import FOLDER as SCENARIOS
+from orchestrator.runs.scenario import names, read_scenario
 from support.texts import mentions, tells
 
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.analysis.signals import Y_D
 from orchestrator.commands.main import main
-from orchestrator.experiments.bundle import current_fmus
-from orchestrator.experiments.preparation import Request, loaded, prepare, with_companion
-from orchestrator.experiments.scenario import names, read_scenario
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs.bundle import current_fmus
+from orchestrator.runs.preparation import Request, loaded, prepare, with_companion
+from orchestrator.runs.scenario import names, read_scenario
+from orchestrator.vehicle.signals import Y_D
 from support.markdown import DOCS, blocks
 
 WAYPOINTS = "x,y,z\n0,0,-2\n3,0,-2\n3,3,-2\n"
@@ -33,7 +33,7 @@ def runs_of(text, stop_time=1.0):
     tables = []
     for prepared in pair_of(f"stop_time = {stop_time}\n{text}"):
         table = Table()
-        simulate(prepared.system, prepared.experiment, [table], attendants=prepared.attendants())
+        simulate(prepared.system, prepared.experiment, [table], hooks=prepared.hooks())
         tables.append(table)
     return tables
 

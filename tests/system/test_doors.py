@@ -14,9 +14,9 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError
-from orchestrator.system.osp import STRUCTURE, write_osp
-from orchestrator.system.ssp.writing import write_ssp
+from orchestrator.formats.osp import STRUCTURE, write_osp
+from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.machine.errors import InputError
 from support.archives import archive, component, described, fmu, system, variable
 from support.others import build
 from support.relay import relay

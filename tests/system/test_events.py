@@ -16,14 +16,14 @@ from auv_fmu import closed_loop as line
 from auv_fmu import plant
 from auv_fmu.closed_loop import LAWS, PAPER, Setting
 from orchestrator import load, simulate
-from orchestrator.analysis.signals import tracking_error
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError
-from orchestrator.experiments.preparation import Request, loaded, prepare, with_companion
-from orchestrator.experiments.scenario import read_scenario
+from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate as run
-from orchestrator.master.table import Table
+from orchestrator.runs.preparation import Request, loaded, prepare, with_companion
+from orchestrator.runs.scenario import read_scenario
+from orchestrator.vehicle.signals import tracking_error
 
 H = 0.02
 STEPS = 120
@@ -285,7 +285,7 @@ def test_what_is_said_of_the_scenarios_is_so(name):
         table = Table()
         run(
             prepared.system, prepared.experiment, [table],
-            loop=prepared.loop, attendants=prepared.attendants(),
+            loop=prepared.loop, hooks=prepared.hooks(),
         )  # fmt: skip
         error = np.linalg.norm(tracking_error(table), axis=1)
         time, after = table.time, table.time >= begin

@@ -13,16 +13,15 @@ import numpy as np
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError
-from orchestrator.experiments.inputs import Inputs, read_inputs
-from orchestrator.experiments.stored import read_result
-from orchestrator.findings import Findings
-from orchestrator.master.playback import Playback
+from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.machine.errors import Findings, InputError
+from orchestrator.master.hooks.playback import Playback
+from orchestrator.runs.inputs import Inputs, read_inputs
+from orchestrator.runs.stored import read_result
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
-from orchestrator.system.ssp.writing import write_ssp
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.transformation import Linear
+from orchestrator.system.units import Linear
 from support.others import WAYS, build, run, system_of
 
 #: Outputs by the inputs that they repeat.
@@ -379,7 +378,7 @@ def test_real_inputs_follow_a_table_as_their_variability_says(tmp_path, variabil
     file = tmp_path / "inputs.csv"
     file.write_text("time,a.u\n" + "".join(f"{t},{u}\n" for t, u in rows))
     system, course = read_inputs(Inputs(file), system_of(fmu), ())
-    table = run(system, attendants=[Playback(course)], **way)
+    table = run(system, hooks=[Playback(course)], **way)
     told = np.array(rows, dtype=[("time", float), ("u", float)])
     theirs = fmpy.simulate_fmu(
         str(fmu), stop_time=1.0, output_interval=0.1, input=told, output=["y"], validate=False

@@ -14,11 +14,11 @@ import pytest
 
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.exchange.verify import verify
-from orchestrator.experiments.scenario import read_scenario
-from orchestrator.experiments.wiring import closed_loop
-from orchestrator.master.library import machines_compiler
+from orchestrator.formats.ssp.writer import structure_xml
+from orchestrator.machine.compiler import machines_compiler
+from orchestrator.runs.scenario import read_scenario
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import PortName
-from orchestrator.system.ssp.writing import structure_xml
 
 LIBDIR = sysconfig.get_config_var("LIBDIR")
 

@@ -18,17 +18,17 @@ import numpy as np
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError, StartError
-from orchestrator.experiments.wiring import closed_loop
+from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.machine.errors import InputError, StartError
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.files import read_rows
-from orchestrator.master.isolated import Isolation
+from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.loop import chosen
-from orchestrator.master.observer import Header
+from orchestrator.master.observers.files import read_rows
+from orchestrator.master.observers.observer import Header
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
-from orchestrator.system.ssp.writing import write_ssp
 from orchestrator.system.structure import System
 from support.foreign import build_c_fmu, build_raising_fmu, build_slave, foreign_system
 from support.machine import LOOPS, contents

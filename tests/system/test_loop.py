@@ -15,17 +15,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError, StartError
-from orchestrator.experiments.wiring import closed_loop
-from orchestrator.master.events import Alter, Event, Events
+from orchestrator.machine.errors import InputError, StartError
 from orchestrator.master.experiment import ORDERS, Experiment
-from orchestrator.master.isolated import Isolation
+from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.hooks.events import Alter, Event, Events
 from orchestrator.master.loop import chosen
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from orchestrator.system.transformation import Linear
+from orchestrator.system.units import Linear
 from support.machine import LOOPS
 from support.mixed import ACTS, CALLS, Shape, altered, system_of, systems
 
@@ -79,7 +79,7 @@ def same(system: System, experiment: Experiment, events: Sequence[Event] = ()) -
 def test_random_systems_give_the_same_rows_and_the_same_failures(
     folder, arguments, step, n, rest, order, rows
 ):
-    with patch("orchestrator.master.observer._ROWS", rows):
+    with patch("orchestrator.master.observers.observer._ROWS", rows):
         same(system_of(folder, **arguments), Experiment((n + rest) * step, step, order))
 
 

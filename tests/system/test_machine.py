@@ -21,12 +21,12 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.commands.options import INTERRUPTED
-from orchestrator.experiments import record
-from orchestrator.experiments.bundle import current_fmus
-from orchestrator.experiments.stored import read_result
-from orchestrator.master.files import read_rows
-from orchestrator.system.leftovers import claimed
+from orchestrator.commands.streams import INTERRUPTED
+from orchestrator.machine.locks import claimed
+from orchestrator.master.observers.files import read_rows
+from orchestrator.runs import record
+from orchestrator.runs.bundle import current_fmus
+from orchestrator.runs.stored import read_result
 from support.machine import (
     LOOPS,
     called,

@@ -17,16 +17,16 @@ import pytest
 from fmpy.ssp.ssd import read_ssd
 from fmpy.util import read_csv
 
-from orchestrator.errors import InputError
-from orchestrator.experiments.wiring import closed_loop
-from orchestrator.master.files import read_columns, read_rows
+from orchestrator.formats.ssp.reader import read_ssp
+from orchestrator.formats.ssp.writer import ssp_bytes
+from orchestrator.machine.archives import check_place, unpacked
+from orchestrator.machine.errors import InputError
+from orchestrator.master.observers.files import read_columns, read_rows
 from orchestrator.master.schedule import stages
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
-from orchestrator.system.ssp.reading import read_ssp
-from orchestrator.system.ssp.writing import ssp_bytes
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.unpacking import check_place, unpacked
 from support.machine import LOOPS
 from support.runs import run, write
 

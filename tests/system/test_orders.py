@@ -13,22 +13,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError
-from orchestrator.experiments.bundle import NATIVE
-from orchestrator.experiments.preparation import Request, load, prepare
-from orchestrator.experiments.result import simulate as simulated
-from orchestrator.experiments.scenario import Scenario
-from orchestrator.master.experiment import ORDERS, Experiment
-from orchestrator.master.isolated import Isolation
+from orchestrator.machine.errors import InputError
+from orchestrator.master.experiment import ORDERS, Experiment, decimations
+from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.loop import chosen
-from orchestrator.master.paces import paces
+from orchestrator.master.observers.table import Table
 from orchestrator.master.schedule import delays, stages
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.runs.bundle import NATIVE
+from orchestrator.runs.preparation import Request, load, prepare
+from orchestrator.runs.result import simulate as simulated
+from orchestrator.runs.scenario import Scenario
 from orchestrator.system.graph import delayed
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from orchestrator.system.transformation import Linear, Mapped
+from orchestrator.system.units import Linear, Mapped
 from support.machine import LOOPS
 from support.relay import Clock, Wire, expected, relay, system_of
 
@@ -102,9 +101,9 @@ def test_any_system_in_any_order_is_what_a_few_lines_make(folder, arguments, n, 
     flat = (
         None if order == "jacobi" else [name for names in stages(system, order) for name in names]
     )
-    paces = {name: round(system.steps.get(name, H) / H) for name in system.components}
+    decimations = {name: round(system.steps.get(name, H) / H) for name in system.components}
     first = dict(zip(map(port_name, table.columns), table.rows[0, 1:].tolist(), strict=True))
-    rows = expected(system, clock, paces, flat, first)
+    rows = expected(system, clock, decimations, flat, first)
     assert list(table.time) == [clock.time(k) for k in range(clock.steps + 1)]
     for k, row in enumerate(rows, start=1):
         got = dict(zip(table.columns, table.rows[k, 1:].tolist(), strict=True))
@@ -238,7 +237,7 @@ def test_steps_follow_from_what_is_stated_and_else_from_the_fmus(folder):
     def paces_of(system: System, **stated: object) -> tuple[float, dict[str, int]]:
         prepared = prepare(Scenario("s"), system, Request(**stated))
         step = prepared.experiment.step
-        return step, paces(prepared.system, step)
+        return step, decimations(prepared.system, step)
 
     assert paces_of(system) == (0.01, {"a": 2, "b": 5, "c": 1})
     assert paces_of(system, steps={"b": 0.1}) == (0.02, {"a": 1, "b": 5, "c": 1})

@@ -15,9 +15,9 @@ from uuid import uuid4
 
 import pytest
 
-from orchestrator.master import library
-from orchestrator.system.cache import keep, kept
-from orchestrator.system.leftovers import process_folder
+from orchestrator.machine.cache import keep, kept
+from orchestrator.machine.locks import process_folder
+from orchestrator.master import stepper
 from support.machine import called
 from support.toy_engine import Toy, outcome, run
 
@@ -88,7 +88,7 @@ def planted(shared: Path, other: int, tmp_path: Path, monkeypatch: pytest.Monkey
     subprocess.run(["cc", "-shared", "-fPIC", "-o", tmp_path / "planted.so", source], check=True)
     forged = Path(mkdtemp())
     monkeypatch.setenv("XDG_CACHE_HOME", str(forged))
-    keep("loop", library._key(), {"stepper.so": (tmp_path / "planted.so").read_bytes()})
+    keep("loop", stepper._key(), {"stepper.so": (tmp_path / "planted.so").read_bytes()})
     keep("batch", "0", {"kernel": pickle.dumps(Mark(mark))})
     monkeypatch.setenv("XDG_CACHE_HOME", str(shared))
     for path in (forged, *forged.rglob("*")):
@@ -124,9 +124,9 @@ def test_once_the_folder_is_mended_files_of_another_user_are_not_run(planted, sh
     subprocess.run(["chmod", "-R", "go-w", shared / "auv-fmu"], check=True)
     for folder in (shared / "auv-fmu").iterdir():
         os.chown(folder, 0, 0)
-    assert library.kept() is None
+    assert stepper.kept() is None
     assert not kept("batch", "0")
-    assert library.made().advance
+    assert stepper.made().advance
     assert not planted.exists()
 
 

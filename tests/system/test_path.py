@@ -10,15 +10,15 @@ import pytest
 
 from auv_fmu import path_planner
 from auv_fmu.path_planner import Waypoints
-from orchestrator.analysis.signals import tracking_error
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError
-from orchestrator.experiments.scenario import read_scenario
-from orchestrator.experiments.waypoints import impossible_paths
-from orchestrator.experiments.wiring import closed_loop
+from orchestrator.machine.errors import InputError
+from orchestrator.runs.scenario import read_scenario
+from orchestrator.runs.waypoints import impossible_paths
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+from orchestrator.vehicle.signals import tracking_error
 from support.archives import fmu, variable
 from support.runs import run
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.experiments import bundle
+from orchestrator.runs import bundle
 from support.machine import contents
 
 ROOT = Path(__file__).parents[2]

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.analysis.gains import stated
 from orchestrator.commands import paper
 from orchestrator.commands.main import main
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
 from orchestrator.paper.errata import errata, of_the_paper
 from orchestrator.paper.report import write_report
-from orchestrator.paper.studies import make_studies, sections
+from orchestrator.paper.sections import make_studies, sections
 from orchestrator.studies.study import ready_studies
+from orchestrator.vehicle.gains import stated
 from support.variants import found, planted
 
 STRANGER = """\

@@ -17,15 +17,15 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError
-from orchestrator.experiments.preparation import Prepared
-from orchestrator.experiments.scenario import Scenario
-from orchestrator.experiments.stored import read_result
+from orchestrator.machine.archives import unpacked
+from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.files import read_columns, read_rows
-from orchestrator.studies.engine import Run
+from orchestrator.master.observers.files import read_columns, read_rows
+from orchestrator.runs.preparation import Prepared
+from orchestrator.runs.scenario import Scenario
+from orchestrator.runs.stored import read_result
+from orchestrator.studies.engine import Point
 from orchestrator.studies.fmu_engine import FmuEngine
-from orchestrator.system.unpacking import unpacked
 from support.others import build, system_of
 
 pytestmark = pytest.mark.usefixtures("workplace")
@@ -149,7 +149,7 @@ def test_who_takes_fmus_along_takes_those_that_were_read(workplace: Path):
     fmu = build(workplace)
     experiment = Experiment(0.2, 0.1)
     prepared = Prepared(Scenario("s"), system_of(fmu), experiment)
-    engine, run = FmuEngine({"s": prepared}), Run(0, "s", {}, 0.2, 0.1)
+    engine, run = FmuEngine({"s": prepared}), Point(0, "s", {}, 0.2, 0.1)
     assert list(pickle.loads(pickle.dumps(engine)).outcomes([run])) == list(engine.outcomes([run]))
     replace_by_another(fmu)
     with pytest.raises(InputError, match=r"plain\.fmu: has changed since it was read"):

@@ -8,16 +8,16 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from orchestrator.errors import InputError
-from orchestrator.master.attendant import Run
-from orchestrator.master.checkpoint import Checkpoints
+from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.instance import ComponentFailed
-from orchestrator.master.isolated import Isolation
-from orchestrator.master.library import made
+from orchestrator.master.fmi.instance import ComponentFailed
+from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.hooks.checkpoint import Checkpoints
+from orchestrator.master.hooks.hook import Run
 from orchestrator.master.loop import PYTHON_LOOP, Loop, chosen
+from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.master.table import Table
+from orchestrator.master.stepper import made
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from support.linear import QUARTER_TRUCK, SINE, TWO_MASSES, Model, Part, error, linear, system_of
@@ -161,9 +161,9 @@ def test_what_grows_as_it_should_is_let_grow(folder, growth):
 
 
 class _Broken:
-    """An attendant that ends a run after some steps."""
+    """A hook that ends a run after some steps."""
 
-    def attend(self, run: Run) -> int:
+    def act(self, run: Run) -> int:
         if run.made == 21:
             raise ComponentFailed("broken off")
         return 21
@@ -174,10 +174,10 @@ def test_a_run_with_a_solved_ring_goes_on_where_it_was(folder, tmp_path, couplin
     system, experiment = ring(folder, 1.0, -2.0), Experiment(3.0, H, coupling=coupling)
     whole, again = run(system, experiment), Table()
     kept = Checkpoints(tmp_path, {}, 1.0, resume=False)
-    ending = simulate(system, experiment, [kept], attendants=[kept, _Broken()])
+    ending = simulate(system, experiment, [kept], hooks=[kept, _Broken()])
     assert ending.failure == "stopped at t = 2.1 s: broken off"
     kept = Checkpoints(tmp_path, {}, 1.0, resume=True)
-    simulate(system, experiment, [again, kept], attendants=[kept])
+    simulate(system, experiment, [again, kept], hooks=[kept])
     assert kept.time == 3.0
     assert again.rows.tobytes() == whole.rows.tobytes()
 

@@ -10,17 +10,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.analysis.certificates import COLUMNS, certificates
-from orchestrator.analysis.metrics import indices
-from orchestrator.analysis.sensors import velocities_reaching
-from orchestrator.analysis.signals import tracking_error
-from orchestrator.experiments.scenario import names, read_scenario
-from orchestrator.experiments.wiring import closed_loop
-from orchestrator.master.table import Table
-from orchestrator.paper.measures import total_variation_until, turning_radius
-from orchestrator.paper.published import EFFORT_PD, EFFORT_PROPOSED, TURNING_RADIUS
+from orchestrator.master.observers.table import Table
+from orchestrator.paper.measures import (
+    EFFORT_PD,
+    EFFORT_PROPOSED,
+    TURNING_RADIUS,
+    total_variation_until,
+    turning_radius,
+)
+from orchestrator.runs.scenario import names, read_scenario
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+from orchestrator.vehicle.cautions import velocities_reaching
+from orchestrator.vehicle.certificates import COLUMNS, certificates
+from orchestrator.vehicle.metrics import indices
+from orchestrator.vehicle.signals import tracking_error
 from support.runs import final_error
 from support.runs import run as simulated
 

@@ -10,9 +10,10 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError
-from orchestrator.master import library, sources
-from orchestrator.system import unpacking
+from orchestrator.machine import archives as unpacking
+from orchestrator.machine import compiler
+from orchestrator.machine.errors import InputError
+from orchestrator.master.fmi import sources
 from support.relay import relay
 
 SUPPORT = Path(__file__).parents[1] / "support"
@@ -45,7 +46,7 @@ WAYS = {
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A cache folder of its own; it is skipped where there is no compiler."""
-    if library.machines_compiler() is None:
+    if compiler.machines_compiler() is None:
         pytest.skip("there is no C compiler")
     folder = tmp_path_factory.mktemp("cache")
     folder.chmod(0o700)

@@ -9,7 +9,7 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.errors import InputError
+from orchestrator.machine.errors import InputError
 from support.archives import (
     archive,
     binding,

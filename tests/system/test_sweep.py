@@ -12,8 +12,8 @@ import pytest
 
 from orchestrator import sweep
 from orchestrator.commands.main import main
-from orchestrator.experiments.preparation import loaded
-from orchestrator.experiments.scenario import Scenario
+from orchestrator.runs.preparation import loaded
+from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import INDICES
 from orchestrator.studies.fmu_engine import FmuEngine

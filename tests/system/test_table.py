@@ -10,9 +10,9 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.paper import table
+from orchestrator.paper import printed_table as table
 from orchestrator.paper.choices import OF_RUNS, OF_RUNS_OF_FIVE, PD, PROPOSED, Choice
-from orchestrator.paper.measures import way_of
+from orchestrator.paper.measures import approach_of
 from orchestrator.paper.printed_table import NUMBERS
 from orchestrator.paper.sensitivity import FARTHEST, PUBLISHED
 from orchestrator.paper.variants import all_variants
@@ -53,7 +53,7 @@ def test_ours_is_what_the_scenarios_give(found):
         np.testing.assert_allclose(
             numbers[scenario], [*metrics["l2_effort"], *metrics["final_error"]], rtol=1e-11
         )
-        assert found.six.ways_of(scenario)[0] == pytest.approx(way_of(result), rel=1e-12)
+        assert found.six.ways_of(scenario)[0] == pytest.approx(approach_of(result), rel=1e-12)
     # With six degrees of freedom 1e-6 m at the start is nothing.
     assert found.printed[0].options == found.six.ours.options and found.printed[0].bands is None
 

@@ -1,16 +1,1 @@
-"""Runs of the closed loop by its equations, compiled.
-
-========================  ============================================================
-module                    what it holds
-========================  ============================================================
-:mod:`.parameters`        which port sets which field of the equations' parameters
-:mod:`.standard`          the system that the equations make
-:mod:`.kernel`            one run: the loop, its noise, its rows
-:mod:`.columns`           which columns these rows have
-:mod:`.tally`             the indices of a run, on the way
-:mod:`.equations`         equations as numba compiles them
-:mod:`.flat`              all numbers of nested tuples, and sums over them
-:mod:`.library`           the kernel, compiled once and kept in the user's cache folder
-:mod:`.verdict`           why a run ends early, in the words of the FMUs
-========================  ============================================================
-"""
+"""Runs of the closed loop by its equations, compiled: `kernel` is one run."""

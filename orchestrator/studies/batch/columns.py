@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from orchestrator.analysis.signals import (
+from orchestrator.vehicle.signals import (
     APPLIED,
     AXES,
     COMMANDED,

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from auv_fmu.closed_loop import LAWS, Law
+from orchestrator.machine.cache import keep, kept
+from orchestrator.machine.children import imported_apart
 from orchestrator.master.identity import code_of
 from orchestrator.studies.batch import kernel
 from orchestrator.studies.batch.kernel import Moment
-from orchestrator.system.cache import keep, kept
-from orchestrator.system.imports import imported_apart
 
 #: What it is in the user's cache folder.
 _KIND = "batch"

@@ -14,10 +14,10 @@ from auv_fmu.pd import PdGains
 from auv_fmu.plant import INTEGRATORS
 from auv_fmu.saturation import SATURATIONS
 from auv_fmu.vehicle import Vehicle
-from orchestrator.analysis.signals import ACTUATORS, AXES, DIRECTIONS, EULER
-from orchestrator.errors import InputError
+from orchestrator.machine.errors import InputError
 from orchestrator.system.names import PortName
 from orchestrator.system.values import Value
+from orchestrator.vehicle.signals import ACTUATORS, AXES, DIRECTIONS, EULER
 
 #: Where a value lies: fields, and places in tuples.
 Path = tuple[str | int, ...]

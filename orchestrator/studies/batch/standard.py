@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from orchestrator.analysis.signals import AXES
-from orchestrator.experiments.wiring import closed_loop
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
+from orchestrator.vehicle.signals import AXES
 
 #: The controller that is told the velocity, and the wires for it.
 _TOLD = "PdController"

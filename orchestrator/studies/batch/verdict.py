@@ -14,8 +14,8 @@ from auv_fmu import motion_planner, plant
 from auv_fmu.closed_loop import LAWS, Setting, Splits, begin, scene
 from auv_fmu.disturbance import disturbance
 from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS
-from orchestrator.analysis.signals import ACTUATORS, AXES, DIRECTIONS
 from orchestrator.studies.batch.kernel import Moment, Plan, is_bounded
+from orchestrator.vehicle.signals import ACTUATORS, AXES, DIRECTIONS
 
 #: The state that a component comes to, and outputs of its that may not be finite, by name.
 _Result = tuple[Any, dict[str, float]]

@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestrator.analysis.figures.style import COLOURS, STYLES
+from orchestrator.figures.style import COLOURS, STYLES
 from orchestrator.studies.figures.bins import Bins, bins_of, grouped, is_logarithmic
-from orchestrator.studies.figures.entries import Plan
-from orchestrator.studies.figures.panels import legend, paneled, spread
-from orchestrator.studies.figures.values import VERDICTS, Values
+from orchestrator.studies.figures.figure_entries import FigureEntry
+from orchestrator.studies.figures.grid import legend, paneled, spread
+from orchestrator.studies.figures.study_data import VERDICTS, Values
 
 #: Parts of an axis along which runs are counted together.
 _BINS = 30
@@ -26,7 +26,7 @@ _ABREAST = 2
 _HEIGHT = 2.3
 
 
-def bands(plan: Plan, title: str, runs: Values) -> Figure:
+def bands(plan: FigureEntry, title: str, runs: Values) -> Figure:
     """A row of panels for each value that is shown, a column for each x; runs apart by colours."""
     abreast = len(plan.x) if len(plan.x) > 1 else min(_ABREAST, len(plan.show))
     shown = list(product(plan.show, plan.x))

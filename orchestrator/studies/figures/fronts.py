@@ -7,16 +7,16 @@ from itertools import cycle
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestrator.analysis.figures.style import COLOURS, STYLES
+from orchestrator.figures.style import COLOURS, STYLES
 from orchestrator.studies.figures.bins import is_logarithmic
-from orchestrator.studies.figures.entries import Plan
-from orchestrator.studies.figures.panels import legend, paneled, spread
-from orchestrator.studies.figures.values import Values
+from orchestrator.studies.figures.figure_entries import FigureEntry
+from orchestrator.studies.figures.grid import legend, paneled, spread
+from orchestrator.studies.figures.study_data import Values
 
 _HEIGHT = 4.0
 
 
-def front(plan: Plan, title: str, runs: Values) -> Figure:
+def front(plan: FigureEntry, title: str, runs: Values) -> Figure:
     """Every run a dot; a line through those than which no other is better in both values."""
     figure, [[axes]] = paneled(title, 1, 1, _HEIGHT)
     [x] = plan.x

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestrator.studies.figures.entries import Plan
-from orchestrator.studies.figures.panels import paneled
-from orchestrator.studies.figures.values import Values
+from orchestrator.studies.figures.figure_entries import FigureEntry
+from orchestrator.studies.figures.grid import paneled
+from orchestrator.studies.figures.study_data import Values
 
 #: Blue falls, red grows: apart for colour-blind eyes.
 _COLOURS = "RdBu_r"
@@ -22,7 +22,7 @@ _NOTHING = 0.05
 _HEIGHT, _AROUND = 0.27, 0.5
 
 
-def influence(plan: Plan, title: str, runs: Values) -> Figure:
+def influence(plan: FigureEntry, title: str, runs: Values) -> Figure:
     """A matrix for each part of the runs: a row for each value, a column for what moves it.
 
     The colour is Spearman's rank correlation: 1 where more of the one always goes with more of the

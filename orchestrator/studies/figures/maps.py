@@ -10,9 +10,9 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from orchestrator.studies.figures.bins import Bins, bins_of, grouped, is_logarithmic
-from orchestrator.studies.figures.entries import Plan
-from orchestrator.studies.figures.panels import paneled, spread
-from orchestrator.studies.figures.values import VERDICTS, Values
+from orchestrator.studies.figures.figure_entries import FigureEntry
+from orchestrator.studies.figures.grid import paneled, spread
+from orchestrator.studies.figures.study_data import VERDICTS, Values
 
 #: Cells along each axis of runs that are no grid.
 _CELLS = 24
@@ -26,7 +26,7 @@ _COLOURS, _EMPTY = "cividis", "lightgrey"
 _HEIGHT = 2.3
 
 
-def maps(plan: Plan, title: str, runs: Values) -> Figure:
+def maps(plan: FigureEntry, title: str, runs: Values) -> Figure:
     """Panels for each value that is shown, with one scale of colours.
 
     The last column that tells runs apart has its values side by side, the others below each other.

@@ -10,7 +10,7 @@ import pytest
 from fmus.packaging import compilers, loader
 from fmus.packaging.compilers import compiler_for, library
 from fmus.packaging.platforms import platforms
-from orchestrator.master.library import COMPILERS, machines_compiler
+from orchestrator.machine.compiler import COMPILERS, machines_compiler
 
 OWN = "/usr/bin/own-cc"
 

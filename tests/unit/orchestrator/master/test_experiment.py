@@ -11,10 +11,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from orchestrator.errors import InputError
-from orchestrator.experiments.preparation import load
-from orchestrator.master.experiment import MOST_STEPS, Experiment
-from orchestrator.master.paces import paces
+from orchestrator.machine.errors import InputError
+from orchestrator.master.experiment import MOST_STEPS, Experiment, decimations
+from orchestrator.runs.preparation import load
 
 
 @given(step=st.floats(1e-3, 1.0), n=st.integers(1, 200), rest=st.floats(0.0, 0.99))
@@ -101,7 +100,7 @@ def test_an_unknown_order_is_refused():
 def test_a_step_of_a_component_may_be_beyond_all_multiples():
     system = replace(load("fig4", "native"), steps={"plant": 1e308})
     with pytest.raises(InputError, match=r"steps of 1e\+308 s, which are no multiple"):
-        paces(system, 0.02)
+        decimations(system, 0.02)
 
 
 @pytest.mark.parametrize(

@@ -14,17 +14,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestrator.experiments.preparation import Prepared, Request
 from orchestrator.master import identity as module
-from orchestrator.master.events import Event, Stop
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.hooks.events import Event, Stop
+from orchestrator.master.hooks.playback import InputTable
 from orchestrator.master.identity import digest_of
-from orchestrator.master.isolated import Isolation
 from orchestrator.master.loop import chosen
-from orchestrator.master.playback import Course
+from orchestrator.runs.preparation import Prepared, Request
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from orchestrator.system.transformation import Linear
+from orchestrator.system.units import Linear
 from support.runs import prepared
 
 
@@ -119,7 +119,7 @@ def an_event(run: Prepared, choice: Choice) -> Prepared:
 def inputs(run: Prepared, choice: Choice) -> Prepared:
     values = np.array([[choice.number]])
     target = PortName("controller", "y.x")
-    return replace(run, course=Course((target,), np.zeros(1), values, np.array([False])))
+    return replace(run, input_table=InputTable((target,), np.zeros(1), values, np.array([False])))
 
 
 OTHERS = [

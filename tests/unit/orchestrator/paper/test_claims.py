@@ -9,21 +9,21 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from auv_fmu.vehicle import Vehicle, accelerations
-from orchestrator.analysis.signals import APPLIED, THETA_HAT, Y_D
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.observer import Header
-from orchestrator.master.table import Table
+from orchestrator.master.observers.observer import Header
+from orchestrator.master.observers.table import Table
 from orchestrator.paper import claims
 from orchestrator.paper.claims import CLAIMS, Claim
+from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.measures import (
-    Way,
+    Approach,
+    approach_of,
     largest_error_after,
     total_variation_until,
     turning_radius,
-    way_of,
 )
-from orchestrator.paper.outcomes import Outcome
 from orchestrator.system.names import PortName
+from orchestrator.vehicle.signals import APPLIED, THETA_HAT, Y_D
 from support.texts import numbers_in, tells
 
 ELL = 0.35
@@ -39,7 +39,7 @@ def table_of(time, parameters=None, **columns):
 
 
 def outcome(table=None, **metrics):
-    return Outcome(metrics, table or Table())
+    return KeptRun(metrics, table or Table())
 
 
 def claim_of(judge) -> Claim:
@@ -214,7 +214,7 @@ def arriving(force, steps=10):
 @given(arrays(float, 11, elements=st.floats(-80.0, 80.0)))
 def test_no_force_has_less_effort_than_its_impulse_takes(force):
     """The effort by its definition, (59) without 1/T_f; the first row ends no step."""
-    found = way_of(arriving(force))
+    found = approach_of(arriving(force))
     assert found.duration == 200.0
     effort = np.sqrt(20.0 * np.sum(force[1:] ** 2))
     assert found.least_effort <= effort * (1.0 + 1e-12) + 1e-12
@@ -226,7 +226,7 @@ def test_no_force_has_less_effort_than_its_impulse_takes(force):
 
 def test_a_constant_force_has_the_least_effort():
     """5 N for 200 s: 1,000 N.s, 5 sqrt(200) N.s^0.5; half the effort takes four times as long."""
-    found = way_of(arriving(5.0))
+    found = approach_of(arriving(5.0))
     assert found.impulse == pytest.approx(1000.0)
     assert found.least_effort == pytest.approx(5.0 * np.sqrt(200.0))
     assert found.soonest(found.least_effort / 2.0) == pytest.approx(800.0)
@@ -245,8 +245,8 @@ def test_a_way_against_damping_takes_an_impulse_of_its_own(forces):
     impulse, duration = h * sum(forces), h * len(forces)
     assert impulse == pytest.approx(vehicle.d11 * x + vehicle.m11 * u)
     effort = np.sqrt(h * np.sum(np.square(forces)))
-    assert Way(duration, vehicle.d11 * x).least_effort <= effort * (1.0 + 1e-12) + 1e-12
-    assert Way(0.0, vehicle.d11 * 31.0).soonest(130.0) == pytest.approx(51.0, abs=0.5)
+    assert Approach(duration, vehicle.d11 * x).least_effort <= effort * (1.0 + 1e-12) + 1e-12
+    assert Approach(0.0, vehicle.d11 * 31.0).soonest(130.0) == pytest.approx(51.0, abs=0.5)
 
 
 def test_efforts_are_held_against_the_impulse_of_the_way():

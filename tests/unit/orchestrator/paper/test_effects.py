@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.master.table import Table
+from orchestrator.master.observers.table import Table
 from orchestrator.paper import effects
 from orchestrator.paper.effects import EFFECTS, LAMBDAS, NOISE_LEVELS, STEPS, show_effect
-from orchestrator.paper.outcomes import Outcome, Outcomes
+from orchestrator.paper.kept_runs import KeptRun, KeptRuns
 from support.texts import tells
 
 
@@ -21,13 +21,13 @@ class Here:
 @pytest.fixture(scope="module")
 def tables(tmp_path_factory) -> dict[str, list[Table]]:
     """Of some steps of the runs of each effect."""
-    outcomes = Outcomes(tmp_path_factory.mktemp("runs"), stop_time=0.2)
+    outcomes = KeptRuns(tmp_path_factory.mktemp("runs"), stop_time=0.2)
     outcomes.make([run for effect in EFFECTS for run in effect.runs], Here())
     return {effect.name: [outcomes[run].table for run in effect.runs] for effect in EFFECTS}
 
 
 def made(tables, *metrics):
-    return [Outcome(values, table) for values, table in zip(metrics, tables, strict=True)]
+    return [KeptRun(values, table) for values, table in zip(metrics, tables, strict=True)]
 
 
 def test_names_are_apart():
@@ -122,7 +122,7 @@ def test_saturation(tables):
 
 def test_certificates(tables):
     [table] = tables["certificates"]
-    figure = effects.certificates_along_a_run(Outcome({}, table)).figure
+    figure = effects.certificates_along_a_run(KeptRun({}, table)).figure
     # An instant a step: at t = 0 the command is away from its limit by 80 less what it is.
     u, *_ = figure.axes[2].lines
     assert len(u.get_xdata()) == len(table) - 1
@@ -131,8 +131,8 @@ def test_certificates(tables):
 
 def test_an_effect_is_drawn_or_says_why_not(tables, tmp_path):
     [table] = tables["certificates"]
-    text = show_effect("certificates", [Outcome({}, table)], tmp_path)
+    text = show_effect("certificates", [KeptRun({}, table)], tmp_path)
     assert f"({tmp_path.name}/certificates.png)" in text
     assert (tmp_path / "certificates.png").stat().st_size > 10_000
-    failed = [Outcome({"failure": "the sea is dry"}, table)]
+    failed = [KeptRun({"failure": "the sea is dry"}, table)]
     assert show_effect("certificates", failed, tmp_path).endswith("the sea is dry")

@@ -15,11 +15,10 @@ from auv_fmu.output_feedback import Gains, Measurement, estimated_error_sum
 from auv_fmu.pd import PdGains
 from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
 from auv_fmu.vehicle import Vehicle, accelerations
-from orchestrator.analysis import gains
-from orchestrator.experiments.wiring import closed_loop as loop_of
 from orchestrator.paper.errata import errata, errata_page, of_the_paper, section
-from orchestrator.paper.measures import sum_without_step
-from orchestrator.paper.published import EFFORT_PD, EFFORT_PROPOSED, TURNING_RADIUS
+from orchestrator.paper.measures import EFFORT_PD, EFFORT_PROPOSED, TURNING_RADIUS, sum_without_step
+from orchestrator.runs.wiring import closed_loop as loop_of
+from orchestrator.vehicle import gains
 from support.texts import tells
 
 ROOT = Path(__file__).parents[4]

@@ -5,8 +5,16 @@ import re
 
 import pytest
 
-from orchestrator.paper.formatting import actuator_values, numbers, picture, plain, table
-from orchestrator.paper.page import contents, headings, html
+from orchestrator.paper.page import (
+    actuator_values,
+    contents,
+    headings,
+    html,
+    numbers,
+    picture,
+    plain,
+    table,
+)
 
 
 def test_anchors_are_those_of_github():

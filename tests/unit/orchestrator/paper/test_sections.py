@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.experiments.scenario import names, read_scenario
-from orchestrator.master.table import Table
-from orchestrator.paper.outcomes import Outcome
-from orchestrator.paper.runs import Run
+from orchestrator.master.observers.table import Table
+from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.sections import draw_section, sections, written
+from orchestrator.paper.variations import Variation
+from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.system.names import port_name
 
 INDICES = {
@@ -32,7 +32,7 @@ class Known:
     def __getitem__(self, run):
         if run not in self._runs:
             self._runs.append(run)
-        return Outcome(self._metrics[self._runs.index(run)], Table())
+        return KeptRun(self._metrics[self._runs.index(run)], Table())
 
     def label(self, run):
         return run.label
@@ -47,11 +47,11 @@ def stranger(folder: Path, name: str = "mine", **entries: str) -> str:
 def test_a_scenario_is_drawn_with_its_companion_or_its_twin_without_noise():
     runs = {section.name: section.runs for section in sections(["fig4", "fig5", "fig7a"])}
     assert runs["fig4"] == {
-        "with noise": Run("fig4"),
-        "without noise": Run("fig4", {"plant.noise.std": 0.0}),
+        "with noise": Variation("fig4"),
+        "without noise": Variation("fig4", {"plant.noise.std": 0.0}),
     }
-    assert runs["fig5"] == {"proposed": Run("fig5"), "PD": Run("fig5-pd")}
-    assert runs["fig7a"] == {"fig7a": Run("fig7a")}
+    assert runs["fig5"] == {"proposed": Variation("fig5"), "PD": Variation("fig5-pd")}
+    assert runs["fig7a"] == {"fig7a": Variation("fig7a")}
 
 
 def test_names_of_strangers_do_not_collide(tmp_path):
@@ -99,14 +99,14 @@ def test_a_failure_is_said(tmp_path):
 
 def test_a_figure_that_there_is_not_is_a_note(tmp_path):
     [section] = sections([stranger(tmp_path, title='"Mine"', figure='"trackin"')])
-    [note] = draw_section(section, [Outcome(INDICES, Table())], tmp_path / "figures")
+    [note] = draw_section(section, [KeptRun(INDICES, Table())], tmp_path / "figures")
     assert "'trackin'" in note
     assert "tracking" in note
 
 
 def test_a_run_without_rows_has_no_figure(tmp_path):
     [section] = sections(["fig3a"])
-    assert draw_section(section, [Outcome({"failure": "no"}, Table())], tmp_path / "f") == []
+    assert draw_section(section, [KeptRun({"failure": "no"}, Table())], tmp_path / "f") == []
     assert not (tmp_path / "f").exists()
 
 

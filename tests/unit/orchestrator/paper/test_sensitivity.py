@@ -7,13 +7,9 @@ import csv
 import numpy as np
 import pytest
 
-from orchestrator.analysis.signals import APPLIED as APPLIED_PORTS
-from orchestrator.analysis.signals import COMMANDED as COMMANDED_PORTS
-from orchestrator.analysis.signals import ELL, POSTURE, Y_D, tracking_error
-from orchestrator.experiments.preparation import Request, loaded, prepare
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.observer import Header
-from orchestrator.master.table import Table
+from orchestrator.master.observers.observer import Header
+from orchestrator.master.observers.table import Table
 from orchestrator.paper import choices
 from orchestrator.paper.choices import (
     FIVE,
@@ -25,14 +21,17 @@ from orchestrator.paper.choices import (
     SIGNALS,
     runs,
 )
-from orchestrator.paper.measures import Way
-from orchestrator.paper.printed_table import section
+from orchestrator.paper.measures import Approach
+from orchestrator.paper.printed_table import section, write_variants
 from orchestrator.paper.sensitivity import PUBLISHED, as_read
-from orchestrator.paper.table import write_variants
 from orchestrator.paper.variants import errors, moved, numbers_of
+from orchestrator.runs.preparation import Request, loaded, prepare
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import Run
+from orchestrator.studies.engine import Point
 from orchestrator.system.names import port_name
+from orchestrator.vehicle.signals import APPLIED as APPLIED_PORTS
+from orchestrator.vehicle.signals import COMMANDED as COMMANDED_PORTS
+from orchestrator.vehicle.signals import ELL, POSTURE, Y_D, tracking_error
 from support.variants import (
     APPLIED,
     COMMANDED,
@@ -179,7 +178,7 @@ def test_ranges_are_of_what_has_arrived_and_of_what_is_consistent():
     # What contradicts nothing has its efforts in the order that is printed.
     assert found.span(PROPOSED, True, L2).low[1] == pytest.approx(80.0)
     assert found.span(PROPOSED, False, L2).high[1] == pytest.approx(106.0)
-    assert found.ways_of(PROPOSED) == [Way(40.0, 1000.0)] * 2
+    assert found.ways_of(PROPOSED) == [Approach(40.0, 1000.0)] * 2
 
 
 def test_how_near_all_six_efforts_are_at_once():
@@ -261,7 +260,7 @@ def test_starts_are_moved_by_no_more_than_is_said():
     """From where the variant itself starts, by the number of the start, and else nothing."""
     engine = BatchEngine({PD: loaded(PD)[1]})
     for options, start in (({}, (2.0, 6.0, 0.0)), ({"plant.eta0.y": -3.0}, (2.0, -3.0, 0.0))):
-        run = Run(0, PD, {"plant.roll": False, **options}, 200.0, 0.02)
+        run = Point(0, PD, {"plant.roll": False, **options}, 200.0, 0.02)
         starts = []
         for made in moved(engine, run, range(50)):
             parameters = dict(made.parameters)

@@ -23,7 +23,7 @@ pytest.importorskip("distributed", reason="needs the extra `studies`")
 
 from dask import config
 
-from orchestrator.errors import InputError
+from orchestrator.machine.errors import InputError
 from orchestrator.studies import cluster
 from orchestrator.studies.cluster import FATAL, making
 
@@ -184,7 +184,7 @@ def test_no_address_leaves_anything_to_wait_for():
         "inproc://a", "tls://127.0.0.1:1", "wss://127.0.0.1:1",
     ]  # fmt: skip
     code = (
-        "from orchestrator.errors import InputError\n"
+        "from orchestrator.machine.errors import InputError\n"
         "from orchestrator.studies.cluster import making\n"
         "from support.toy_engine import Toy\n"
         f"for address in {addresses}:\n"

@@ -11,7 +11,7 @@ import threading
 import pytest
 
 from orchestrator import simulate
-from orchestrator.studies.engine import Run
+from orchestrator.studies.engine import Point
 from orchestrator.studies.fmu_engine import FmuEngine
 from support.runs import prepared
 
@@ -26,7 +26,7 @@ def engine():
 @pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
 @pytest.mark.parametrize("scenario", ["fig5", "fig5-pd"])
 def test_outcome_is_that_of_the_same_run_alone(engine, scenario, order):
-    [outcome] = engine.outcomes([Run(3, scenario, CHANGES, 6.0, 0.015, order)])
+    [outcome] = engine.outcomes([Point(3, scenario, CHANGES, 6.0, 0.015, order)])
     alone = simulate(
         scenario, CHANGES, stop_time=6.0, step=0.015, order=order, kind="native", loop="python"
     )
@@ -42,10 +42,10 @@ def test_outcome_is_that_of_the_same_run_alone(engine, scenario, order):
 
 
 def test_failure_is_an_outcome_and_the_next_run_is_made(engine):
-    fine = Run(2, "fig5", {}, 1.0, 0.02)
-    refused = Run(0, "fig5", {"plant.ell": -1.0}, 1.0, 0.02)
-    stopped = Run(1, "fig5", {"plant.nu0.u": 1e60, "plant.nu0.r": 1e60}, 1.0, 0.02)
-    no_time = Run(3, "fig5", {}, 0.0, 0.02)
+    fine = Point(2, "fig5", {}, 1.0, 0.02)
+    refused = Point(0, "fig5", {"plant.ell": -1.0}, 1.0, 0.02)
+    stopped = Point(1, "fig5", {"plant.nu0.u": 1e60, "plant.nu0.r": 1e60}, 1.0, 0.02)
+    no_time = Point(3, "fig5", {}, 0.0, 0.02)
     runs = [refused, stopped, fine, no_time, fine]
     first, second, third, fourth, last = engine.outcomes(runs)
     assert [first.number, second.number, third.number, fourth.number] == [0, 1, 2, 3]
@@ -66,7 +66,7 @@ def test_fmus_travel_with_the_engine(tmp_path, native):
     engine = FmuEngine({"own": prepared(tmp_path / "own.toml")})
     sent = pickle.dumps(engine)
     shutil.rmtree(tmp_path)
-    runs = [Run(0, "own", CHANGES, 1.0, 0.02)]
+    runs = [Point(0, "own", CHANGES, 1.0, 0.02)]
     arrived = pickle.loads(sent)
     [outcome] = arrived.outcomes(runs)
     assert outcome.failure is None
@@ -80,5 +80,5 @@ def test_interrupt_is_no_failure_of_a_run(engine):
     timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        list(engine.outcomes([Run(i, "fig5", {}, 1e5, 0.02) for i in range(2)]))
+        list(engine.outcomes([Point(i, "fig5", {}, 1e5, 0.02) for i in range(2)]))
     timer.join()

@@ -7,15 +7,15 @@ from math import exp, log, pi, sqrt
 import numpy as np
 import pytest
 
-from orchestrator.analysis.signals import AXES, EULER
-from orchestrator.experiments.preparation import loaded
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.loop import chosen
-from orchestrator.master.observer import Ending, Header
+from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.simulation import simulate
+from orchestrator.runs.preparation import loaded
 from orchestrator.studies.engine import INDICES
 from orchestrator.studies.indices import Indices
 from orchestrator.system.names import port_name
+from orchestrator.vehicle.signals import AXES, EULER
 
 T, H, ELL = 10.0, 0.02, 0.35
 

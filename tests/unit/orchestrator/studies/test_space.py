@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator.errors import InputError
-from orchestrator.experiments.preparation import loaded
-from orchestrator.studies.engine import Run
+from orchestrator.machine.errors import InputError
+from orchestrator.runs.preparation import loaded
+from orchestrator.studies.engine import Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import MOST_RUNS, study_of
 
@@ -36,7 +36,7 @@ def test_grid_is_every_combination_whose_last_value_changes_fastest():
     assert len(runs) == 12
     assert [runs[i].parameters for i in range(12)] == expected
     assert {type(runs[0].parameters[name]) for name in ("plant.eta0.y", "plant.ell")} == {float}
-    assert runs[5] == Run(5, "fig5", expected[5], 100.0, 0.02, "gauss-seidel")
+    assert runs[5] == Point(5, "fig5", expected[5], 100.0, 0.02, "gauss-seidel")
     assert runs.columns == {"plant.ell": float, "controller.saturation": str, "plant.eta0.y": float}
 
 

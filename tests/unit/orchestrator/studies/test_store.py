@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-from orchestrator.errors import InputError
+from orchestrator.machine.errors import InputError
 from orchestrator.studies.engine import INDICES, Outcome
 from orchestrator.studies.store import StudyResult, read_record, store
 from support.machine import contents, eventually

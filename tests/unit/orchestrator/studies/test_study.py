@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.errors import InputError
+from orchestrator.machine.errors import InputError
 from orchestrator.studies.study import (
     ENTRIES,
     Range,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from orchestrator import sweep
-from orchestrator.errors import InputError
+from orchestrator.machine.errors import InputError
 from orchestrator.studies import sweep as module
 
 STUDY = {"scenario": "fig4", "vary": {"plant.ell": [0.3, 0.4]}}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.errors import InputError
+from orchestrator.machine.errors import InputError
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System

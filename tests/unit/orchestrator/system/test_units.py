@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.errors import InputError
-from orchestrator.system.transformation import Linear, Mapped, chained
-from orchestrator.system.units import UndefinedUnit, Unit, conversion
+from orchestrator.machine.errors import InputError
+from orchestrator.system.units import Linear, Mapped, UndefinedUnit, Unit, chained, conversion
 
 LENGTH, TEMPERATURE = (0, 1, 0, 0, 0, 0, 0, 0), (0, 0, 0, 0, 1, 0, 0, 0)
 M, INCH = Unit("m", LENGTH), Unit("inch", LENGTH, 0.0254)

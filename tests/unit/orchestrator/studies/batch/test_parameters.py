@@ -8,7 +8,7 @@ import pytest
 
 from auv_fmu.closed_loop import PAPER
 from fmus.packaging.discovery import components
-from orchestrator.errors import InputError
+from orchestrator.machine.errors import InputError
 from orchestrator.studies.batch.parameters import CHOICES, DEFAULTS, PATHS, setting_of
 from orchestrator.system.names import port_name
 

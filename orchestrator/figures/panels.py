@@ -1,0 +1,266 @@
+"""Panels that several figures have: the path, tracking errors, commands with their limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator, MaxNLocator
+from matplotlib.transforms import Transform
+
+from orchestrator.figures.layout import Cell, Panel
+from orchestrator.figures.signal import draw_signal, mean_window
+from orchestrator.figures.style import REFERENCE, Drawn, earth_axes, having, plain
+from orchestrator.master.observers.table import Table
+from orchestrator.vehicle.signals import (
+    ACTUATORS,
+    AXES,
+    COMMANDED,
+    CONTROL_POINT,
+    LIMITS,
+    LOWER_LIMITS,
+    TRACKING,
+    UPPER_LIMITS,
+    Y_D,
+    parameter,
+    tracking_error,
+    true_control_point,
+)
+
+_ACTUATOR_UNITS = ("N", "N·m", "N·m")
+
+#: An axis of a path is at least this share of the longest: a straight line lies in a box.
+_FLATTEST = 0.3
+
+#: Where limits of the actuators are in sight: when a command comes up to this share of them.
+_NEAR = 0.5
+
+#: Commands are cut off at this multiple of the limits, with a word.
+_BEYOND = 1.5
+
+#: Zero crossings reach far down in a logarithmic scale, and say nothing below this [m].
+_SMALLEST_ERROR = 1e-5
+
+#: The second of two runs: thin and solid, for dashes of a signal that swings are a smear.
+_THICK, _THIN = 1.4, 0.8
+
+#: Of the events of a run, so many are marked; names of those after this share stand before them.
+_MOST_MARKS, _LATE = 20, 0.6
+
+#: What a line of text needs of the height of a panel.
+_ROOM = 0.25
+
+#: Peaks from here on are written with an exponent [N, N.m].
+_MANY = 1e6
+
+
+def _path(cell: Cell, runs: Sequence[Drawn]) -> None:
+    """Paths of control points and their reference in three dimensions."""
+    axes = cell.axes(projection="3d")
+    paths = []
+    for run, _ in list(having(runs, (Y_D, ())))[:1]:
+        paths.append(run.result.group(*Y_D))
+        axes.plot(*paths[0].T, color=REFERENCE, linestyle="--", linewidth=1, label="reference")
+        axes.scatter(*paths[0][0], color=REFERENCE, marker="s", s=20, label="its start")
+    shown = list(having(runs, CONTROL_POINT))
+    for i, (run, colour) in enumerate(shown):
+        y = true_control_point(run.result)
+        paths.append(y)
+        label = plain(run.label) if len(shown) > 1 else "control point"
+        axes.plot(*y.T, color=colour, linewidth=_THIN if i else _THICK, label=label)
+        # Rings around each other: vehicles that start together stay to be seen.
+        axes.scatter(
+            *y[0], marker="o", s=20 + 50 * i, edgecolors=colour,
+            facecolors="none" if i else colour, label=None if i else "start",
+        )  # fmt: skip
+    _frame_path(axes, np.vstack(paths), runs[0].z_up)
+    title(axes, "path")
+
+
+def _frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
+    points = points[np.isfinite(points).all(axis=1)]
+    lower, upper = np.min(points, axis=0), np.max(points, axis=0)
+    extent = np.maximum(upper - lower, _FLATTEST * max(float((upper - lower).max()), 1e-3))
+    middle = (lower + upper) / 2
+    low, high = (middle - 0.54 * extent).tolist(), (middle + 0.54 * extent).tolist()
+    x, y, z = earth_axes(z_up)
+    axes.set(
+        xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]),
+        xlabel=x, ylabel=y, zlabel=z,
+    )  # fmt: skip
+    if not z_up:
+        axes.invert_yaxis()
+        axes.invert_zaxis()
+    box = np.maximum(extent, 0.5 * extent.max())
+    flat = float(box.max() / box[2]) - 1.0
+    # A tall box would reach into the panel below, a flat one into that beside it.
+    zoom = min(0.95 - 0.1 * flat, 0.68 * float(np.linalg.norm(box) / box[2]))
+    axes.set_box_aspect(box, zoom=zoom)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(4))
+    axes.tick_params(labelsize="small", pad=0)
+    # Below a flat box the names of the axes would lie upon their numbers, and beside it far away.
+    axes.xaxis.labelpad = axes.yaxis.labelpad = 8 * flat - 2
+    axes.zaxis.labelpad = 4 - 8 * flat
+
+
+def title(axes: Axes, text: str) -> None:
+    """A title above the axes, and below it what the lines are: nothing lies upon the data."""
+    n = len(axes.get_legend_handles_labels()[0])
+    if n < 2:
+        axes.set_title(text)
+        return
+    axes.legend(
+        title=text, alignment="left", ncols=n if n < 4 else -(-n // 2), loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+    )  # fmt: skip
+
+
+def over_time(panels: Sequence[Axes], runs: Sequence[Drawn], has_means: bool = False) -> None:
+    """One axis of time for some panels: all of the runs, named below the last, and their events."""
+    start = min(run.result.time[0] for run in runs)
+    end = max(run.result.time[-1] for run in runs)
+    for axes in panels:
+        axes.set_xlim(start, end)
+    _mark_events(panels, runs)
+    means = f", lines: means over {mean_window(runs[0].result.time):.3g} s" if has_means else ""
+    panels[-1].set_xlabel(f"time [s]{means}")
+
+
+def _mark_events(panels: Sequence[Axes], runs: Sequence[Drawn]) -> None:
+    """Lines where something has happened, or ended, in a run; their names in the first panel."""
+    marks: dict[float, str] = {}
+    for run in runs:
+        for occurrence in run.result.ending.events[:_MOST_MARKS]:
+            marks[occurrence.time] = marks.get(occurrence.time) or occurrence.label
+    if any(marks.values()):
+        _make_room_below(panels[0])
+    start, end = panels[0].get_xlim()
+    for time, label in marks.items():
+        for axes in panels:
+            axes.axvline(time, color="0.35", linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
+        is_late = time - start > _LATE * (end - start)
+        panels[0].annotate(
+            plain(label), (time, 0), xycoords=panels[0].get_xaxis_transform(),
+            xytext=(-2 if is_late else 2, 2), textcoords="offset points",
+            ha="right" if is_late else "left", va="bottom", fontsize="small",
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
+        )  # fmt: skip
+
+
+def _make_room_below(axes: Axes) -> None:
+    """Room for a line of text below the data."""
+    bottom, top = axes.get_ylim()
+    if axes.get_yscale() == "log":
+        axes.set_ylim(bottom=bottom * (bottom / top) ** _ROOM)
+    else:
+        axes.set_ylim(bottom=bottom - _ROOM * (top - bottom))
+
+
+def draw_errors(
+    panels: Sequence[Axes],
+    runs: Sequence[Drawn],
+    name: str = "tracking errors",
+    logarithmic: bool = False,
+) -> None:
+    """Tracking errors of some runs, an axis a panel."""
+    for i, (run, colour) in enumerate(having(runs, TRACKING)):
+        errors = tracking_error(run.result)
+        for axes, error in zip(panels, (np.abs(errors) if logarithmic else errors).T, strict=True):
+            axes.plot(run.result.time, error, **_line(i, run, colour))
+    for k, axes in zip(AXES, panels, strict=True):
+        axes.set_ylabel(f"$|e_{k}|$ [m]" if logarithmic else f"$e_{k}$ [m]")
+        if logarithmic:
+            axes.set_yscale("log")
+            axes.yaxis.set_major_locator(LogLocator(numticks=5))
+            if axes.get_ylim()[1] > _SMALLEST_ERROR:
+                axes.set_ylim(bottom=max(_SMALLEST_ERROR, axes.get_ylim()[0]))
+    title(panels[0], name)
+    over_time(panels, runs)
+
+
+def _line(i: int, run: Drawn, colour: str) -> dict[str, Any]:
+    """Of the run a figure is about, and, thin upon it, of those it is compared with."""
+    return {"color": colour, "linewidth": _THIN if i else _THICK, "label": plain(run.label)}
+
+
+def draw_commands(
+    panels: Sequence[Axes], runs: Sequence[Drawn], name: str = "commanded control signals"
+) -> None:
+    """Commands of some runs and the limits of (3), an actuator a panel."""
+    shown = list(having(runs, (COMMANDED, ())))
+    limited = [run.result for run, _ in having(runs, ((), LIMITS))]
+    has_means = False
+    for k, axes, unit in zip(range(3), panels, _ACTUATOR_UNITS, strict=True):
+        for i, (run, colour) in enumerate(shown):
+            command = partial(_command, COMMANDED[k])
+            has_means |= draw_signal(axes, run.result, command, **_line(i, run, colour))
+        axes.set_ylabel(rf"$\tau_{ACTUATORS[k]}$ [{unit}]")
+        if limited:
+            _show_limits(axes, k, [run for run, _ in shown], limited[0], unit)
+    title(panels[0], name)
+    over_time(panels, runs, has_means)
+
+
+def _command(column: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
+    """A command is held until the next one, the last until the end of the run."""
+    command = table.step_values(column)[:, 0]
+    return np.append(table.step_start, table.time[-1]), np.append(command, command[-1])
+
+
+def _show_limits(axes: Axes, k: int, runs: Sequence[Drawn], limited: Table, unit: str) -> None:
+    """Limits of an actuator, and how far commands go that are cut off."""
+    lower, upper = parameter(limited, LOWER_LIMITS[k]), parameter(limited, UPPER_LIMITS[k])
+    words = (
+        f"limits ±{upper:g} {unit}" if lower == -upper else f"limits {lower:g}, {upper:g} {unit}"
+    )
+    peaks = {run.label: _peak(run.result[COMMANDED[k]]) for run in runs}
+    if max(peaks.values()) < _NEAR * min(upper, -lower):
+        bottom, top = axes.get_ylim()
+        axes.set_ylim(bottom, top + 0.2 * (top - bottom))
+        _say(axes, f"{words}: far away", 0.98, axes.transAxes, "top")
+        return
+    for limit in (lower, upper):
+        axes.axhline(limit, color="black", linewidth=0.8)
+    bottom, _ = axes.get_ylim()
+    axes.set_ylim(max(min(bottom, 1.2 * lower), _BEYOND * lower), _BEYOND * upper)
+    for label, peak in peaks.items():
+        if peak > _BEYOND * max(upper, -lower):
+            who = f"peak of {plain(label)}" if len(runs) > 1 else "peak"
+            number = f"{peak:,.0f}" if peak < _MANY else f"{peak:.2g}"
+            words += f", {who} {number} {unit}"
+    _say(axes, words, upper, axes.get_yaxis_transform(), "bottom")
+
+
+def _say(axes: Axes, words: str, y: float, transform: Transform, va: str) -> None:
+    """A word at the right of a panel, legible upon lines."""
+    axes.annotate(
+        words, (1, y), xycoords=transform, xytext=(0, 2 if va == "bottom" else 0),
+        textcoords="offset points", ha="right", va=va, fontsize="small",
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
+    )  # fmt: skip
+
+
+def _peak(values: np.ndarray) -> float:
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+
+
+def _errors(cell: Cell, runs: Sequence[Drawn]) -> None:
+    draw_errors(cell.stack(3), runs)
+
+
+def _logarithmic_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
+    draw_errors(cell.stack(3), runs, "tracking errors, logarithmic", logarithmic=True)
+
+
+def _commands(cell: Cell, runs: Sequence[Drawn]) -> None:
+    draw_commands(cell.stack(3), runs)
+
+
+PATH = Panel("path", CONTROL_POINT, _path, 3.4)
+ERRORS = Panel("tracking errors", TRACKING, _errors, 4.0)
+LOGARITHMIC_ERRORS = Panel("logarithmic tracking errors", TRACKING, _logarithmic_errors, 4.0)
+COMMANDS = Panel("commands", (COMMANDED, ()), _commands, 4.0)

@@ -1,0 +1,153 @@
+"""Any signals of any results over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from orchestrator.figures.panels import over_time
+from orchestrator.figures.signal import draw_signal
+from orchestrator.figures.style import COLOURS, STYLES, WIDTH, Drawn, plain, styled
+from orchestrator.machine.errors import InputError
+from orchestrator.master.observers.selection import matches, matching
+from orchestrator.master.observers.table import Table
+from orchestrator.vehicle.signals import unit_of
+
+#: What is drawn where nothing is asked for, as far as it is there.
+DEFAULT = ("controller.e", "plant.tau", "controller.theta_hat")
+
+#: Height of a panel, of what stands above and below all of them, of a row of a legend [in].
+_PANEL, _MARGIN, _ROW = 1.9, 0.6, 0.2
+
+#: Letters in a row of a legend, of which the line of an entry takes some.
+_LETTERS, _LINE = 100, 6
+
+#: Of the lines, so many that few runs look alike.
+_STYLES = (*STYLES, (0, (7, 2)), (0, (3, 1, 1, 1, 1, 1)))
+
+
+class Plot(Figure):
+    """A figure that a notebook shows by itself."""
+
+    def _repr_png_(self) -> bytes:
+        image = BytesIO()
+        self.savefig(image, format="png")
+        return image.getvalue()
+
+
+def wanted(columns: Sequence[str], patterns: Sequence[str]) -> list[str]:
+    """The columns of a table that would be drawn."""
+    return [name for name in columns if any(matches(name, p) for p in patterns or DEFAULT)]
+
+
+def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Figure:
+    """Draw columns over time, a group such as plant.y a panel, runs over each other.
+
+    Args:
+        runs: labels and tables.
+        patterns: such as `plant.y.*`, or the name of a group or column; none: errors, commands
+            and estimates of the loop.
+
+    Raises:
+        InputError: a pattern matches no column.
+
+    """
+    if not all(isinstance(pattern, str) for pattern in patterns):
+        raise InputError(f"patterns are texts such as plant.y.*, not {list(patterns)!r}")
+    names = list(dict.fromkeys(name for _, table in runs for name in table.columns))
+    if not patterns:
+        patterns = [pattern for pattern in DEFAULT if wanted(names, [pattern])]
+    if not patterns:
+        groups = dict.fromkeys(map(group_of, names))
+        raise InputError(f"name the columns to draw; there are {', '.join(groups)}")
+    panels: dict[tuple[str, str], list[str]] = {}
+    for name in matching(names, patterns):
+        panels.setdefault((group_of(name), unit_of(name)), []).append(name)
+    with styled():
+        figure = Plot(figsize=(WIDTH, _MARGIN + _PANEL * len(panels)))
+        axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+        has_means = [
+            _draw_panel(place, group, unit, members, runs)
+            for place, ((group, unit), members) in zip(axes, panels.items(), strict=True)
+        ]
+        over_time(list(axes), [Drawn(*run) for run in runs], any(has_means))
+        if len(runs) > 1:
+            in_colour = all(len(members) == 1 for members in panels.values())
+            lines = [
+                _line(label, COLOURS[i % len(COLOURS)] if in_colour else "black", i)
+                for i, (label, _) in enumerate(runs)
+            ]
+            columns = _columns(lines)
+            figure.set_figheight(figure.get_figheight() + _ROW * -(-len(lines) // columns))
+            figure.legend(handles=lines, loc="outside upper left", ncols=columns)
+    return figure
+
+
+def group_of(column: str) -> str:
+    """The group that a column belongs to: plant.y of plant.y.x; the column itself for others."""
+    for separator in ("[", "."):
+        group, _, member = column.rpartition(separator)
+        if "." in group and member:
+            return group
+    return column
+
+
+def _column(name: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
+    return table.time, table[name]
+
+
+def _draw_panel(
+    axes: Axes, group: str, unit: str, members: Sequence[str], runs: Sequence[tuple[str, Table]]
+) -> bool:
+    """The lines of a group; whether there are means among them.
+
+    Members differ in colour, runs in style; runs of a single member in both.
+    """
+    has_means = False
+    parts = [member.removeprefix(group).strip(".[]") for member in members]
+    for i, (run, table) in enumerate(runs):
+        for j, member in enumerate(members):
+            if member not in table:
+                continue
+            colour = (j if len(members) > 1 else i) % len(COLOURS)
+            has_means |= draw_signal(
+                axes,
+                table,
+                partial(_column, member),
+                color=COLOURS[colour],
+                linestyle=_style(i if len(runs) > 1 else j),
+                label=", ".join([parts[j]] * (len(members) > 1) + [plain(run)] * (len(runs) > 1)),
+            )
+    name = group if len(members) > 1 else members[0]
+    axes.set_ylabel(f"{name}\n[{unit}]" if unit else name)
+    if len(members) > 1:
+        lines = [
+            _line(part, COLOURS[j % len(COLOURS)], 0 if len(runs) > 1 else j)
+            for j, part in enumerate(parts)
+        ]
+        axes.legend(
+            handles=lines, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=_columns(lines)
+        )
+    return has_means
+
+
+def _line(label: str, colour: str, style: int) -> Line2D:
+    """A line for a legend."""
+    return Line2D([], [], color=colour, linestyle=_style(style), label=plain(label))
+
+
+def _style(i: int) -> Any:
+    return _STYLES[i % len(_STYLES)]
+
+
+def _columns(lines: Sequence[Line2D]) -> int:
+    """How many entries of a legend have room beside each other."""
+    longest = max(len(str(line.get_label())) for line in lines)
+    return max(1, _LETTERS // (longest + _LINE))

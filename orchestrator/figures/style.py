@@ -1,0 +1,157 @@
+"""How figures look: colours that stay apart, settings, headings, and files without a date."""
+
+from __future__ import annotations
+
+import logging
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from itertools import cycle
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from orchestrator.machine.errors import InputError
+from orchestrator.master.observers.table import Table
+
+#: Okabe and Ito's colours, which stay apart for colour-blind eyes, darkest first; every line
+#: also has a style of its own, for print.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+STYLES = ("-", "--", "-.", ":")
+REFERENCE = "#555555"
+
+#: Width of the page [in]: two columns of a journal, and a phone still shows its letters.
+WIDTH = 7.2
+
+SETTINGS: Any = {
+    "axes.formatter.limits": (-3, 4),
+    "axes.grid": True,
+    "axes.labelpad": 2.0,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": "medium",
+    "agg.path.chunksize": 20_000,
+    "figure.constrained_layout.use": True,
+    "figure.titlesize": "large",
+    "font.size": 10,
+    "grid.alpha": 0.3,
+    "legend.borderaxespad": 0.2,
+    "legend.borderpad": 0.2,
+    "legend.columnspacing": 1.0,
+    "legend.fontsize": "small",
+    "legend.frameon": False,
+    "legend.handlelength": 1.6,
+    "legend.handletextpad": 0.5,
+    "legend.title_fontsize": "medium",
+    "lines.linewidth": 1.4,
+    "savefig.dpi": 200,
+    # Figures of the same run are the same file.
+    "svg.hashsalt": "auv-fmu",
+}
+
+#: What may stand before an underscore in a heading: letters of the paper.
+_GREEK = {
+    **{name: name for name in ("gamma", "lambda", "omega", "phi", "psi", "rho", "sigma", "tau")},
+    **{name: name for name in ("alpha", "beta", "delta", "eta", "nu", "theta", "epsilon")},
+    "eps": "epsilon",
+}
+_SYMBOL = re.compile(rf"(?<![\w\\.])({'|'.join(_GREEK)}|[A-Za-z])_([A-Za-z0-9]+)(?!\w)")
+
+
+#: What a file would say of its time and tool, by its ending.
+_NO_DATE: dict[str, Any] = {
+    ".png": {"Software": None},
+    ".svg": {"Date": None},
+    ".pdf": {"CreationDate": None},
+}
+
+
+class Drawn(NamedTuple):
+    """A run in a figure.
+
+    Attributes:
+        label: that tells it from others.
+        result: its rows.
+        z_up: whether z is up and y west where its path is drawn (reading 16); or down, and east.
+
+    """
+
+    label: str
+    result: Table
+    z_up: bool = False
+
+
+def earth_axes(z_up: bool) -> tuple[str, str, str]:
+    """Titles of the axes x, y and z of a path."""
+    if z_up:
+        return "x north [m]", "y west [m]", "z up [m]"
+    return "x north [m]", "y east [m]", "z down [m]"
+
+
+#: Columns, and parameters, that something needs: what :meth:`Table.missing` takes.
+Needs = tuple[Sequence[str], Sequence[str]]
+
+
+def having(runs: Sequence[Drawn], needs: Needs) -> Iterator[tuple[Drawn, str]]:
+    """The runs that have what is needed, each with its own colour whichever others have."""
+    for run, colour in zip(runs, cycle(COLOURS), strict=False):
+        if not run.result.missing(*needs):
+            yield run, colour
+
+
+def plain(text: str) -> str:
+    """A text that matplotlib takes for text, and not for a formula."""
+    return text.replace("$", r"\$")
+
+
+def heading(title: str) -> str:
+    """A title whose symbols such as A_f and theta_hat are set as such, and the rest as it is."""
+    return _SYMBOL.sub(_set, plain(title))
+
+
+def _set(symbol: re.Match[str]) -> str:
+    base, index = symbol.groups()
+    letter = rf"\{_GREEK[base]}" if base in _GREEK else base
+    return rf"$\hat{{{letter}}}$" if index == "hat" else rf"${letter}_{{{index}}}$"
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw with :data:`SETTINGS` and nothing that a matplotlibrc says, wherever that may be.
+
+    What matplotlib thinks of it is not for the user.
+    """
+    log = logging.getLogger("matplotlib")
+    level = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        with mpl.rc_context(), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            mpl.rcdefaults()
+            mpl.rcParams.update(SETTINGS)
+            yield
+    finally:
+        log.setLevel(level)
+
+
+def save(figure: Figure, *paths: Path) -> None:
+    """Write a figure without the time and the tool, so that the same run gives the same file.
+
+    Raises:
+        InputError: values are too large for its axes.
+
+    """
+    with styled(), mpl.rc_context({"figure.constrained_layout.use": False}):
+        # Laid out once for all files.
+        if (engine := figure.get_layout_engine()) is not None:
+            try:
+                engine.execute(figure)
+            except (ValueError, OverflowError) as error:
+                raise InputError("values lie too far apart to be drawn") from error
+        figure.set_layout_engine(None)
+        for path in paths:
+            figure.savefig(path, metadata=_NO_DATE[path.suffix])

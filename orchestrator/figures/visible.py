@@ -1,0 +1,134 @@
+"""Of a long run, the rows that can be seen in a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from orchestrator.master.observers.observer import Ending, Header
+from orchestrator.master.observers.table import Table
+from orchestrator.vehicle.signals import DRAWN
+
+#: Runs of no more rows than this are kept whole.
+_WHOLE = 20_000
+
+#: Times into which a longer run is divided, at least, and less than twice as many at most.
+_DIVISIONS = 200
+
+
+class _Division(NamedTuple):
+    """What is kept of a part of a run.
+
+    Attributes:
+        pairs: rows with extremes, and the first and the last, each behind the row before it,
+            (n, 2, 1 + columns).
+        integral: of the rows over time, linear between them.
+
+    """
+
+    pairs: np.ndarray
+    integral: np.ndarray
+
+    @property
+    def mean(self) -> np.ndarray:
+        """The mean row, at the time at which the division ends."""
+        start, end = self.pairs[0, 0, 0], self.pairs[-1, 1, 0]
+        return np.append(end, self.integral[1:] / (end - start))
+
+
+class VisibleRows(Table):
+    """An observer that keeps the rows that can be seen, so that figures of long runs cost no more.
+
+    Of each division of the time it keeps the rows in which one of the drawn signals is smallest or
+    largest, so the envelope of noise and chatter stays, and with each row the one before it, so
+    that steps stay whole. Neighbouring divisions are merged when there are too many. So memory does
+    not grow with the length of the run, and nobody has to know before how long it will be.
+
+    Attributes:
+        means: of a longer run, for the rows that are kept are its extremes and no sample of it: a
+            row at the start, and at the end of each division the mean over it of all signals,
+            linear between their rows. None: all rows are kept.
+
+    """
+
+    def __init__(self, watched: Collection[str] = DRAWN) -> None:
+        """Start without rows.
+
+        Args:
+            watched: columns whose extremes are kept.
+
+        """
+        super().__init__()
+        self._watched_names = watched
+        self.means: Table | None = None
+
+    def begin(self, header: Header) -> None:
+        """Make room for a run that is kept whole."""
+        self._enter(header, np.empty((_WHOLE, 1 + len(header.columns))))
+        self._watched = [
+            i for i, name in enumerate(header.columns, 1) if name in self._watched_names
+        ]
+        self.means = None
+        self._divisions: list[_Division] = []
+        self._last = np.empty((0, 1 + len(header.columns)))
+        self._per_division, self._in_last = _WHOLE // _DIVISIONS, 0
+
+    def take(self, rows: np.ndarray) -> None:
+        """Keep what can be seen of some rows."""
+        if self._divisions:
+            rows = np.vstack((self._last, rows))
+        elif self._n + len(rows) <= _WHOLE:
+            super().take(rows)
+            return
+        else:
+            first = self.rows[:1] if self._n else rows[:1]
+            rows = np.vstack((first, self.rows, rows))
+            self._rows, self._n = rows[:0].copy(), 0
+        self._last = rows[-1:].copy()
+        pairs = sliding_window_view(rows, 2, axis=0).swapaxes(1, 2)
+        while len(pairs):
+            room = self._per_division - self._in_last
+            self._add(pairs[:room])
+            pairs = pairs[room:]
+
+    def end(self, ending: Ending) -> None:
+        """Put the rows in order."""
+        super().end(ending)
+        if self._divisions:
+            last = np.stack((self._last, self._last), axis=1)
+            pairs = np.concatenate([*(division.pairs for division in self._divisions), last])
+            rows = pairs.reshape(-1, pairs.shape[-1])
+            _, first = np.unique(rows[:, 0], return_index=True)
+            self._rows, self._n = rows[first], len(first)
+            means = [self._rows[0], *(division.mean for division in self._divisions)]
+            self.means = Table.of(self.header, np.array(means), ending)
+            self._divisions = []
+
+    def _add(self, pairs: np.ndarray) -> None:
+        """Put rows, each behind the one before it, into the last division, or into a new one."""
+        n = len(pairs)
+        areas = 0.5 * np.diff(pairs[:, :, 0], axis=1) * pairs.sum(axis=1)
+        if self._in_last:
+            # Row by row, so that the means do not depend on the blocks in which rows come.
+            begun = self._divisions.pop()
+            pairs = np.concatenate((begun.pairs, pairs))
+            areas = np.vstack((begun.integral, areas))
+        self._divisions.append(_Division(self._extremes(pairs), areas.sum(axis=0)))
+        self._in_last = (self._in_last + n) % self._per_division
+        if not self._in_last and len(self._divisions) == 2 * _DIVISIONS:
+            halves = self._divisions[::2], self._divisions[1::2]
+            self._divisions = list(map(self._merged, *halves))
+            self._per_division *= 2
+
+    def _merged(self, one: _Division, next_one: _Division) -> _Division:
+        pairs = np.concatenate((one.pairs, next_one.pairs))
+        return _Division(self._extremes(pairs), one.integral + next_one.integral)
+
+    def _extremes(self, pairs: np.ndarray) -> np.ndarray:
+        """The pairs with a smallest or largest watched value in their second row, and the ends."""
+        watched = pairs[:, 1, self._watched]
+        found = {0, len(pairs) - 1, *watched.argmin(axis=0), *watched.argmax(axis=0)}
+        return pairs[sorted(found)]

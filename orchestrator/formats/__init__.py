@@ -1,0 +1,1 @@
+"""How a system is written down: SSP, libcosim's configuration, a container FMU."""

@@ -1,0 +1,24 @@
+"""Systems as SSP archives: what the master runs and what other hosts open.
+
+`reader` and `writer` are the two doors. Reading goes from the elements of a file (`document`,
+`archive`) over the tree of systems (`building`, `hierarchy`) to the output that feeds each input
+(`routes`) and the value of each parameter (`bindings`).
+"""
+
+#: The file of an archive that says what is in it.
+STRUCTURE = "SystemStructure.ssd"
+
+_SSP = "http://ssp-standard.org/SSP1/SystemStructure"
+SSD = f"{_SSP}Description"
+SSC = f"{_SSP}Common"
+SSV = f"{_SSP}ParameterValues"
+SSM = f"{_SSP}ParameterMapping"
+SSB = f"{_SSP}SignalDictionary"
+OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
+OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
+
+#: The annotation of ours that names the inputs that are open on purpose.
+LEFT_OPEN = "LeftOpen"
+
+#: Those of the standard's own elements.
+NAMESPACES = (SSD, SSC, SSV, SSM, SSB)

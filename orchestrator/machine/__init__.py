@@ -1,0 +1,1 @@
+"""The operating system: errors, files, locks, archives, child processes, interrupts, compilers."""

@@ -1,0 +1,1 @@
+"""An FMU behind a few calls (`instance`): in this process (`loaded`) or in its own (`isolated`)."""

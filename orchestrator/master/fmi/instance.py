@@ -1,0 +1,162 @@
+"""What a run asks of a component, wherever its FMU is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from ctypes import c_double
+from math import inf
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from orchestrator.master.stepper_types import CMember
+from orchestrator.system.values import StringTable, Value
+
+#: What a component is asked for in every step, one after the other.
+CALLS = SET_INPUTS, DO_STEP, GET_OUTPUTS = "setting inputs", "fmi2DoStep", "getting outputs"
+
+
+class ComponentFailed(Exception):
+    """A component did not do what it was asked for; the text names it and says why.
+
+    Attributes:
+        fatal: whether it is lost: FMI's fmi2Fatal, or its process has ended or hangs.
+
+    """
+
+    def __init__(self, text: str, fatal: bool = False) -> None:
+        """Say what happened."""
+        super().__init__(text)
+        self.fatal = fatal
+
+
+class Ended(Exception):
+    """The run ends here, and well; the text says why.
+
+    Attributes:
+        component: that has ended it in a step; empty: none has.
+        time: until which that component has computed [s].
+
+    """
+
+    def __init__(self, text: str, component: str = "", time: float = -inf) -> None:
+        """Say why."""
+        super().__init__(text)
+        self.component, self.time = component, time
+
+
+class Part(NamedTuple):
+    """Ports of one component that have the same causality and type.
+
+    Attributes:
+        causality: `input` or `output`.
+        fmi_type: one of :data:`orchestrator.master.fmi.transfer.FMI_TYPES`.
+        references: value references.
+        place: of their values among those of the component.
+
+    """
+
+    causality: str
+    fmi_type: str
+    references: list[int]
+    place: slice
+
+
+class Instance(Protocol):
+    """An instantiated FMU whose inputs and outputs live in a row of floats.
+
+    In every step the calls of `set_inputs`, then `do_step` with time and step size, then those of
+    `get_outputs` are made; those of `get_outputs` once all components of a stage have been stepped.
+    Each returns FMI's status: `failed` is for one that is worse than a warning.
+
+    Attributes:
+        name: of the component.
+        is_here: whether its FMU is in this process, so that there are pointers to its functions.
+        gives_derivatives: whether its FMU can say how outputs change with inputs.
+
+    """
+
+    name: str
+    is_here: bool
+    gives_derivatives: bool
+    set_inputs: list[Callable[[], int]]
+    get_outputs: list[Callable[[], int]]
+
+    @property
+    def do_step(self) -> Callable[[c_double, c_double, int], int]:
+        """FMI's doStep, to be called with time, step size and one."""
+
+    def pointers(self) -> CMember:
+        """The same calls as pointers, for an FMU in this process."""
+
+    def failed(self, status: int, function: str) -> ComponentFailed | Ended:
+        """What to raise after a call that has ended with a status.
+
+        Args:
+            status: worse than a warning.
+            function: one of :data:`CALLS`.
+
+        """
+
+    def tie(self, values: np.ndarray, parts: Sequence[Part], strings: StringTable) -> None:
+        """Say where its values are: a view of the row, with the inputs first, and its parts.
+
+        Args:
+            values: of the row, from its first on.
+            parts: of them.
+            texts: for which numbers stand there.
+
+        """
+
+    def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
+        """Set start values and parameters, set up the experiment, and enter that mode.
+
+        What may be set in that mode is set there once more: some FMUs take on their own values
+        when they enter it.
+        """
+
+    def exit_initialization(self) -> None:
+        """Get ready for the first step."""
+
+    def exchange(self) -> None:
+        """Set all inputs, then read all outputs."""
+
+    def derivatives(self, outputs: Sequence[int], of: int) -> Sequence[float]:
+        """How some outputs change with one input at the same time, by their value references.
+
+        Raises:
+            ComponentFailed: the FMU does not say it.
+
+        """
+
+    def read(self, ports: Sequence[str]) -> dict[str, Value]:
+        """Values of some variables, as the FMU holds them."""
+
+    def tune(self, values: Mapping[str, Value]) -> None:
+        """Set tunable parameters between two steps."""
+
+    def reset(self) -> None:
+        """Be what it was before the initialisation, which can then be entered again."""
+
+    def keep(self) -> None:
+        """Keep the state of now, to go back to it."""
+
+    def go_back(self) -> None:
+        """Go back to the state that was kept; what the row holds is left as it is."""
+
+    def let_change(self, inputs: Sequence[int], slopes: Sequence[float]) -> None:
+        """Let some inputs, by their value references, change linearly in the steps from now on."""
+
+    def state(self) -> bytes:
+        """The FMU's whole state between two steps, from which another instance can go on.
+
+        Raises:
+            ComponentFailed: it cannot be had; see :attr:`.component.Component.gives_state`.
+
+        """
+
+    def restore(self, state: bytes) -> None:
+        """Take on a state; what the row holds of this instance is left as it is."""
+
+    def terminate(self) -> None:
+        """Let the FMU end what it has begun."""

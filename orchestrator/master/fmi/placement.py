@@ -1,0 +1,76 @@
+"""In which process each FMU runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from threading import Lock
+
+from orchestrator.machine.interrupts import Interrupts
+from orchestrator.master.fmi.binary import make_binary
+from orchestrator.master.fmi.instance import Instance
+from orchestrator.master.fmi.isolated import Isolation, isolated
+from orchestrator.master.fmi.loaded import all_loaded
+from orchestrator.master.fmi.log import Log
+from orchestrator.system.component import Component
+
+#: FMUs that allow one instance a process, and have it in this one, for runs in several threads.
+_taken: set[str] = set()
+_LOCK = Lock()
+
+
+@contextmanager
+def placed(
+    components: Mapping[str, Component],
+    log: Log,
+    isolation: Isolation | None,
+    interrupts: Interrupts,
+) -> Iterator[dict[str, Instance]]:
+    """Instances of components by their names: all in this process, or each in one of its own.
+
+    One more of an FMU that allows one instance a process goes into one of its own in any case.
+
+    Args:
+        components: by their names.
+        log: takes what the FMUs say.
+        isolation: how long isolated FMUs may take; None: all are to be in this process.
+        interrupts: that end the wait for an FMU.
+
+    Raises:
+        InputError: an FMU cannot be loaded.
+        StartError: no process can be started.
+        ComponentFailed: an FMU has failed while it was instantiated.
+
+    """
+    with ExitStack() as stack:
+        apart = {
+            name: component
+            for name, component in components.items()
+            if isolation is not None or not stack.enter_context(_has_room(component))
+        }
+        here = {name: it for name, it in components.items() if name not in apart}
+        instances = stack.enter_context(all_loaded(here, log))
+        if apart:
+            how = isolation or Isolation()
+            for component in apart.values():
+                # Here there is time for it, and somebody to tell.
+                make_binary(component, component.folder)
+            instances |= stack.enter_context(isolated(apart, log, how, interrupts))
+        yield {name: instances[name] for name in components}
+
+
+@contextmanager
+def _has_room(component: Component) -> Iterator[bool]:
+    """Whether this process may have one more instance, which then counts until the end."""
+    if not component.is_once_per_process:
+        yield True
+        return
+    guid = component.description.guid
+    with _LOCK:
+        has_room = guid not in _taken
+        _taken.add(guid)
+    try:
+        yield has_room
+    finally:
+        if has_room:
+            _taken.remove(guid)

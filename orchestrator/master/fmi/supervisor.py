@@ -1,0 +1,188 @@
+"""The process that keeps those of isolated FMUs: it starts them and leaves none behind.
+
+It runs nothing foreign itself, so that it can be relied on where they crash, hang, or write
+without end; and it outlives whoever has started it for as long as that takes.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import select
+import shutil
+import signal
+import socket
+import sys
+import warnings
+from codecs import getincrementaldecoder
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from orchestrator.machine.errors import plain
+from orchestrator.master.fmi.worker import serve
+
+#: Written to the supervisor to end all processes; so does the end of its input.
+END = b"."
+
+#: What an FMU may write to its standard output and error [bytes]; more is not shown.
+_MOST_OUTPUT = 1 << 16
+
+#: What a pipe holds, and what it takes at once if it takes anything [bytes].
+_PIPE, _PIECE = 1 << 16, 1 << 12
+
+#: How often it looks whether its parent is still there [ms].
+_PATIENCE = 500
+
+_PR_SET_PDEATHSIG = 1
+
+
+def keep(order: dict[str, Any]) -> None:
+    """Run each component in a process, until all have ended or nobody wants them any more.
+
+    Reads :data:`END` from the standard input, and writes a line with the number of a component
+    and its exit status to the standard output when its process has ended.
+
+    Args:
+        order: `components`, each with its name, FMU, digest, folder and the descriptor of a socket,
+            and `temporary`, folders that nobody else removes if the parent is killed.
+
+    """
+    parent = os.getppid()
+    # Whether to stop is for the parent to decide.
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    children = _Children()
+    for name, fmu, digest, folder, descriptor in order["components"]:
+        if children.start(name):
+            serve(name, Path(fmu), digest, Path(folder), _alone_with(descriptor))
+            return
+        os.close(descriptor)
+    if not children.watched(parent):
+        for folder in order["temporary"]:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _alone_with(descriptor: int) -> socket.socket:
+    """In a new process: keep one socket and the standard streams, and die with the supervisor."""
+    os.dup2(descriptor, 3)
+    os.set_inheritable(3, False)
+    os.closerange(4, os.sysconf("SC_OPEN_MAX"))
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        # Where memory gets short, this is the process to end.
+        with suppress(OSError):
+            Path("/proc/self/oom_score_adj").write_text("1000")
+    return socket.socket(fileno=3)
+
+
+class _Captured:
+    """What the process of a component writes to its standard output and error."""
+
+    def __init__(self, name: str, descriptor: int) -> None:
+        self._name, self._descriptor = name, descriptor
+        self._left = _MOST_OUTPUT
+        # A letter may come in two pieces.
+        self._decoded = getincrementaldecoder("utf-8")("backslashreplace").decode
+        os.set_blocking(descriptor, False)
+
+    def forward(self) -> None:
+        """Show what has come, if it is not too much."""
+        with suppress(BlockingIOError):
+            text = os.read(self._descriptor, _PIPE)
+            if self._left > 0:
+                shown = plain(self._decoded(text[: self._left]), "\n\t")
+                _show(shown.encode())
+                self._left -= len(text)
+                if self._left <= 0:
+                    _show(f"\nauv-fmu: {self._name}: writes more than is shown\n".encode())
+
+
+class _Children:
+    """The processes of the components."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[int, int] = {}
+        self._outputs: dict[int, _Captured] = {}
+        # A child that ends interrupts the poll through this pipe.
+        self._ends, end = os.pipe()
+        os.set_blocking(end, False)
+        signal.set_wakeup_fd(end, warn_on_full_buffer=False)
+        signal.signal(signal.SIGCHLD, lambda *_: None)
+        self._poll = select.poll()
+        for descriptor in (0, self._ends):
+            self._poll.register(descriptor, select.POLLIN)
+
+    def start(self, name: str) -> bool:
+        """Start one more; true in the new process."""
+        reading, writing = os.pipe()
+        with warnings.catch_warnings():
+            # That numpy may have threads: this process computes nothing.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            pid = os.fork()
+        # A group of its own, so that what it starts can be ended with it.
+        with suppress(OSError):
+            os.setpgid(pid, pid)
+        if pid == 0:
+            signal.set_wakeup_fd(-1)
+            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+            os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+            for stream in (1, 2):
+                os.dup2(writing, stream)
+            return True
+        os.close(writing)
+        self._numbers[pid] = len(self._numbers)
+        self._outputs[reading] = _Captured(name, reading)
+        self._poll.register(reading, select.POLLIN)
+        return False
+
+    def watched(self, parent: int) -> bool:
+        """Wait until all have ended or are to end; whether the parent is still there."""
+        while self._numbers:
+            for descriptor, event in self._poll.poll(_PATIENCE):
+                if descriptor == 0:
+                    there = os.read(0, 1) == END
+                    self._kill()
+                    return there
+                if descriptor == self._ends:
+                    os.read(self._ends, _PIPE)
+                elif event & select.POLLIN:
+                    self._outputs[descriptor].forward()
+                else:
+                    self._poll.unregister(descriptor)
+            if os.getppid() != parent:
+                self._kill()
+                return False
+            self._reap()
+        return True
+
+    def _reap(self) -> None:
+        while self._numbers and (
+            ended := os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)
+        ):
+            pid = ended.si_pid
+            _kill_group(pid)
+            _, status = os.waitpid(pid, 0)
+            for output in self._outputs.values():
+                output.forward()
+            number = self._numbers.pop(pid)
+            with suppress(OSError):
+                os.write(1, b"%d %d\n" % (number, os.waitstatus_to_exitcode(status)))
+
+    def _kill(self) -> None:
+        for pid in self._numbers:
+            _kill_group(pid)
+
+
+def _kill_group(pid: int) -> None:
+    with suppress(OSError):
+        os.killpg(pid, signal.SIGKILL)
+
+
+def _show(text: bytes) -> None:
+    """Write to the standard error, unless nobody takes it."""
+    with suppress(OSError):
+        for first in range(0, len(text), _PIECE):
+            _, ready, _ = select.select([], [2], [], 0)
+            if ready:
+                os.write(2, text[first : first + _PIECE])

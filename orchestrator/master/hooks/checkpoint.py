@@ -1,0 +1,293 @@
+"""What a run needs to go on in another process, written from time to time.
+
+A folder holds two files. All rows so far are in the one that grows. The other is replaced as a
+whole, once the rows are on the disk: it says how many of them count, with their digest, and holds
+the states of the FMUs and whatever else a run knows, with a checksum over all. A process may be
+killed at any time: what it leaves is its last checkpoint. A random identity in both files tells
+them from files of the user's.
+
+Observers have no state there. A run that is resumed tells them all rows again, from the first on,
+so whoever can observe a run can observe one that was resumed.
+"""
+
+from __future__ import annotations
+
+import os
+from base64 import b64decode, b64encode
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from math import isfinite
+from pathlib import Path
+from stat import S_ISREG
+from typing import Any, NamedTuple
+from uuid import uuid4
+
+import numpy as np
+
+from orchestrator.machine.atomic import sealed, unsealed, write_whole
+from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.ledger import moved_aside
+from orchestrator.master.fmi.log import Log
+from orchestrator.master.hooks.hook import NEVER, Lasting, Run
+from orchestrator.master.hooks.row_log import RowLog, begins
+from orchestrator.master.identity import Identity
+from orchestrator.master.observers.observer import Ending, Header, NotKept
+from orchestrator.system.structure import System
+
+#: The file that grows, and the one that is replaced.
+_ROWS, _STATE = "rows.bin", "state.json"
+
+
+class _Stored(NamedTuple):
+    """What the file that is replaced holds.
+
+    Attributes:
+        identity: random, of both files.
+        every: for how many seconds a checkpoint was written [s].
+        of: the run.
+        time, made: how far the run had come [s], and in how many steps; None: no row counts yet.
+        rows: digest of all rows.
+        row: all values, hidden ones too.
+        states: of the FMUs, as base64.
+        lasting: what else there was to remember.
+
+    """
+
+    identity: str
+    every: float
+    of: dict[str, str]
+    time: float | None = None
+    made: int = 0
+    rows: str = ""
+    row: Sequence[float] = ()
+    states: Mapping[str, str] = {}
+    lasting: Sequence[Any] = ()
+
+
+def check_gives_states(system: System) -> None:
+    """Check that the states of all FMUs can be had.
+
+    Raises:
+        InputError: of one they cannot.
+
+    """
+    for name, component in system.components.items():
+        if not component.gives_state:
+            raise InputError(
+                f"{name}: its FMU {component.fmu.name} does not give its state away "
+                "(canGetAndSetFMUstate and canSerializeFMUstate): a run with it has no checkpoints"
+            )
+
+
+class Checkpoints:
+    """An observer and hook that writes checkpoints, and begins with the one that it finds.
+
+    As a hook it comes first: what others do at the same time belongs to what follows.
+
+    Attributes:
+        folder: of the checkpoint.
+        time: of the checkpoint in the folder [s]; None: there is none.
+
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        identity: Identity,
+        every: float,
+        resume: bool,
+        force: bool = False,
+        token: str = "",
+    ) -> None:
+        """Look for a checkpoint; nothing is written before the run begins.
+
+        Args:
+            folder: of the checkpoint.
+            identity: of the run.
+            every: a checkpoint for so many simulated seconds [s].
+            resume: begin with the one that is there, if there is one.
+            force: move aside what is there otherwise.
+            token: random, for a new checkpoint; empty: one is drawn.
+
+        Raises:
+            InputError: what is there is not wanted, or not what is wanted.
+
+        """
+        if not (isfinite(every) and every > 0.0):
+            raise InputError(f"a checkpoint every {every:g} s: must be positive and finite")
+        self.folder, self._run, self._every = folder, identity, every
+        self._found = self._look(resume, force)
+        self._identity = self._found.identity if self._found else token or uuid4().hex
+        self._log: Log | None = None
+        self.time: float | None = None if self._found is None else self._found.time
+
+    def _look(self, resume: bool, force: bool) -> _Stored | None:
+        """The checkpoint that is there, which the run goes on with."""
+        try:
+            found = _read(self.folder)
+            rows = self.folder / _ROWS
+            if os.path.lexists(rows) and not (found and begins(rows, found.identity)):
+                raise InputError(
+                    f"{rows} is not a file of a checkpoint; move it, choose another folder, or let "
+                    "--force move it aside"
+                )
+            if found is None or found.time is None:
+                return found
+            if not resume:
+                raise InputError(
+                    f"{self.folder} holds a run as it was at t = {found.time:g} s: --resume goes "
+                    "on with it; --force moves it aside and begins anew"
+                )
+            if different := sorted(dict(found.of.items() ^ self._run.items())):
+                raise InputError(
+                    f"{self.folder} is of another run: {', '.join(different)} differ; run what it "
+                    "was made by, or let --force move it aside and begin anew"
+                )
+        except InputError:
+            if not force:
+                raise
+            for path in (self.folder / _STATE, self.folder / _ROWS):
+                if os.path.lexists(path):
+                    moved_aside(path)
+            return None
+        return found
+
+    def begin(self, header: Header) -> None:
+        """Open the file of rows."""
+        self._columns = ("time", *header.columns)
+        found = self._found
+        if found is None or found.time is None:
+            self._known = 0
+            # First the proof that the file of rows is ours.
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._store(_Stored(self._identity, self._every, dict(self._run)))
+            (self.folder / _ROWS).unlink(missing_ok=True)
+        else:
+            self._known = found.made + 1
+        digest = "" if found is None else found.rows
+        rows = self.folder / _ROWS
+        self._row_log = RowLog(rows, self._identity, len(self._columns), self._known, digest)
+
+    def take(self, rows: np.ndarray) -> None:
+        """Write some rows, but for those that are told again."""
+        again = min(self._known, len(rows))
+        self._known -= again
+        new = rows[again:]
+        if (different := self._row_log.append(new)) and self._log is not None:
+            row, column = different
+            self._log.remark(
+                f"{self._columns[column]} is not what it was at t = {new[row, 0]:g} s before the "
+                "run was resumed: an FMU does not restore all of its state"
+            )
+
+    def end(self, ending: Ending) -> None:
+        """Close the file of rows."""
+        self._row_log.close()
+
+    def act(self, run: Run) -> int:
+        """Write a checkpoint, or begin with one."""
+        self._log = run.log
+        found, self._found = self._found, None
+        if found is not None and found.time is not None:
+            with _explained(self.folder / _STATE):
+                self._resume(run, found)
+        elif run.made:
+            self._write(run)
+        steps = max(round(min(self._every / run.experiment.step, NEVER)), 1)
+        return (run.made // steps + 1) * steps
+
+    def remove(self) -> None:
+        """Remove what a run that has come to its end does not need any more."""
+        if (found := _read(self.folder)) is not None and found.identity == self._identity:
+            # While there are rows, there is the proof that they are ours.
+            self._store(_Stored(self._identity, self._every, dict(self._run)))
+            if begins(self.folder / _ROWS, self._identity):
+                (self.folder / _ROWS).unlink()
+            (self.folder / _STATE).unlink()
+        self._partial.unlink(missing_ok=True)
+        with suppress(OSError):
+            # Fails where there is something in it.
+            self.folder.rmdir()
+
+    def _write(self, run: Run) -> None:
+        run.blocks.hand_over()
+        try:
+            content = _Stored(
+                self._identity,
+                self._every,
+                dict(self._run),
+                run.time,
+                run.made,
+                self._row_log.to_disk(),
+                run.row.values.tolist(),
+                {
+                    name: b64encode(instance.state()).decode()
+                    for name, instance in run.instances.items()
+                },
+                [one.state() for one in _lasting(run)],
+            )
+            self._store(content)
+        except OSError as error:
+            raise NotKept(f"stopped at t = {run.time:g} s: {reason(error)}") from error
+        self.time = run.time
+
+    @property
+    def _partial(self) -> Path:
+        return self.folder / f".auv-fmu-{self._identity}.json"
+
+    def _store(self, content: _Stored) -> None:
+        write_whole(self.folder / _STATE, sealed(content._asdict()), self._partial)
+
+    def _resume(self, run: Run, found: _Stored) -> None:
+        # First of all what rows mean, who is told them wants to know.
+        for one, state in zip(_lasting(run), found.lasting, strict=True):
+            one.restore(state)
+        first = 1  # which was computed anew
+        for rows in self._row_log.kept():
+            run.blocks.tell(rows[first:])
+            run.made += len(rows) - first
+            if run.interrupts:
+                raise KeyboardInterrupt
+            first = 0
+        run.row.values[:] = found.row
+        for name, instance in run.instances.items():
+            instance.restore(b64decode(found.states[name]))
+
+
+def _lasting(run: Run) -> list[Lasting]:
+    hooks = [one for one in run.hooks if isinstance(one, Lasting)]
+    return [run.row.strings, run.overrides, run.log, *hooks]
+
+
+def interval_in(folder: Path) -> float | None:
+    """For how many seconds the last checkpoint in a folder was written [s]; None: there is none.
+
+    Raises:
+        InputError: it cannot be read.
+
+    """
+    found = _read(folder)
+    return None if found is None else found.every
+
+
+def _read(folder: Path) -> _Stored | None:
+    path = folder / _STATE
+    if not os.path.lexists(path):
+        return None
+    with _explained(path):
+        if not S_ISREG(path.lstat().st_mode):
+            raise ValueError("it is no file")
+        return _Stored(**unsealed(path.read_text(encoding="utf-8")))
+
+
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    """Say of a checkpoint that is none, or is damaged, where it is."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (OSError, ValueError, TypeError, LookupError, RecursionError) as error:
+        raise InputError(
+            f"{path}: not a checkpoint: {reason(error)}; move it, or let --force move it aside"
+        ) from error

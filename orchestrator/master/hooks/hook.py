@@ -1,0 +1,110 @@
+"""What acts on a run between two of its steps, and what there is to act on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol, runtime_checkable
+
+from orchestrator.machine.interrupts import Interrupts
+from orchestrator.master.experiment import MOST_STEPS, Experiment
+from orchestrator.master.fmi.instance import Instance
+from orchestrator.master.fmi.log import Log
+from orchestrator.master.gathering import Overrides
+from orchestrator.master.observers.observer import Blocks, Occurrence
+from orchestrator.master.row import Row
+from orchestrator.master.schedule import Stage
+from orchestrator.system.structure import System
+
+#: After more steps than any run has.
+NEVER = MOST_STEPS + 1
+
+
+@dataclass
+class Run:
+    """A run, as far as it has come.
+
+    Attributes:
+        system, experiment: what is run.
+        instances: of its components, by their names.
+        row: of all values.
+        stages: of every step.
+        signals: what is done to values on their way from outputs to inputs.
+        blocks: take the rows.
+        log: of what the FMUs say.
+        interrupts: signals to stop that have come; a hook that waits looks there.
+        hooks: what acts on it.
+        made: how many steps have been made.
+        due: after how many a hook acts on it: every loop stops there.
+        happened: events, in their order.
+
+    """
+
+    system: System
+    experiment: Experiment
+    instances: Mapping[str, Instance]
+    row: Row
+    stages: Sequence[Stage]
+    overrides: Overrides
+    blocks: Blocks
+    log: Log
+    interrupts: Interrupts
+    hooks: Sequence[Hook] = ()
+    made: int = 0
+    due: int = NEVER
+    happened: list[Occurrence] = field(default_factory=list)
+
+    @property
+    def time(self) -> float:
+        """What the components have come to [s]."""
+        return self.experiment.time(self.made)
+
+
+class Hook(Protocol):
+    """Acts on a run between two of its steps: events, a checkpoint, a clock."""
+
+    def act(self, run: Run) -> int:
+        """Act after :attr:`Run.made` steps, for the first time before any.
+
+        Where a run is resumed, the first call comes after the steps that were made before, whether
+        it was wanted there or not.
+
+        Returns:
+            After how many steps it wants to be called again; :data:`NEVER`: not any more.
+
+        Raises:
+            Ended: the run is to end here.
+            ComponentFailed: a component did not do what it was asked for.
+
+        """
+
+
+@runtime_checkable
+class Lasting(Protocol):
+    """What a run that is resumed has to know again of an earlier process.
+
+    A hook that is one remembers by itself what it has done, and what is still to be done.
+    """
+
+    def state(self) -> Any:
+        """What there is to know, as JSON has it."""
+
+    def restore(self, state: Any) -> None:
+        """Know it again."""
+
+
+class Hooks:
+    """Calls hooks when their time has come."""
+
+    def __init__(self, run: Run) -> None:
+        """Call all hooks of a run first before any step, in their order."""
+        self._run = run
+        self._next = dict.fromkeys(run.hooks, 0)
+
+    def act(self) -> None:
+        """Call those whose time has come, and let the run go on until the next one's."""
+        run = self._run
+        for hook, due in self._next.items():
+            if due <= run.made:
+                self._next[hook] = hook.act(run)
+        run.due = min(self._next.values(), default=NEVER)

@@ -1,0 +1,310 @@
+"""Rows written to files as they come, and read again."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from importlib import import_module
+from importlib.util import find_spec
+from io import BufferedWriter, RawIOBase, StringIO
+from itertools import compress, islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.user_files import lines_of
+from orchestrator.master.observers.observer import Ending, Header
+
+#: Rows that are written to Parquet, or read, at once.
+_ROWS = 8192
+
+#: What Parquet needs at most: bytes of a value, and bytes that describe a column of the rows that
+#: are written at once.
+_BYTES, _CHUNK_BYTES = 9, 1024
+
+
+class _Output(RawIOBase):
+    """A new file to write to, which is opened again where an FMU in this process has closed it."""
+
+    def __init__(self, path: Path) -> None:
+        """Make it."""
+        self._path, self._at = path, 0
+        self._descriptor = self._opened(os.O_CREAT | os.O_TRUNC)
+        self._status = os.fstat(self._descriptor)
+
+    def check_place(self) -> None:
+        """Check that it is still where it was made.
+
+        Raises:
+            OSError: what is written would go nowhere.
+
+        """
+        try:
+            is_there = os.path.samestat(self._path.stat(), self._status)
+        except FileNotFoundError:
+            is_there = False
+        if not is_there:
+            raise FileNotFoundError(f"{self._path} was moved or deleted while it was written")
+        if not self._is_open():
+            self._descriptor = self._opened()
+
+    def fileno(self) -> int:
+        """Its descriptor."""
+        return self._descriptor
+
+    def writable(self) -> bool:
+        """It is."""
+        return True
+
+    def tell(self) -> int:
+        """How much was written [bytes]."""
+        return self._at
+
+    def write(self, content: Any) -> int:
+        """Write some of what there is to write."""
+        os.lseek(self._descriptor, self._at, os.SEEK_SET)
+        n = os.write(self._descriptor, content)
+        self._at += n
+        return n
+
+    def truncate(self, size: int | None = None) -> int:
+        """Cut it off."""
+        self._at = self._at if size is None else size
+        os.ftruncate(self._descriptor, self._at)
+        return self._at
+
+    def close(self) -> None:
+        """Close it, if that is still to be done."""
+        if not self.closed:
+            super().close()
+            if self._is_open():
+                os.close(self._descriptor)
+
+    def _opened(self, flags: int = 0) -> int:
+        return os.open(self._path, os.O_WRONLY | getattr(os, "O_BINARY", 0) | flags, 0o666)
+
+    def _is_open(self) -> bool:
+        """Whether the descriptor is that of the file, and not closed or of another one by now."""
+        with suppress(OSError):
+            return os.path.samestat(os.fstat(self._descriptor), self._status)
+        return False
+
+
+class CsvLines:
+    """A file of CSV that ends with a whole line, whenever and however writing ends."""
+
+    def __init__(self, path: Path, names: Sequence[str]) -> None:
+        """Make the file and write the names of its columns."""
+        self._file = _Output(path)
+        self.write([names])
+
+    def write(self, lines: Sequence[Sequence[object]]) -> None:
+        """Write some lines, numbers so that they read back exactly.
+
+        Raises:
+            OSError: not all of them could be written; those that could are there.
+
+        """
+        self._file.check_place()
+        text = StringIO(newline="")
+        csv.writer(text, lineterminator="\n").writerows(lines)
+        content = text.getvalue().encode()
+        begin, n = self._file.tell(), 0
+        try:
+            while n < len(content):
+                n += self._file.write(memoryview(content)[n:])
+        except OSError:
+            self._file.truncate(begin + content.rfind(b"\n", 0, n) + 1)
+            raise
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+class CsvFile:
+    """An observer that writes CSV; numbers are written so that they read back exactly."""
+
+    def __init__(self, path: Path) -> None:
+        """Write into a file, which is made when the run begins."""
+        self._path = path
+
+    def begin(self, header: Header) -> None:
+        """Write the names of the columns."""
+        self._lines = CsvLines(self._path, ("time", *header.columns))
+        self._strings = header.text_places()
+
+    def take(self, rows: np.ndarray) -> None:
+        """Write some rows."""
+        lines = rows.tolist()
+        for place, strings in self._strings:
+            for line in lines:
+                line[place] = strings.text(line[place])
+        self._lines.write(lines)
+
+    def end(self, ending: Ending) -> None:
+        """Close the file."""
+        self._lines.close()
+
+
+class ParquetFile:
+    """An observer that writes Apache Parquet, all columns as doubles but for those of texts.
+
+    Without what is written last, nothing of such a file can be read: there is always room for that,
+    and for the rows that wait.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Write into a file, which is made when the run begins.
+
+        Raises:
+            InputError: pyarrow is not installed.
+
+        """
+        _check_pyarrow()
+        self._path = path
+
+    def begin(self, header: Header) -> None:
+        """Make the file and its schema."""
+        self._arrow: Any = import_module("pyarrow")
+        self._strings = header.text_places()
+        kinds = [self._arrow.float64()] * (1 + len(header.columns))
+        for place, _ in self._strings:
+            kinds[place] = self._arrow.string()
+        self._schema = self._arrow.schema(list(zip(("time", *header.columns), kinds, strict=True)))
+        self._output = _Output(self._path)
+        self._file = BufferedWriter(self._output)
+        self._writer = import_module("pyarrow.parquet").ParquetWriter(self._file, self._schema)
+        self._waiting = [np.empty((0, len(self._schema)))]
+        self._n, self._room = 0, min(header.experiment.rows, _ROWS)
+        self._take_room()
+
+    def take(self, rows: np.ndarray) -> None:
+        """Write some rows, when there are enough of them: always as many at once."""
+        self._waiting.append(rows.copy())
+        while sum(map(len, self._waiting)) >= _ROWS:
+            waiting = np.vstack(self._waiting)
+            self._waiting = [waiting[_ROWS:]]
+            self._write(waiting[:_ROWS])
+            self._take_room()
+
+    def end(self, ending: Ending) -> None:
+        """Write the rest and close the file."""
+        self._output.check_place()
+        if len(rest := np.vstack(self._waiting)):
+            self._write(rest)
+        self._writer.close()
+        self._file.truncate()
+        self._file.close()
+
+    def _write(self, rows: np.ndarray) -> None:
+        columns = [self._arrow.array(column) for column in rows.T]
+        for place, strings in self._strings:
+            columns[place] = self._arrow.array([strings.text(number) for number in rows[:, place]])
+        self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))
+        self._n += 1
+
+    def _take_room(self) -> None:
+        """Take the room that the file needs until the next time, if it can be had.
+
+        Raises:
+            OSError: there is not enough.
+
+        """
+        self._output.check_place()
+        self._file.flush()
+        if hasattr(os, "posix_fallocate"):
+            columns = len(self._schema)
+            needed = columns * (self._room * _BYTES + (self._n + 2) * _CHUNK_BYTES)
+            os.posix_fallocate(self._file.fileno(), self._file.tell(), needed)
+
+
+#: Writers by the ending of their files.
+FORMATS: dict[str, type[CsvFile] | type[ParquetFile]] = {"csv": CsvFile, "parquet": ParquetFile}
+
+
+def read_columns(path: Path) -> tuple[str, ...]:
+    """The names of the columns behind the time.
+
+    Raises:
+        InputError: the file is no table of a run.
+
+    """
+    with _explained(path):
+        if path.suffix == ".parquet":
+            with _parquet(path) as file:
+                return _behind_time(file.schema_arrow.names)
+        with lines_of(path) as lines:
+            return _behind_time(next(csv.reader(lines), ()))
+
+
+def read_rows(path: Path, strings: Collection[str] = ()) -> Iterator[np.ndarray]:
+    """The rows of a file, time first, some thousand at a time.
+
+    Args:
+        path: of the file.
+        texts: columns that hold texts, and are left out.
+
+    Raises:
+        InputError: the file is no table of a run.
+
+    """
+    with _explained(path):
+        if path.suffix == ".parquet":
+            with _parquet(path) as file:
+                names = [name for name in file.schema_arrow.names if name not in strings]
+                for batch in file.iter_batches(_ROWS, columns=names):
+                    columns = [column.to_numpy(zero_copy_only=False) for column in batch.columns]
+                    yield np.column_stack(columns).astype(float, copy=False)
+        elif strings:
+            with lines_of(path, newline="") as lines:
+                table = csv.reader(lines)
+                kept = [name not in strings for name in next(table, ())]
+                while records := list(islice(filter(None, table), _ROWS)):
+                    if any(len(record) != len(kept) for record in records):
+                        raise ValueError(f"a row has not {len(kept)} values, as there are names")
+                    yield np.array([list(map(float, compress(it, kept))) for it in records])
+        else:
+            with lines_of(path) as lines:
+                width = 1 + len(_behind_time(next(csv.reader(lines), ())))
+                filled = (line for line in lines if line.strip())
+                while block := list(islice(filled, _ROWS)):
+                    rows = np.loadtxt(block, delimiter=",", comments=None, quotechar='"', ndmin=2)
+                    if rows.shape[1] != width:
+                        raise ValueError(f"rows of {rows.shape[1]} values below {width} names")
+                    yield rows
+
+
+def _behind_time(names: Sequence[str]) -> tuple[str, ...]:
+    if not names:
+        raise ValueError("it is empty")
+    first, *others = names
+    if first != "time":
+        raise ValueError(f"its first column is {first!r}, not 'time'")
+    return tuple(others)
+
+
+def _parquet(path: Path) -> Any:
+    _check_pyarrow()
+    return import_module("pyarrow.parquet").ParquetFile(path)
+
+
+def _check_pyarrow() -> None:
+    if find_spec("pyarrow") is None:
+        raise InputError("Parquet needs pyarrow: pip install 'auv-fmu[parquet]'")
+
+
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {reason(error)}") from error
+    except (ValueError, csv.Error) as error:
+        raise InputError(f"{path}: not a table of a run: {reason(error)}") from error

@@ -1,0 +1,162 @@
+"""Rows kept in memory: a table of all ports over time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.observers.observer import Ending, Header
+from orchestrator.system.names import PortName
+
+#: More rows than this are not kept in memory.
+MOST_ROWS = 10_000_000
+
+#: Rows further apart than the step, by more than this share of it, do not follow each other.
+_ROUNDING = 1e-6
+
+
+class Table:
+    """An observer that keeps the rows of a run, one at the start and one a step.
+
+    A row holds, at time t_k, the outputs after the step that ended there, and the inputs that this
+    step was made with. What a sampled component has computed in a step therefore belongs to the
+    time at which the step began: :meth:`step_values`, :meth:`start_values` and
+    :attr:`step_start` pair the two.
+
+    Attributes:
+        header: of the run: columns, experiment, parameters.
+        ending: how the run has ended.
+
+    """
+
+    def __init__(self) -> None:
+        """Start without rows."""
+        self.header = Header((), Experiment(1.0, 1.0))
+        self.ending = Ending()
+        self._rows = np.empty((0, 1))
+        self._n = 0
+
+    @classmethod
+    def of(cls, header: Header, rows: np.ndarray, ending: Ending | None = None) -> Table:
+        """A table of rows that are there already, time first."""
+        table = cls()
+        table._enter(header, rows)
+        table._n = len(rows)
+        table.ending = ending or table.ending
+        return table
+
+    def _enter(self, header: Header, rows: np.ndarray) -> None:
+        self.header, self._rows = header, rows
+        self._index = {name: i for i, name in enumerate(header.columns, start=1)}
+
+    def begin(self, header: Header) -> None:
+        """Make room for all rows."""
+        n = header.experiment.rows
+        if n > MOST_ROWS:
+            raise InputError(f"{n:,} rows do not fit into memory; take larger steps")
+        # Memory is taken when a row is written, so a long run costs what it has computed.
+        try:
+            self._enter(header, np.empty((n, 1 + len(header.columns))))
+        except MemoryError as error:
+            raise InputError(f"a table of {n:,} rows does not fit into memory") from error
+
+    def take(self, rows: np.ndarray) -> None:
+        """Keep some rows."""
+        self._rows[self._n : self._n + len(rows)] = rows
+        self._n += len(rows)
+
+    def end(self, ending: Ending) -> None:
+        """Remember how the run has ended."""
+        self.ending = ending
+
+    def __len__(self) -> int:
+        """How many rows were computed."""
+        return self._n
+
+    def __contains__(self, column: str) -> bool:
+        """Whether there is a column `component.port`."""
+        return column == "time" or column in self._index
+
+    def __getitem__(self, column: str) -> np.ndarray:
+        """The values of one column; those of a String are texts.
+
+        Raises:
+            KeyError: there is no such column; the text has a suggestion.
+
+        """
+        if column == "time":
+            return self.time
+        if column not in self._index:
+            raise KeyError(f"no column {column!r}{did_you_mean(str(column), self._index)}")
+        values = self.rows[:, self._index[column]]
+        if column not in self.header.strings:
+            return values
+        return np.array([self.header.strings[column].text(number) for number in values])
+
+    @property
+    def rows(self) -> np.ndarray:
+        """All rows, time first, (rows, 1 + columns)."""
+        return self._rows[: self._n]
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times of the rows [s]."""
+        return self.rows[:, 0]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """`component.port` of every column behind the time."""
+        return self.header.columns
+
+    @property
+    def parameters(self) -> Mapping[PortName, Any]:
+        """Of all components, as the FMUs reported them after initialisation."""
+        return self.header.parameters
+
+    @property
+    def failure(self) -> str | None:
+        """Why the run ended early, or None."""
+        return self.ending.failure
+
+    def group(self, *columns: str) -> np.ndarray:
+        """Several columns side by side, (rows, columns)."""
+        return np.column_stack([self[column] for column in columns])
+
+    def missing(self, columns: Iterable[str], parameters: Iterable[str] = ()) -> list[str]:
+        """Those of some columns and parameters, `component.name`, that are not there."""
+        known = {*map(str, self.parameters)}
+        return [column for column in columns if column not in self] + [
+            name for name in parameters if name not in known
+        ]
+
+    @cached_property
+    def _before(self) -> np.ndarray:
+        """For every row but the first, the row of the time at which its step began.
+
+        Where rows were left out, it is the row itself, a step later.
+        """
+        ends = np.arange(1, self._n)
+        follows = np.diff(self.time) <= self.header.experiment.step * (1.0 + _ROUNDING)
+        return np.where(follows, ends - 1, ends)
+
+    @property
+    def step_start(self) -> np.ndarray:
+        """Times at which the steps began that ended at the second row and all after it [s]."""
+        exact = self.time[self._before]
+        skipped = self._before == np.arange(1, self._n)
+        starts: np.ndarray = np.where(skipped, exact - self.header.experiment.step, exact)
+        return starts
+
+    def step_values(self, *columns: str) -> np.ndarray:
+        """What these steps were made with, or what sampled components computed in them."""
+        return self.group(*columns)[1:]
+
+    def start_values(self, *columns: str) -> np.ndarray:
+        """What these columns held when these steps began."""
+        values: np.ndarray = self.group(*columns)[self._before]
+        return values

@@ -1,0 +1,188 @@
+"""Outcomes of runs: each made once, and kept from one report to the next."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.figures.visible import VisibleRows
+from orchestrator.machine.errors import InputError
+from orchestrator.machine.ledger import Ledger
+from orchestrator.machine.workers import Workers
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.identity import code_of, digest_of
+from orchestrator.master.observers.observer import Ending, Header, Occurrence
+from orchestrator.master.observers.table import Table
+from orchestrator.master.simulation import simulate
+from orchestrator.paper.variations import Variation
+from orchestrator.runs.bundle import PYTHON
+from orchestrator.runs.folder import opened
+from orchestrator.runs.preparation import Prepared
+from orchestrator.runs.run import metrics_json
+from orchestrator.system.names import port_name
+from orchestrator.vehicle.metrics import Metrics
+
+
+@dataclass(frozen=True)
+class KeptRun:
+    """What is kept of a run.
+
+    Attributes:
+        metrics: as in metrics.json; `failure` alone for a run that could not be made.
+        table: the rows that can be seen, which are all rows of a run of the paper.
+
+    """
+
+    metrics: Mapping[str, Any]
+    table: Table
+
+    @property
+    def failure(self) -> str | None:
+        """Why the run ended early, or was not made."""
+        return self.metrics.get("failure")
+
+
+class KeptRuns:
+    """Outcomes of runs; equal ones, of whatever name, are made once."""
+
+    def __init__(
+        self,
+        folder: Path,
+        stop_time: float | None = None,
+        kind: str = PYTHON,
+        force: bool = False,
+    ) -> None:
+        """Start without any.
+
+        Args:
+            folder: in which outcomes are kept.
+            stop_time: of all runs [s]; None: their own.
+            kind: of the bundle's FMUs in all runs.
+            force: move aside what was changed there.
+
+        """
+        self._folder, self._stop_time, self._kind = folder, stop_time, kind
+        self._force = force
+        self._keys: dict[Variation, str] = {}
+        self._labels: dict[str, str] = {}
+        self._kept_runs: dict[str, KeptRun] = {}
+
+    def __getitem__(self, run: Variation) -> KeptRun:
+        """The outcome of a run that was made."""
+        return self._kept_runs[self._keys[run]]
+
+    def label(self, run: Variation) -> str:
+        """The shortest of the labels that equal runs have."""
+        return self._labels[self._keys[run]]
+
+    @property
+    def labels(self) -> list[str]:
+        """Of all runs."""
+        return list(self._labels.values())
+
+    def make(self, runs: Iterable[Variation], workers: Workers) -> None:
+        """Make what is not kept in the folder, the longest first.
+
+        Raises:
+            InputError: what is kept was changed.
+            KeyboardInterrupt: the user does not want to wait; runs that are finished are kept.
+
+        """
+        with opened(self._folder, self._force) as ledger:
+            self._make(runs, workers, ledger)
+
+    def _make(self, runs: Iterable[Variation], workers: Workers, ledger: Ledger) -> None:
+        missing: dict[str, tuple[int, Variation]] = {}
+        for run in runs:
+            wanted = replace(run, stop_time=self._stop_time or run.stop_time, kind=self._kind)
+            try:
+                prepared = wanted.prepared()
+            except InputError as error:
+                self._keys[run] = self._labels[run.label] = key = run.label
+                self._kept_runs[key] = KeptRun({"failure": str(error)}, Table())
+                continue
+            self._keys[run] = key = key_of(prepared)
+            label = wanted.label
+            self._labels[key] = min(label, self._labels.get(key, label), key=len)
+            ledger.check([_file(key)])
+            if ledger.owns(_file(key)):
+                self._kept_runs[key] = _read(self._folder / _file(key))
+            else:
+                missing.setdefault(key, (prepared.experiment.rows, wanted))
+        longest_first = sorted(missing.items(), key=lambda item: -item[1][0])
+        tasks = {key: partial(_make, run, key) for key, (_, run) in longest_first}
+        for key, kept_run in workers.results(tasks, "run"):
+            self._kept_runs[key] = kept_run
+            if kept_run.failure is None:
+                with ledger.changing() as unfinished:
+                    _write(unfinished / _file(key), kept_run)
+
+    def forget_others(self) -> None:
+        """Remove from the folder what belongs to no run of this report."""
+        with opened(self._folder) as ledger:
+            ledger.remove(set(ledger.files) - set(map(_file, self._keys.values())))
+
+
+def _file(key: str) -> str:
+    """The name of the file of an outcome."""
+    return f"{key}.npz"
+
+
+def key_of(prepared: Prepared) -> str:
+    """Digest of all that an outcome depends on."""
+    kept = {
+        "what is kept": code_of("orchestrator.vehicle", "orchestrator.figures", "orchestrator.runs")
+    }
+    return digest_of(prepared.identity, kept)[:32]
+
+
+def _make(run: Variation, key: str) -> KeptRun:
+    """Make a run; a task for a worker."""
+    try:
+        prepared = run.prepared()
+        if key_of(prepared) != key:
+            raise InputError("FMUs have changed while the report was made; make it anew")
+        metrics, seen = Metrics(), VisibleRows()
+        simulate(
+            prepared.system,
+            prepared.experiment,
+            [metrics, seen],
+            loop=prepared.loop,
+            hooks=prepared.hooks(),
+        )
+    except InputError as error:
+        return KeptRun({"failure": str(error)}, Table())
+    return KeptRun(metrics_json(metrics, prepared), Table.of(seen.header, seen.rows, seen.ending))
+
+
+def _write(file: Path, kept_run: KeptRun) -> None:
+    header = kept_run.table.header
+    text = {
+        "metrics": kept_run.metrics,
+        "columns": header.columns,
+        "experiment": asdict(header.experiment),
+        "parameters": {str(name): value for name, value in header.parameters.items()},
+        "messages": kept_run.table.ending.messages,
+        "events": kept_run.table.ending.events,
+    }
+    # A column together: one that is constant then takes no room.
+    np.savez_compressed(file, text=json.dumps(text), columns=kept_run.table.rows.T)
+
+
+def _read(file: Path) -> KeptRun:
+    with np.load(file) as content:
+        text, rows = json.loads(str(content["text"])), content["columns"].T
+    header = Header(
+        tuple(text["columns"]),
+        Experiment(**text["experiment"]),
+        {port_name(name): value for name, value in text["parameters"].items()},
+    )
+    events = tuple(Occurrence(*event) for event in text["events"])
+    ending = Ending(messages=tuple(text["messages"]), events=events)
+    return KeptRun(text["metrics"], Table.of(header, rows, ending))

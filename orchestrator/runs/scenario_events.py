@@ -1,0 +1,407 @@
+"""What a scenario says of events, read for a system: names, groups, values and their types."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from math import isfinite
+from typing import Any
+
+from orchestrator.machine.errors import Findings, InputError
+from orchestrator.master.hooks.events import (
+    COMPARISONS,
+    Action,
+    Alter,
+    Condition,
+    Event,
+    Freeze,
+    Release,
+    Reset,
+    Set,
+    Stop,
+)
+from orchestrator.runs.entries import (
+    Entry,
+    are_names,
+    check_entries,
+    flattened,
+    is_finite,
+    is_flag,
+    is_number,
+    is_table,
+    is_text,
+)
+from orchestrator.system.names import PortName, port_name, splits
+from orchestrator.system.structure import Connection, System
+from orchestrator.system.units import Linear, Mapped
+from orchestrator.system.values import INTEGERS, finite, literal, type_of, typed
+
+#: What is between the names of a group and of its members.
+_MEMBER = (".", "[")
+
+_CONDITION = re.compile(rf"(\S+)\s*({'|'.join(COMPARISONS)})\s*(\S+)")
+
+
+def _is_name_or_names(value: Any) -> bool:
+    return is_text(value) or are_names(value)
+
+
+#: What an event may hold, in the order of the reference page.
+ENTRIES: dict[str, Entry] = {
+    "at": Entry("number", is_number, "When it happens [s].", "at `when`"),
+    "when": Entry(
+        "text",
+        is_text,
+        "The condition that it happens at: a signal, one of `< > <= >=`, and a number, such as "
+        '`"plant.eta.z > 5"`. It must have been false before.',
+        "at `at`",
+    ),
+    "repeat": Entry(
+        "true or false",
+        is_flag,
+        "Whether it happens each time that `when` becomes true, or the first time alone.",
+        "`false`",
+    ),
+    "for": Entry("number", is_number, "How long it lasts [s].", "for good"),
+    "label": Entry("text", is_text, "Its name in figures.", "what it does"),
+    "set": Entry(
+        "table of values",
+        is_table,
+        "New values of tunable parameters, and of inputs that nothing feeds.",
+        "",
+    ),
+    "override": Entry("table of values", is_table, "Values that signals have from now on.", ""),
+    "bias": Entry("table of values", is_table, "What is added to signals from now on.", ""),
+    "freeze": Entry(
+        "name, or list of names", _is_name_or_names, "Signals that keep what they were last.", ""
+    ),
+    "drop": Entry(
+        "name, or list of names",
+        _is_name_or_names,
+        "Sensors that fail: who listens keeps what it heard last, as with `freeze`.",
+        "",
+    ),
+    "lose": Entry(
+        "name, or list of names",
+        _is_name_or_names,
+        "Actuators that fail: overridden with zero.",
+        "",
+    ),
+    "release": Entry(
+        "name, or list of names",
+        _is_name_or_names,
+        "Signals that are what they are without events again.",
+        "",
+    ),
+    "reset": Entry(
+        "name, or list of names",
+        _is_name_or_names,
+        "Components that begin anew, with their parameters as they are at that time.",
+        "",
+    ),
+    "stop": Entry("true or false", is_flag, "`true`: the run ends here, and has not failed.", ""),
+}
+
+#: Actions that nothing is left of that could end.
+_AT_ONCE = ("release", "reset", "stop")
+
+
+def check_events(where: object, tables: Sequence[Mapping[str, Any]]) -> None:
+    """Check what can be checked of events without a system.
+
+    Raises:
+        InputError: an event is not written as one.
+
+    """
+    findings = Findings()
+    for number, table in enumerate(tables, start=1):
+        with findings.collecting():
+            _check_event(f"{where}: event {number}", table)
+    findings.refuse()
+
+
+def _check_event(place: str, table: Mapping[str, Any]) -> None:
+    check_entries(place, table, ENTRIES)
+    if ("at" in table) == ("when" in table):
+        raise InputError(f"{place}: write when it happens: either at or when")
+    actions = [key for key in table if key in _ACTIONS]
+    if len(actions) != 1:
+        said = f"not {' and '.join(actions)}" if actions else f"one of {', '.join(_ACTIONS)}"
+        raise InputError(f"{place}: write one thing that it does, {said}")
+    for key in ("at", "for"):
+        if not is_finite(table.get(key, 1.0)):
+            raise InputError(f"{place}: {key} = {table[key]}: must be finite")
+    if table.get("for", 1.0) <= 0.0:
+        raise InputError(f"{place}: for = {table['for']}: must be positive")
+    if "for" in table and actions[0] in _AT_ONCE:
+        raise InputError(f"{place}: {actions[0]} has no duration: leave `for` out")
+    if "repeat" in table and "when" not in table:
+        raise InputError(f"{place}: repeat is for events with `when`")
+
+
+def read_events(
+    where: object, tables: Sequence[Mapping[str, Any]], system: System
+) -> tuple[Event, ...]:
+    """The events of a run.
+
+    Args:
+        where: they are written, for messages.
+        tables: as :func:`check_events` has found them good.
+        system: that they happen to.
+
+    Raises:
+        InputError: an event cannot happen to this system.
+
+    """
+    findings, events = Findings(), []
+    for number, table in enumerate(tables, start=1):
+        try:
+            events.append(_event(table, system))
+        except InputError as error:
+            findings.problem(f"{where}: event {number}: {error}")
+    findings.refuse()
+    return tuple(events)
+
+
+def shared_events(
+    tables: Sequence[Mapping[str, Any]], system: System
+) -> tuple[Mapping[str, Any], ...]:
+    """Those events that can happen to another system as well."""
+
+    def can_happen(table: Mapping[str, Any]) -> bool:
+        try:
+            _event(table, system)
+        except InputError:
+            return False
+        return True
+
+    return tuple(filter(can_happen, tables))
+
+
+def _event(table: Mapping[str, Any], system: System) -> Event:
+    [key] = [key for key in table if key in _ACTIONS]
+    start = system.start_time or 0.0
+    if table.get("at", start) < start:
+        raise InputError(f"at = {table['at']}: before the run begins, at {start:g} s")
+    text = "stop" if key == "stop" else f"{key} {', '.join(_things(table[key]))}"
+    return Event(
+        text,
+        _ACTIONS[key](table[key], system),
+        table.get("label", text),
+        table.get("at"),
+        _condition(table["when"], system) if "when" in table else None,
+        table.get("repeat", False),
+        table.get("for"),
+    )
+
+
+def _things(value: Any) -> Iterator[str]:
+    """What an event acts on, in words."""
+    if is_table(value):
+        yield from (f"{name} = {_shown(one)}" for name, one in flattened(value))
+    else:
+        yield from [value] if is_text(value) else value
+
+
+def _shown(value: Any) -> str:
+    return f"{value:g}" if is_number(value) else literal(value)
+
+
+def _condition(text: str, system: System) -> Condition:
+    match = _CONDITION.fullmatch(text.strip())
+    if match is None:
+        raise InputError(
+            f'when = {text!r}: write a signal, < or >, and a number: "plant.eta.z > 5"'
+        )
+    name, comparison, number = match.groups()
+    [signal] = _ports(system, name, ("input", "output"), alone=True)
+    try:
+        return Condition(signal, comparison, finite(number, f"when = {text!r}:"))
+    except ValueError as error:
+        raise InputError(str(error)) from None
+
+
+# What there is in a system
+
+
+def _ports(
+    system: System, text: str, causalities: Sequence[str], alone: bool = False
+) -> list[PortName]:
+    """The port of a name, or those of a group.
+
+    Args:
+        system: that has them.
+        text: `component.port` or `component.group`.
+        causalities: that they may have.
+        alone: whether one is wanted, and no group.
+
+    Raises:
+        InputError: there is none.
+
+    """
+    port = system.named(port_name(text))
+    if not system.has(port) and not alone:
+        for component, group in splits(text):
+            if component in system.components:
+                members = [
+                    PortName(component, variable.name)
+                    for causality in causalities
+                    for variable in system.components[component].having(causality)
+                    if variable.name.startswith(tuple(group + mark for mark in _MEMBER))
+                ]
+                if members:
+                    return members
+    variable = system.component(port.component).variable(port.port)
+    if variable.causality not in causalities:
+        raise InputError(
+            f"{port} is of causality {variable.causality}, not {' or '.join(causalities)}"
+        )
+    if type_of(variable) == "String" and "parameter" not in causalities:
+        raise InputError(f"{port} is a String: events act on numbers and truth values")
+    return [port]
+
+
+def _routes(system: System, port: PortName) -> list[Connection | None]:
+    """The connections that a signal takes to those that it reaches; None: it is an input itself."""
+    if system.component(port.component).variable(port.port).causality == "input":
+        return [None]
+    found: list[Connection | None] = [c for c in system.connections if c.source == port]
+    if not found:
+        raise InputError(f"{port} feeds nothing here: no event can alter what others take of it")
+    return found
+
+
+def _inputs(names: Any, system: System) -> tuple[PortName, ...]:
+    """The inputs that some signals reach."""
+    return tuple(
+        route.target if route else port
+        for name in _things(names)
+        for port in _ports(system, name, ("input", "output"))
+        for route in _routes(system, port)
+    )
+
+
+def _members(name: str, value: Any, ports: Sequence[PortName]) -> Iterator[tuple[PortName, Any]]:
+    """Ports of a group with their values: one for all, or a list with one for each."""
+    values = value if isinstance(value, list) else [value] * len(ports)
+    if len(values) != len(ports):
+        raise InputError(f"{name}: {len(values)} values for {len(ports)} signals")
+    return zip(ports, values, strict=True)
+
+
+# What events do
+
+
+def _override(values: Mapping[str, Any], system: System) -> Action:
+    return Alter("override", tuple(_altered(values, system, _value)))
+
+
+def _bias(values: Mapping[str, Any], system: System) -> Action:
+    return Alter("bias", tuple(_altered(values, system, _offset)))
+
+
+def _altered(
+    values: Mapping[str, Any],
+    system: System,
+    arriving: Callable[[System, PortName, Connection | None, Any], float],
+) -> Iterator[tuple[PortName, float]]:
+    for name, value in flattened(values):
+        ports = _ports(system, name, ("input", "output"))
+        for port, one in _members(name, value, ports):
+            for route in _routes(system, port):
+                yield route.target if route else port, arriving(system, port, route, one)
+
+
+def _value(system: System, port: PortName, route: Connection | None, value: Any) -> float:
+    """What an input takes where a signal is overridden."""
+    variable = system.component(port.component).variable(port.port)
+    number = float(typed(str(port), variable, _text(value)))
+    if route is None or route.transformation is None:
+        return number
+    return _arrived(port, route, value, route.transformation(number))
+
+
+def _offset(system: System, port: PortName, route: Connection | None, value: Any) -> float:
+    """What is added to an input where a signal is biased."""
+    variable = system.component(port.component).variable(port.port)
+    if type_of(variable) not in ("Real", "Integer"):
+        raise InputError(f"{port} is of type {type_of(variable)}: nothing can be added to it")
+    least, most = INTEGERS
+    if not is_finite(value) or (
+        type_of(variable) == "Integer" and (value != int(value) or abs(value) > most - least)
+    ):
+        raise InputError(f"{port}: {value!r} cannot be added to it")
+    match route:
+        case Connection(transformation=Linear(factor, _)):
+            return _arrived(port, route, value, factor * float(value))
+        case Connection(transformation=Mapped()):
+            raise InputError(f"{port} is mapped on its way: nothing can be added to it")
+    return float(value)
+
+
+def _arrived(port: PortName, route: Connection, value: Any, arriving: float) -> float:
+    """What a value of an event is at the end of its way, where it must be a number still."""
+    if not isfinite(arriving):
+        raise InputError(f"{port}: {value!r} is {arriving:g} where it arrives, at {route.target}")
+    return arriving
+
+
+def _text(value: Any) -> Any:
+    return literal(value) if isinstance(value, bool) else value
+
+
+def _freeze(names: Any, system: System) -> Action:
+    return Freeze(_inputs(names, system))
+
+
+def _lose(names: Any, system: System) -> Action:
+    return Alter("override", tuple((target, 0.0) for target in _inputs(names, system)))
+
+
+def _release(names: Any, system: System) -> Action:
+    return Release(_inputs(names, system))
+
+
+def _set(values: Mapping[str, Any], system: System) -> Action:
+    fed = {connection.target: connection.source for connection in system.connections}
+    parameters, inputs = [], []
+    for name, value in flattened(values):
+        for port, one in _members(name, value, _ports(system, name, ("parameter", "input"))):
+            variable = system.component(port.component).variable(port.port)
+            if port in fed:
+                raise InputError(f"{port} is fed by {fed[port]}: override it")
+            if variable.causality == "input":
+                inputs.append((port, float(typed(str(port), variable, _text(one)))))
+            elif variable.variability != "tunable":
+                raise InputError(
+                    f"{port} is a {variable.variability} parameter: it cannot change during a run"
+                )
+            else:
+                parameters.append((port, typed(str(port), variable, _text(one))))
+    return Set(tuple(parameters), tuple(inputs))
+
+
+def _reset(names: Any, system: System) -> Action:
+    for name in _things(names):
+        if system.steps.get(system.component(name).name, system.step) != system.step:
+            raise InputError(f"{name} takes longer steps of its own: it cannot begin in one")
+    return Reset(tuple(_things(names)))
+
+
+def _stop(value: bool, system: System) -> Action:
+    if not value:
+        raise InputError("stop = false: leave the event out")
+    return Stop("stop")
+
+
+_ACTIONS: Mapping[str, Callable[[Any, System], Action]] = {
+    "set": _set,
+    "override": _override,
+    "bias": _bias,
+    "freeze": _freeze,
+    "drop": _freeze,
+    "lose": _lose,
+    "release": _release,
+    "reset": _reset,
+    "stop": _stop,
+}

@@ -1,0 +1,149 @@
+"""The wiring of the closed loop: which FMUs there are, and which ports feed which."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from orchestrator.machine.errors import Findings, InputError, did_you_mean
+from orchestrator.runs.scenario import Scenario
+from orchestrator.system.component import RUNNABLE, Component, read_component
+from orchestrator.system.names import PortName, port_name
+from orchestrator.system.structure import Connection, System
+
+_WIRING = Path(__file__).with_name("closed_loop.toml")
+
+
+def read_wiring() -> dict[str, Any]:
+    """What `closed_loop.toml` holds."""
+    return tomllib.loads(_WIRING.read_text(encoding="utf-8"))
+
+
+def closed_loop(
+    folder: Path, scenario: Scenario | None = None, versions: Sequence[str] = RUNNABLE
+) -> System:
+    """The wiring of the closed loop over the FMUs in a folder.
+
+    Args:
+        folder: with the built FMUs.
+        scenario: whose components, wires and parameters change it; None: the closed loop as is.
+        versions: of FMI that its FMUs may have.
+
+    Raises:
+        Refused: a component or group of ports that the scenario names does not exist.
+
+    """
+    findings, wiring = Findings(), read_wiring()
+    scenario = scenario or Scenario(wiring["name"])
+    chosen, wires = _changed(scenario, wiring["components"], wiring["wires"], findings)
+    components = {}
+    for name, fmu in chosen.items():
+        with findings.collecting():
+            path = Path(fmu) if fmu.endswith(".fmu") else folder / f"{fmu}.fmu"
+            components[name] = read_component(name, path, versions)
+    findings.refuse()
+    connections: list[Connection] = []
+    for target, source in wires.items():
+        with findings.collecting():
+            connections += _wire(components, target, source)
+    groups = {**wiring["wires"], **scenario.wires}
+    left_open = {
+        PortName(name, variable.name)
+        for name, component in components.items()
+        for variable in component.having("input")
+        if any(f"{name}.{variable.name}".startswith(f"{group}.") for group in groups)
+    }
+    system = System(
+        name=wiring["name"],
+        components=components,
+        connections=tuple(connections),
+        left_open=left_open - {connection.target for connection in connections},
+        stop_time=wiring["experiment"]["stop_time"],
+        step=wiring["experiment"]["step"],
+        steps=scenario.steps,
+    )
+    for port, value in scenario.parameters.items():
+        with findings.collecting():
+            system = system.with_parameters({port: value})
+    findings.refuse()
+    return system
+
+
+def _changed(
+    scenario: Scenario,
+    chosen: Mapping[str, str],
+    wires: Mapping[str, str | bool],
+    findings: Findings,
+) -> tuple[dict[str, str], dict[str, str]]:
+    """The components and wires of a scenario."""
+    there = {**chosen, **scenario.components}
+    for name in there:
+        if not re.fullmatch(r"\w+", name):
+            findings.problem(
+                f"{scenario.name}: component {name!r}: write letters, digits and _ alone"
+            )
+    for target in scenario.wires.keys() - wires.keys():
+        if scenario.wires[target] is False:
+            findings.problem(
+                f"{scenario.name}: there is no wire {target!r} to remove"
+                f"{did_you_mean(target, wires)}"
+            )
+    wired = {
+        target: str(source)
+        for target, source in {**wires, **scenario.wires}.items()
+        if source is not False
+    }
+    if missing := set(scenario.only) - there.keys():
+        findings.problem(
+            f"{scenario.name}: only = {', '.join(sorted(missing))}: no such component; "
+            f"there are {', '.join(there)}"
+        )
+    if scenario.only:
+        left = there.keys() - {*scenario.only}
+        there = {name: fmu for name, fmu in there.items() if name in scenario.only}
+        wired = {
+            target: source
+            for target, source in wired.items()
+            if left.isdisjoint((target.split(".")[0], source.split(".")[0]))
+        }
+    return there, wired
+
+
+def _wire(components: Mapping[str, Component], target: str, source: str) -> list[Connection]:
+    """The connections of one wire: of two ports, or every input of a group takes its namesake."""
+    to, group = port_name(target).component, port_name(target).port
+    start, source_group = port_name(source).component, port_name(source).port
+    for name in (to, start):
+        if name not in components:
+            raise InputError(
+                f"wire {source} -> {target}: there is no component {name!r}"
+                f"{did_you_mean(name, components)}"
+            )
+    inputs = [variable.name for variable in components[to].having("input")]
+    outputs = components[start].variables
+    if group in components[to].variables and source_group in outputs:
+        return [Connection(PortName(start, source_group), PortName(to, group))]
+    members = [name for name in inputs if name.startswith(f"{group}.")]
+    if group in inputs and not members:
+        raise InputError(
+            f"wire {source} -> {target}: {target} is one input, and {start} has no port "
+            f"{source_group!r}{did_you_mean(source_group, outputs)}"
+        )
+    if not members:
+        raise InputError(
+            f"wire {source} -> {target}: {to} has no input {group} nor inputs {group}.*"
+            f'{did_you_mean(group, inputs)}; a scenario removes a wire with "{target}" = false '
+            "under [wires]"
+        )
+    if source_group in outputs and not any(name.startswith(f"{source_group}.") for name in outputs):
+        raise InputError(
+            f"wire {source} -> {target}: {source} is one port, and {target} a group of inputs; "
+            f"wire one of them{did_you_mean(group, members)}"
+        )
+    return [
+        Connection(PortName(start, source_group + name.removeprefix(group)), PortName(to, name))
+        for name in members
+    ]

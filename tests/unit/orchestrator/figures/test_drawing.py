@@ -1,0 +1,173 @@
+"""Figures show the numbers of the table, leave out what is not there, and say so."""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.figures import FIGURES, Drawn, check_figure, draw, overlay
+from orchestrator.figures.layout import compose
+from orchestrator.machine.errors import InputError
+from orchestrator.vehicle.signals import COMMANDED, DY_HAT, NU, POSTURE, THETA_HAT, Y_D
+from support.tables import loop_table
+from support.tiers import slow
+
+
+def panel(figure, label):
+    """The axes whose vertical axis has a label."""
+    [axes] = [axes for axes in figure.axes if axes.get_ylabel() == label]
+    return axes
+
+
+def lines(axes):
+    return [np.array(line.get_data()) for line in axes.get_lines()]
+
+
+def notes_of(kind, *tables, folder: Path):
+    return draw(kind, "", [Drawn(f"run {i}", t) for i, t in enumerate(tables)], folder, "f")
+
+
+def test_lines_hold_the_numbers_of_the_table():
+    table = loop_table()
+    figure, notes = compose("", FIGURES["tracking"][""], [Drawn("run", table)])
+    assert notes == []
+    estimates = lines(panel(figure, "estimate"))
+    for i, line in enumerate(estimates, start=1):
+        # Computed in the step that ends at a row: it belongs to the time at which it began.
+        np.testing.assert_array_equal(
+            line, (table.time[:-1], table[f"controller.theta_hat[{i}]"][1:])
+        )
+    command = lines(panel(figure, r"$\tau_q$ [N·m]"))[0]
+    np.testing.assert_array_equal(command[1][:-1], table["plant.tau.q"][1:])
+    # (9) at no attitude at all would be eta + ell e1; here against its x component.
+    x, theta, psi = (table[f"plant.eta.{k}"] for k in ("x", "theta", "psi"))
+    error = x + 0.35 * np.cos(psi) * np.cos(theta) - table["planner.y_d.x"]
+    np.testing.assert_allclose(lines(panel(figure, "error [m]"))[0][1], error, atol=1e-12)
+
+
+@pytest.mark.parametrize("z_up", [False, True])
+def test_axes_of_a_path_say_which_way_they_point(z_up):
+    figure, _ = compose("", FIGURES["tracking"][""], [Drawn("run", loop_table(), z_up)])
+    [axes] = [axes for axes in figure.axes if axes.name == "3d"]
+    assert axes.get_zlabel() == ("z up [m]" if z_up else "z down [m]")
+    assert axes.get_ylabel() == ("y west [m]" if z_up else "y east [m]")
+    # Right-handed: both are turned around, or neither.
+    assert axes.zaxis_inverted() == axes.yaxis_inverted() == (not z_up)
+
+
+def test_panels_end_together():
+    table = loop_table()
+    figure, _ = compose("", FIGURES["tracking"][""], [Drawn("run", table)])
+    flat = [axes for axes in figure.axes if axes.name != "3d"]
+    assert {axes.get_xlim() for axes in flat} == {(0.0, table.time[-1])}
+    assert lines(panel(figure, r"$\tau_u$ [N]"))[0][0][-1] == table.time[-1]
+
+
+@pytest.mark.parametrize(
+    ("without", "note"),
+    [
+        (THETA_HAT, "estimated parameters left out: no controller.theta_hat[1]"),
+        (Y_D, "tracking errors left out: no planner.y_d.x"),
+        (COMMANDED, "commands left out: no plant.tau.u"),
+    ],
+)
+def test_what_is_missing_is_left_out_with_a_note(without, note):
+    """As with a user's own controller, which need not estimate anything."""
+    _, notes = compose("", FIGURES["tracking"][""], [Drawn("run", loop_table(without=without))])
+    assert note in notes
+
+
+def test_a_figure_that_is_missing_is_left_out_with_a_note(tmp_path):
+    notes = notes_of("tracking", loop_table(without=DY_HAT), folder=tmp_path)
+    assert notes == ["f-velocity left out: no controller.dy_hat.x"]
+    assert {path.name for path in tmp_path.iterdir()} == {"f.png", "f.svg"}
+
+
+@pytest.mark.parametrize("kind", FIGURES)
+def test_no_vehicle_is_no_figure_and_one_note(tmp_path, kind):
+    table = loop_table(without=(*POSTURE, *NU, *COMMANDED, *THETA_HAT, *DY_HAT))
+    [note] = notes_of(kind, table, folder=tmp_path)
+    assert note.startswith("no figure: the run has no plant.")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_without_a_step_is_no_figure(tmp_path):
+    assert notes_of("tracking", loop_table(1), folder=tmp_path) == [
+        "no figure: the run has no step"
+    ]
+
+
+def test_a_companion_that_lacks_something_is_named(tmp_path):
+    companion = loop_table(without=Y_D)
+    notes = notes_of("comparison-errors", loop_table(), companion, folder=tmp_path)
+    assert "tracking errors of run 1 left out: no planner.y_d.x" in notes
+
+
+def test_colours_belong_to_runs():
+    """A run that is not there does not hand its colour to the next."""
+    tables = (loop_table(), loop_table(without=Y_D), loop_table())
+    runs = [Drawn(name, table) for name, table in zip("abc", tables, strict=True)]
+    figure = overlay("", runs)
+    colours = {
+        label: {line.get_color() for axes in figure.axes for line in axes.get_lines()
+                if line.get_label() == label}
+        for label in "abc"
+    }  # fmt: skip
+    assert all(len(found) == 1 for found in colours.values())
+    assert len(set.union(*colours.values())) == 3
+
+
+def test_a_command_that_is_cut_off_says_its_peak():
+    table = loop_table()
+    table["plant.tau.u"][200] = -366.0
+    figure, _ = compose("", FIGURES["tracking"][""], [Drawn("run", table)])
+    axes = panel(figure, r"$\tau_u$ [N]")
+    assert axes.get_ylim()[0] > -366.0
+    assert [text.get_text() for text in axes.texts] == ["limits ±80 N, peak 366 N"]
+
+
+def test_a_figure_has_no_heading_where_none_is_given():
+    run = Drawn("run", loop_table())
+    with_title, _ = compose("Fig. 4", FIGURES["tracking"][""], [run])
+    without, _ = compose("", FIGURES["tracking"][""], [run])
+    assert with_title.get_suptitle() == "Fig. 4"
+    assert without.get_suptitle() == ""
+    assert without.get_figheight() < with_title.get_figheight()
+
+
+def test_nothing_is_drawn_when_it_is_to_stop(tmp_path):
+    run = Drawn("run", loop_table())
+    assert draw("tracking", "", [run], tmp_path, "f", stop=lambda: True) == []
+    assert not list(tmp_path.iterdir())
+
+
+def test_same_run_is_the_same_file(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        notes_of("comparison", loop_table(), loop_table(seed=2), folder=tmp_path / name)
+    assert {path.name for path in (tmp_path / "a").iterdir()} == {"f.png", "f.svg"}
+    for path in (tmp_path / "a").iterdir():
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes(), path.name
+
+
+@pytest.mark.parametrize("value", [2e8, np.nan, *slow(1e-9, np.inf)])
+def test_matplotlib_keeps_its_thoughts_to_itself(tmp_path, caplog, value):
+    table = loop_table()
+    for column in (*COMMANDED, *THETA_HAT, *DY_HAT):
+        table[column][200:] = value
+    with warnings.catch_warnings(), caplog.at_level(logging.WARNING):
+        warnings.simplefilter("error")
+        for kind in ("tracking", "comparison"):
+            draw(kind, "標題", [Drawn("run", table), Drawn("other", loop_table())], tmp_path, kind)
+    assert caplog.records == []
+
+
+def test_an_unknown_figure_is_refused_with_a_hint():
+    with pytest.raises(InputError, match="no figure 'trakking'; did you mean tracking"):
+        check_figure("trakking")
+    with pytest.raises(InputError, match="no figure 'none'; there are tracking"):
+        check_figure("none")

@@ -1,0 +1,100 @@
+"""Any signals: which are chosen, which share a panel, and what they are called."""
+
+import numpy as np
+import pytest
+
+from orchestrator.figures.plot import group_of, plot
+from orchestrator.figures.style import save
+from orchestrator.machine.errors import InputError
+from orchestrator.vehicle.signals import unit_of
+from support.tables import loop_table, table_of
+
+
+def drawn(figure):
+    """Lines by the label of their panel and their own."""
+    return {
+        (axes.get_ylabel(), line.get_label()): np.array(line.get_data())
+        for axes in figure.axes
+        for line in axes.get_lines()
+    }
+
+
+def test_members_of_a_group_with_one_unit_share_a_panel():
+    table = loop_table()
+    lines = drawn(plot([("run", table)], ["plant.eta"]))
+    assert set(lines) == {
+        *(("plant.eta\n[m]", k) for k in "xyz"),
+        *(("plant.eta\n[rad]", k) for k in ("phi", "theta", "psi")),
+    }
+    for (_, member), line in lines.items():
+        np.testing.assert_array_equal(line, (table.time, table[f"plant.eta.{member}"]))
+
+
+def test_runs_lie_over_each_other_with_labels_of_their_own():
+    first, second = loop_table(), loop_table(seed=2)
+    lines = drawn(plot([("first", first), ("second", second)], ["plant.eta.x"]))
+    for label, table in (("first", first), ("second", second)):
+        np.testing.assert_array_equal(lines["plant.eta.x\n[m]", label][1], table["plant.eta.x"])
+
+
+@pytest.mark.parametrize("n", [2, 3, 7])
+def test_legends_of_many_runs_leave_the_panels_their_room(n, tmp_path):
+    """Members have their colours in the panel, runs their styles above all: all of it in sight."""
+    labels = [f"another scenario with a long name, controller.k_p = {i}" for i in range(n)]
+    figure = plot([(label, loop_table()) for label in labels], ["plant.eta", "plant.tau"])
+    save(figure, tmp_path / "plot.png")
+    [runs] = figure.legends
+    assert [text.get_text() for text in runs.texts] == labels
+    assert {line.get_color() for line in runs.get_lines()} == {"black"}
+    page = figure.bbox
+    for axes in figure.axes:
+        assert axes.get_position().width > 0.75
+        for legend in filter(None, (runs, axes.get_legend())):
+            box = legend.get_window_extent()
+            assert page.x0 <= box.x0 and box.x1 <= page.x1 and box.y1 <= page.y1
+            assert not box.overlaps(axes.get_window_extent())
+    members = figure.axes[0].get_legend()
+    assert [text.get_text() for text in members.texts] == ["x", "y", "z"]
+    assert len({line.get_color() for line in members.get_lines()}) == 3
+
+
+def test_a_signal_that_one_run_lacks_is_drawn_of_the_other():
+    own = table_of(mine__a=np.arange(10.0))
+    lines = drawn(plot([("loop", loop_table()), ("own", own)], ["mine.a"]))
+    np.testing.assert_array_equal(lines["mine.a", "own"][1], np.arange(10.0))
+
+
+def test_without_patterns_the_loop_is_shown():
+    labels = {axes.get_ylabel() for axes in plot([("run", loop_table())]).axes}
+    assert labels == {"plant.tau.u\n[N]", "plant.tau\n[N·m]", "controller.theta_hat"}
+
+
+def test_what_cannot_be_chosen_is_explained():
+    with pytest.raises(InputError, match=r"no column matches 'plant.ta'; did you mean plant.ta"):
+        plot([("run", loop_table())], ["plant.ta"])
+    with pytest.raises(InputError, match=r"name the columns to draw; there are mine.a, mine.b"):
+        plot(
+            [("own", table_of(mine__a__x=np.zeros(3), mine__a__y=np.zeros(3), mine__b=np.ones(3)))]
+        )
+
+
+def test_values_that_no_axis_can_show_are_refused(tmp_path):
+    figure = plot([("own", table_of(mine__a=np.linspace(-1.7, 1.7, 10) * 1e308))], ["mine.a"])
+    with pytest.raises(InputError, match="too far apart to be drawn"):
+        save(figure, tmp_path / "plot.png")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("column", "group", "unit"),
+    [
+        ("plant.y.x", "plant.y", "m"),
+        ("controller.theta_hat[2]", "controller.theta_hat", ""),
+        ("plant.fault", "plant.fault", ""),
+        ("disturbance.tau_w.p", "disturbance.tau_w", "N·m"),
+        ("vehicle.nu.r", "vehicle.nu", "rad/s"),
+    ],
+)
+def test_groups_and_units(column, group, unit):
+    assert group_of(column) == group
+    assert unit_of(column) == unit

@@ -1,0 +1,29 @@
+"""Headings: symbols are set, everything else is text."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.figure import Figure
+
+from orchestrator.figures.style import heading
+
+
+@pytest.mark.parametrize(
+    ("title", "expected"),
+    [
+        ("under A_f = 1, A_d = 2", "under $A_{f}$ = 1, $A_{d}$ = 2"),
+        ("theta_hat and eps_t", r"$\hat{\theta}$ and $\epsilon_{t}$"),
+        ("my_run of a_long_name", "my_run of a_long_name"),
+        ("costs $5", r"costs \$5"),
+        (r"a\A_f", r"a\A_f"),
+    ],
+)
+def test_symbols_of_the_paper_are_set(title, expected):
+    assert heading(title) == expected
+
+
+@given(st.text(alphabet=r"aA_ftheta_hat$\{}^ 1=.", max_size=30))
+def test_no_title_is_a_broken_formula(title):
+    figure = Figure()
+    figure.suptitle(heading(title))
+    figure.draw_without_rendering()

@@ -1,0 +1,181 @@
+"""What is written is what was read, and valid."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+from zipfile import ZipFile
+
+import pytest
+from fmpy.ssp.ssd import read_ssd, read_ssv
+
+from orchestrator.formats.container import write_container
+from orchestrator.formats.examination import open_inputs
+from orchestrator.formats.osp import write_osp
+from orchestrator.formats.ssp import OMS
+from orchestrator.formats.ssp.reader import read_ssp
+from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.machine.errors import Findings, InputError
+from orchestrator.system.component import read_component
+from orchestrator.system.names import PortName, plain
+from orchestrator.system.structure import System
+from support.archives import (
+    archive,
+    binding,
+    component,
+    connection,
+    connector,
+    described,
+    fmu,
+    system,
+    variable,
+)
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> System:
+    """A system with all that a system may have, two of whose FMUs have one name."""
+    folder = tmp_path_factory.mktemp("fmus")
+    (folder / "other").mkdir()
+    ports = (
+        variable("y", "output", unit="degC"), variable("n", "output", "Enumeration"),
+        variable("b", "output", "Boolean"), variable("m", "input", "Enumeration"),
+        variable("c", "input", "Boolean"), variable("k", "parameter", "Enumeration"),
+        variable("t", "parameter", "String"),
+    )  # fmt: skip
+    files = {
+        "a.fmu": fmu(folder / "a.fmu", variable("u", "input", unit="K"), *ports),
+        "x/a.fmu": fmu(folder / "other" / "a.fmu", variable("u", "input", unit="degC"), *ports),
+    }
+    hint = '<ssd:Annotations><ssc:Annotation type="x"><StepSizeHint value="0.5"/></ssc:Annotation>'
+    inner = system(
+        component("a b", "x/a.fmu", binding({"k": 'Enumeration value="fast"'})).replace(
+            "</ssd:Component>", f"{hint}</ssd:Annotations></ssd:Component>"
+        ),
+        connection("u", "a b.u"), connector("u", "input", "K"), name="inner",
+    )  # fmt: skip
+    top = system(
+        component("a", bindings=binding({"t": 'String value="x &amp; y"'})) + inner,
+        connection("a.y", "inner.u", '<ssc:LinearTransformation factor="2"/>')
+        + connection("a.y", "a.u", suppressUnitConversion="true")
+        + connection(
+            "a.n", "a.m",
+            '<ssc:IntegerMappingTransformation><ssc:MapEntry source="2" target="5"/>'
+            "</ssc:IntegerMappingTransformation>")
+        + connection(
+            "a.b", "a.c",
+            '<ssc:BooleanMappingTransformation><ssc:MapEntry source="true" target="false"/>'
+            "</ssc:BooleanMappingTransformation>"),
+    )  # fmt: skip
+    text = described(top, after='<ssd:DefaultExperiment startTime="2" stopTime="3"/>')
+    return read_ssp(archive(folder / "all.ssp", text, files))
+
+
+def test_system_that_is_written_and_read_is_the_same(found: System, tmp_path: Path):
+    [path] = write_ssp(found, tmp_path)
+    findings = Findings(strict=True)
+    again = read_ssp(path, findings=findings)
+    assert again.connections == found.connections
+    assert again.parameters == found.parameters
+    assert again.steps == found.steps == {"inner.a b": 0.5}
+    assert (again.start_time, again.stop_time) == (2.0, 3.0)
+    contents = [
+        {name: part.fmu.read_bytes() for name, part in one.components.items()}
+        for one in (found, again)
+    ]
+    assert contents[0] == contents[1]
+
+
+@pytest.mark.parametrize("step", [None, 0.02])
+def test_what_is_written_is_valid(found: System, tmp_path: Path, step: float | None):
+    """fmpy holds it against the schemas of SSP 1.0."""
+    [path] = write_ssp(replace(found, step=step), tmp_path)
+    read_ssd(str(path))
+    with ZipFile(path) as content:
+        sets = [name for name in content.namelist() if name.endswith(".ssv")]
+    assert len(sets) == 2
+    for name in sets:
+        read_ssv(str(path), name)
+
+
+def test_inputs_that_are_open_on_purpose_have_no_connector_and_stay_so(
+    found: System, tmp_path: Path
+):
+    """fmpy takes for a connector without a connection the source of the one before."""
+    left_open = {PortName("inner.a b", "c")}
+    system = replace(found, left_open=left_open)
+    [path] = write_ssp(system, tmp_path)
+    components = {part.name: part for part in read_ssd(str(path)).system.elements}
+    named = {part: {c.name for c in components[part].connectors} for part in components}
+    assert "c" in named["a"] and "c" not in named["inner.a b"]
+    again = read_ssp(path)
+    assert again.left_open == left_open
+    assert again.steps == found.steps
+    assert "inner.a b.c" in str(open_inputs(found))
+    assert "inner.a b.c" not in str(open_inputs(again))
+
+
+@pytest.mark.parametrize("step", [0.02, 0.0125])
+def test_omsimulator_is_told_the_step_where_it_looks_for_it(
+    found: System, tmp_path: Path, step: float
+):
+    """Its Python side takes the attributes, its C++ side the child, by literal prefixes."""
+    [path] = write_ssp(replace(found, step=step), tmp_path)
+    with ZipFile(path) as content:
+        text = content.read("SystemStructure.ssd").decode()
+    root = ElementTree.fromstring(text)
+    way = "./{*}System/{*}Annotations/{*}Annotation[@type='org.openmodelica']/{*}Annotations/"
+    [information] = root.findall(f"{way}{{{OMS}}}SimulationInformation")
+    assert information.attrib == {
+        "name": "oms_ma_default", "method": "oms_ma", "fixedStepSize": str(step),
+    }  # fmt: skip
+    [master] = information
+    assert master.tag == f"{{{OMS}}}FixedStepMaster"
+    assert (master.get("description"), float(master.get("stepSize", ""))) == ("oms-ma", step)
+    for element in ("ssd:System ", "ssc:Annotation ", "oms:Annotations>", "oms:FixedStepMaster "):
+        assert f"<{element}" in text
+    assert f'<osp:FixedStepAlgorithm baseStepSize="{step}" />' in text
+    root_element = text[text.index("<ssd:SystemStructureDescription") :].partition(">")[0]
+    assert "xmlns:osp=" in root_element and "xmlns:oms=" in root_element
+    # Without libcosim's annotation it is what is left to be read.
+    other = text.replace("FixedStepAlgorithm", "Another")
+    with ZipFile(path) as content:
+        files = {name: content.read(name) for name in content.namelist() if name.count("/")}
+    assert read_ssp(archive(tmp_path / "other.ssp", other, files)).step == step
+
+
+def test_formats_without_words_for_a_transformation_refuse_it(found: System, tmp_path: Path):
+    for write in (write_osp, write_container):
+        with pytest.raises(InputError, match="write an SSP"):
+            write(found, tmp_path)
+
+
+def test_fmus_of_one_name_stay_apart(tmp_path: Path):
+    """Also where names differ in case only, or one is that of the format's own file."""
+    names = ("a/M.fmu", "b/M.fmu", "b/m.fmu", "c/2_M.fmu", "c/OspSystemStructure.xml")
+    components = {}
+    for i, name in enumerate(names):
+        file = tmp_path / name
+        file.parent.mkdir(exist_ok=True)
+        components[f"c{i}"] = read_component(f"c{i}", fmu(file, variable(f"y{i}", "output")))
+    given = System("s", components, (), step=0.1)
+    contents = {name: part.fmu.read_bytes() for name, part in components.items()}
+
+    structure, *files = write_osp(given, tmp_path)
+    root = ElementTree.parse(structure).getroot()
+    sources = {s.get("name"): s.get("source", "") for s in root.iterfind(".//{*}Simulator")}
+    assert {name: (tmp_path / file).read_bytes() for name, file in sources.items()} == contents
+    assert len({file.name.lower() for file in (structure, *files)}) == 1 + len(names)
+
+    again = read_ssp(write_ssp(given, tmp_path)[0])
+    assert {name: part.fmu.read_bytes() for name, part in again.components.items()} == contents
+
+
+def test_plain_names_are_distinct_and_kept_where_they_can_be():
+    assert plain(["M.fmu", "m.fmu", "2_M.fmu", "M.fmu"]) == [
+        "M.fmu", "1_m.fmu", "2_M.fmu", "3_M.fmu",
+    ]  # fmt: skip
+    assert plain(["2_M.fmu", "M.fmu", "M.fmu", "ä b", "x"], "X") == [
+        "2_M.fmu", "M.fmu", "3_M.fmu", "__b", "4_x",
+    ]  # fmt: skip

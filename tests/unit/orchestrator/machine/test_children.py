@@ -1,0 +1,89 @@
+"""Nothing that lies in the current folder is read as modules are imported."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from orchestrator.commands.main import main
+
+#: Files that change what matplotlib or numba do, or how they end.
+RC = [
+    b"font.size: 30\naxes.facecolor: yellow\nbackend: module://evil\n",
+    b"\xff\xfe\x00",
+]
+
+
+def figures(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix != ".json"}
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    folder = tmp_path_factory.mktemp("plain") / "r"
+    assert main(["run", "fig4", "--stop-time", "0.2", "--out", str(folder)]) == 0
+    return figures(folder)
+
+
+@pytest.mark.parametrize("content", [*RC, None])
+def test_figures_are_the_same_whatever_a_matplotlibrc_says(workplace, plain, content):
+    if content is None:
+        os.mkfifo("matplotlibrc")
+    else:
+        Path("matplotlibrc").write_bytes(content)
+    said = subprocess.run(
+        [sys.executable, "-P", "-m", "orchestrator", "run", "fig4", "--stop-time", "0.2"],
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, timeout=100, check=True,
+    ).stderr  # fmt: skip
+    assert said == b""
+    assert figures(workplace / "results" / "fig4") == plain
+
+
+def test_figures_in_a_program_are_the_same_whatever_it_has_set(workplace, plain):
+    import matplotlib as mpl  # noqa: PLC0415
+
+    with mpl.rc_context({"font.size": 30, "axes.facecolor": "yellow"}):
+        assert main(["run", "fig4", "--stop-time", "0.2"]) == 0
+    assert figures(workplace / "results" / "fig4") == plain
+
+
+def test_workers_of_a_report_read_it_no_more(workplace):
+    os.mkfifo("matplotlibrc")
+    code = (
+        "from orchestrator.machine.workers import workers\n"
+        "def size():\n"
+        "    import matplotlib\n"
+        "    return matplotlib.rcParams['font.size']\n"
+        "if __name__ == '__main__':\n"
+        "    with workers() as some:\n"
+        "        print(dict(some.results({0: size}, 'run')))\n"
+    )
+    (workplace / "program.py").write_text(code)
+    said = subprocess.run(
+        [sys.executable, "program.py"], stdout=subprocess.PIPE, text=True, timeout=100, check=True
+    )
+    assert said.stdout == "{0: 10.0}\n"
+
+
+@pytest.mark.slow
+def test_numba_takes_nothing_from_the_current_folder(workplace):
+    pytest.importorskip("numba", reason="needs the extra `studies`")
+    pytest.importorskip("distributed", reason="needs the extra `studies`")
+    Path(".numba_config.yaml").write_text(
+        "cache_dir: planted\ncache_locator_classes: evil.Locator\ndisable_jit: 1\n"
+    )
+    Path("evil.py").write_text("open('mark', 'w')\n")
+    Path("study.toml").write_text(
+        'scenario = "fig5"\nstop_time = 0.2\n[vary]\nplant.eta0.y = [0.0, 4.0]\n'
+    )
+    before = {path.name for path in workplace.iterdir()}
+    command = ("sweep", "study.toml", "--engine", "batch", "--kind", "native", "--workers", "1")
+    subprocess.run(
+        [sys.executable, "-m", "orchestrator", *command],
+        stdout=subprocess.DEVNULL, check=True,
+    )  # fmt: skip
+    assert {path.name for path in workplace.iterdir()} == before | {"results"}

@@ -1,0 +1,105 @@
+"""Signals are collected, not raised."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+import pytest
+
+from orchestrator.machine.interrupts import Interrupts, held_interrupts, orderly_end
+
+
+def test_signals_are_collected_and_announced_at_once():
+    said: list[bool] = []
+    with held_interrupts(lambda interrupts: said.append(interrupts.urgent)) as interrupts:
+        assert not interrupts
+        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGINT)
+        assert interrupts
+    assert said == [False, True]
+
+
+def test_what_a_batch_system_sends_is_urgent():
+    with held_interrupts() as interrupts:
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert interrupts.urgent
+
+
+def test_inner_context_shares_the_signals_of_the_outer_one():
+    with held_interrupts() as outer, held_interrupts() as inner:
+        os.kill(os.getpid(), signal.SIGINT)
+        assert inner is outer
+
+
+def test_handlers_are_restored():
+    before = signal.getsignal(signal.SIGINT)
+    with held_interrupts():
+        assert signal.getsignal(signal.SIGINT) is not before
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_other_threads_hold_nothing():
+    found: list[Interrupts] = []
+
+    def work() -> None:
+        with held_interrupts() as interrupts:
+            found.append(interrupts)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert not found[0]
+
+
+def test_what_is_ignored_stays_ignored():
+    """nohup ignores SIGHUP."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with held_interrupts() as interrupts:
+            os.kill(os.getpid(), signal.SIGHUP)
+            assert not interrupts
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_without_a_thread_nobody_insists_and_everything_else_goes_on(monkeypatch):
+    def cannot(_: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", cannot)
+    with held_interrupts() as interrupts, interrupts.insistence(lambda: None):
+        os.kill(os.getpid(), signal.SIGINT)
+        assert interrupts
+
+
+def test_signals_before_and_after_are_no_insistence():
+    given_up: list[str] = []
+    with held_interrupts() as interrupts:
+        for _ in range(3):
+            os.kill(os.getpid(), signal.SIGINT)
+        with interrupts.insistence(lambda: given_up.append("now")):
+            os.kill(os.getpid(), signal.SIGINT)
+        for _ in range(3):
+            os.kill(os.getpid(), signal.SIGINT)
+    assert given_up == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("of_process", [False, True])
+def test_signals_after_the_last_context_change_nothing(number, of_process):
+    before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    try:
+        with orderly_end(of_process):
+            with held_interrupts(is_last=True) as interrupts:
+                os.kill(os.getpid(), number)
+            os.kill(os.getpid(), number)
+        if of_process:
+            os.kill(os.getpid(), number)
+        else:
+            assert {n: signal.getsignal(n) for n in before} == before
+    finally:
+        for n, handler in before.items():
+            signal.signal(n, handler)
+    assert interrupts.signals == [number]

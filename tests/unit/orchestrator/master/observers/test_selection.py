@@ -1,0 +1,68 @@
+"""Rows and columns that are kept, whatever the blocks in which rows come."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orchestrator.machine.errors import InputError
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.observers.observer import Ending, Header
+from orchestrator.master.observers.selection import Selection, matches, matching
+from orchestrator.master.observers.table import Table
+
+COLUMNS = ("a.x", "a.y", "b.k[1]", "b.k[2]")
+CUTS = st.lists(st.integers(1, 999), max_size=5)
+HEADER = Header(COLUMNS, Experiment(10.0, 0.01))
+
+
+def selected(n: int, cuts: list[int], interval: float | None, columns=None) -> Table:
+    rows = np.arange(n)[:, np.newaxis] * np.array([0.01, 1.0, 2.0, 3.0, 4.0])
+    table = Table()
+    selection = Selection(table, interval, columns)
+    selection.begin(HEADER)
+    for block in np.split(rows, sorted(cuts)):
+        if len(block):
+            selection.take(block)
+    selection.end(Ending())
+    return table
+
+
+@given(
+    n=st.integers(2, 1000),
+    cuts=st.lists(st.integers(1, 999), max_size=5),
+    every=st.integers(1, 300),
+)
+def test_one_row_is_kept_for_each_interval_and_the_last(n, cuts, every):
+    kept = selected(n, cuts, every * 0.01)
+    expected = sorted({*range(0, n, every), n - 1})
+    np.testing.assert_allclose(kept["a.x"], expected)
+
+
+@given(cuts=CUTS)
+def test_an_interval_between_steps_keeps_the_first_row_beyond(cuts):
+    """0.025 s in steps of 0.01 s: rows 0, 3, 5, 8, 10, ..."""
+    kept = selected(500, cuts, 0.025)
+    assert kept["a.x"][:5].tolist() == [0, 3, 5, 8, 10]
+
+
+def test_columns_are_kept_in_the_order_that_was_asked_for():
+    kept = selected(3, [], None, ["b.k[2]", "a.x"])
+    assert kept.columns == ("b.k[2]", "a.x")
+    assert kept.rows.tolist() == [[0.0, 0.0, 0.0], [0.01, 4.0, 1.0], [0.02, 8.0, 2.0]]
+
+
+@pytest.mark.parametrize("interval", [0.0, -1.0, float("nan")])
+def test_impossible_interval_is_refused(interval):
+    with pytest.raises(InputError, match="must be positive"):
+        Selection(Table(), interval)
+
+
+def test_patterns_are_names_groups_and_wildcards():
+    assert matching(COLUMNS, ["b.k[*]", "a.x"]) == ["a.x", "b.k[1]", "b.k[2]"]
+    assert matching(COLUMNS, ["a"]) == ["a.x", "a.y"]
+    assert not matches("a.xy", "a.x")
+    with pytest.raises(InputError, match=r"no column matches 'a\.z'; did you mean a\."):
+        matching(COLUMNS, ["a.z"])

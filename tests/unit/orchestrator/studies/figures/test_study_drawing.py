@@ -1,0 +1,120 @@
+"""Figures of studies show what loops over the runs find."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from orchestrator.studies.engine import INDICES
+from orchestrator.studies.figures import draw_figures, read_figures
+from orchestrator.studies.figures.bands import bands
+from orchestrator.studies.figures.fronts import best
+from orchestrator.studies.figures.influence import influence
+from orchestrator.studies.figures.maps import maps
+from orchestrator.studies.figures.study_data import Values
+
+GRID = np.geomspace(1.0, 100.0, 5)
+VARIED = {"disturbance.A_f": float, "disturbance.A_d": float}
+
+
+def columns():
+    """Two scenarios on a grid, three runs at each of its points; the largest A_f has no error."""
+    A_f, A_d, _, scenario = (
+        a.ravel() for a in np.meshgrid(GRID, GRID, range(3), ["fig5", "fig5-pd"], indexing="ij")
+    )
+    n = len(A_f)
+    made = {name: np.full(n, np.nan) for name in INDICES}
+    made["late_error"] = np.random.default_rng(3).lognormal(0.0, 1.0, n)
+    made["late_error"][A_f == GRID[-1]] = np.nan
+    made["peak_command.u"] = A_f**2
+    return made | {
+        "scenario": scenario.astype(object),
+        "disturbance.A_f": A_f,
+        "disturbance.A_d": A_d,
+        "failure": np.array([None] * n, dtype=object),
+    }
+
+
+def plan(**figure):
+    [read] = read_figures("mine.toml", {"f": figure}, VARIED, True)
+    return read
+
+
+def test_bands_are_medians_and_shares():
+    runs = columns()
+    figure = bands(
+        plan(kind="bands", x="disturbance.A_f", show=["late_error", "lost"]), "", Values(runs)
+    )
+    for axes, middle in zip(figure.axes, (np.median, lambda e: np.mean(~(e <= 1.0))), strict=True):
+        for line, scenario in zip(axes.get_lines(), ("fig5", "fig5-pd"), strict=True):
+            x, y = line.get_data()
+            np.testing.assert_allclose(x, GRID, rtol=1e-12)
+            for value, found in zip(GRID, y, strict=True):
+                here = (runs["disturbance.A_f"] == value) & (runs["scenario"] == scenario)
+                expected = middle(runs["late_error"][here])
+                np.testing.assert_equal(found, expected)
+        assert axes.get_xscale() == "log"
+
+
+def test_maps_are_medians_and_grey_where_no_run_has_any():
+    runs = columns()
+    figure = maps(
+        plan(kind="maps", x="disturbance.A_f", y="disturbance.A_d", show="late_error"),
+        "", Values(runs),
+    )  # fmt: skip
+    proposed, pd, _ = figure.axes
+    assert (proposed.get_title(), pd.get_title()) == ("proposed", "PD")
+    for axes, scenario in ((proposed, "fig5"), (pd, "fig5-pd")):
+        cells = axes.collections[0].get_array()
+        for (row, column), found in np.ndenumerate(np.ma.filled(cells, np.nan)):
+            here = runs["scenario"] == scenario
+            here &= (runs["disturbance.A_d"] == GRID[row]) & (
+                runs["disturbance.A_f"] == GRID[column]
+            )
+            np.testing.assert_equal(found, np.median(runs["late_error"][here]))
+
+
+def test_front_is_what_nothing_else_beats():
+    points = np.random.default_rng(4).integers(0, 30, (200, 2)).astype(float)
+    found = {tuple(point) for point in best(points)}
+    expected = {
+        tuple(p) for p in points if not any((q <= p).all() and (q < p).any() for q in points)
+    }
+    assert found == expected
+
+
+def test_influence_knows_more_less_and_nothing():
+    pytest.importorskip("scipy", reason="needs the extra studies")
+    runs = columns()
+    runs["final_error.x"] = -np.exp(runs["disturbance.A_d"] / 10)
+    show = ["peak_command.u", "final_error.x", "largest_drift"]
+    figure = influence(plan(kind="influence", x=list(VARIED), show=show), "", Values(runs))
+    matrix = np.ma.filled(figure.axes[0].get_images()[0].get_array(), np.nan)
+    np.testing.assert_allclose(matrix, [[1, 0], [0, -1], [np.nan, np.nan]], atol=1e-12)
+
+
+def test_every_figure_is_written_twice_and_those_without_values_are_left_out(tmp_path):
+    figures = {
+        "error": {"kind": "bands", "x": "disturbance.A_f", "show": "late_error"},
+        "drift": {"kind": "front", "x": "largest_drift", "y": "late_error"},
+        "effort": {"kind": "front", "x": "peak_command.u", "y": "late_error"},
+    }
+    figures["many"] = figures["error"] | {"by": ["disturbance.A_f", "disturbance.A_d"]}
+    plans = read_figures("mine.toml", figures, VARIED, True)
+    assert list(draw_figures(plans, "A_f and A_d", columns(), tmp_path)) == [
+        "figure drift left out: no run has largest_drift",
+        "figure many left out: by tells 25 parts of the runs apart",
+    ]
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "error.png", "error.svg", "effort.png", "effort.svg",
+    }  # fmt: skip
+
+
+def test_the_same_runs_give_the_same_files(tmp_path):
+    figures = {"f": {"kind": "bands", "x": "disturbance.A_f", "show": "late_error"}}
+    plans = read_figures("mine.toml", figures, VARIED, True)
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        assert not list(draw_figures(plans, "", columns(), tmp_path / folder))
+    for name in ("f.png", "f.svg"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()

@@ -1,0 +1,40 @@
+"""What is said of a run after it, against what the run itself has integrated."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from orchestrator import simulate
+from orchestrator.vehicle.cautions import cautions_after
+
+FIVE = {"plant.roll": False, "plant.noise.std": 0.0}
+
+
+def pitch(result):
+    """By (1), whose pitch turns at q: Euler's scheme, a row a step."""
+    q = result["plant.nu.q"]
+    return np.concatenate(([0.0], 0.02 * np.cumsum(q[:-1])))
+
+
+@pytest.mark.parametrize(
+    ("scenario", "parameters", "stop_time"),
+    [
+        ("fig5", FIVE, 20.0),
+        ("fig5-pd", FIVE, 20.0),
+        ("fig5-pd", {}, 20.0),
+        ("fig4", FIVE, 40.0),
+        ("fig5-pd", FIVE, 0.5),
+    ],
+)
+def test_five_degrees_of_freedom_that_pass_the_vertical_are_told(scenario, parameters, stop_time):
+    result = simulate(scenario, parameters, stop_time=stop_time, kind="native")
+    beyond = pitch(result) > np.pi / 2
+    said = [caution for caution in cautions_after(result) if "passes 90 degrees" in caution]
+    if "plant.roll" in parameters and beyond.any():
+        time = result.time[beyond.argmax()]
+        [line] = said
+        assert f"by t = {time:g} s, where (1) has a pole" in line and "plant.roll" in line
+    else:
+        assert not said
+    assert beyond.any() == (scenario != "fig4" and stop_time > 1.0)
