@@ -18,14 +18,17 @@ from orchestrator.machine.locks import claimed
 from orchestrator.runs import bundle
 
 # A slow machine is no error, and the same tree gives the same result every time.
-settings.register_profile("patient", deadline=None, derandomize=True)
+settings.register_profile("patient", deadline=None, derandomize=True, max_examples=40)
 settings.load_profile("patient")
+# The same and more of them, beside the slow tests.
+settings.register_profile("thorough", settings.get_profile("patient"), max_examples=200)
 # New examples every time, and many.
 settings.register_profile("search", deadline=None, max_examples=2000)
 # For mutmut: no smaller examples once a mutant is dead.
 settings.register_profile(
     "mutants",
     settings.get_profile("patient"),
+    max_examples=100,
     phases=[Phase.explicit, Phase.generate],
 )
 # For tests/fuzz/test_keeping.py: thousands of folders, and of files with a changed bit.
@@ -106,14 +109,14 @@ def _copy(fmus: Path, module: str, folder: Path, *options: str) -> None:
     shutil.copytree(fmus, folder, dirs_exist_ok=True)
 
 
-def _built(shared: Path, kind: str) -> Path:
+def _built(shared: Path, kind: str, fmi: str = bundle.FMI[0]) -> Path:
     """Make a bundle of the FMUs that runs take, unless another worker has done so."""
-    folder = shared / kind
+    folder = shared / f"{kind}{fmi}"
     with claimed(shared, wait=True), pytest.MonkeyPatch.context() as patch:
         if not folder.exists():
-            fmus = bundle.current_fmus(kind)
+            fmus = bundle.current_fmus(kind, fmi)
             patch.setattr(bundle, "run_fmus", partial(_copy, fmus))
-            bundle.build(folder, kind=kind)
+            bundle.build(folder, kind=kind, fmi=fmi)
     return folder
 
 
@@ -127,6 +130,12 @@ def dist(shared: Path) -> Path:
 def native(shared: Path) -> Path:
     """A folder with the FMUs in C, to be read only."""
     return _built(shared, bundle.NATIVE)
+
+
+@pytest.fixture(scope="session")
+def dist3(shared: Path) -> Path:
+    """A folder with the FMUs in C of FMI 3.0, to be read only."""
+    return _built(shared, bundle.NATIVE, "3")
 
 
 @pytest.fixture

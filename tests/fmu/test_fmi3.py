@@ -21,7 +21,6 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
 from orchestrator.master.experiment import Experiment
-from orchestrator.runs import bundle
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.structure import System
@@ -47,14 +46,6 @@ FUNCTIONS = re.findall(
 NUMERIC = ("Float32", "Int8", "UInt8", "Int16", "UInt16", "UInt32", "Int64", "UInt64")
 OTHER = "other types"
 OTHER_TYPES = (*NUMERIC, "Binary", "Clock")
-
-
-@pytest.fixture(scope="module")
-def dist3(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the FMUs of FMI 3.0."""
-    folder = tmp_path_factory.mktemp("fmi3")
-    bundle.build(folder, kind="native", fmi="3")
-    return folder
 
 
 @pytest.fixture(scope="module")

@@ -117,6 +117,7 @@ def test_cell_of_a_plain_fmu(plain: Worker[Cell, str], cell: str):
     hold(plain, OF_THE_SLAVE[cell])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", without_the_loader(), ids=": ".join)
 def test_what_is_said_of_a_plain_fmu(plain: Worker[Cell, str], key: tuple[str, str]):
     wrong = plain.ask((key, "stepping"), PATIENCE)

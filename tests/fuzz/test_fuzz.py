@@ -86,6 +86,7 @@ def test_kinds_answer_alike(kinds: dict[str, Folders], name: str):
         assert not findings, explained(fuzzer, "twins", findings)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(GCC is None, reason="gcc is not installed")
 def test_sanitizers_find_nothing(native: Path):
     with unpacked([native / f"{name}.fmu" for name in NAMES]) as folders, sanitizers() as reports:

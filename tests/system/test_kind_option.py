@@ -36,6 +36,7 @@ def kinds(folder: Path) -> dict[str, str]:
     return {name: fmu["kind"] for name, fmu in record["fmus"].items()}
 
 
+@pytest.mark.slow
 def test_build_writes_fmus_ssp_checksums_and_bill(workplace, capsys):
     assert main(["build", "--kind", "native"]) == 0
     folder = workplace / "fmus/dist/native"
