@@ -22,12 +22,10 @@ from orchestrator.exchange.verify import verify
 from orchestrator.machine.compiler import machines_compiler
 from orchestrator.master.experiment import Experiment
 from orchestrator.runs import bundle
-from orchestrator.runs.scenario import read_scenario
-from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import Component
 from orchestrator.system.structure import System
 from support.instances import NAMES
-from support.runs import run
+from support.runs import run, system_of
 
 #: Both controllers, so that all FMUs of the paper are run.
 SCENARIOS = ("fig4", "fig5-pd")
@@ -50,10 +48,6 @@ def in_root() -> list[str]:
     if subprocess.run([*command, "/", "true"], capture_output=True, check=False).returncode != 0:
         pytest.skip("the root folder may not be changed here")
     return command
-
-
-def system_of(folder: Path, scenario: str) -> System:
-    return closed_loop(folder, read_scenario(scenario))
 
 
 def symbols(library: Path, option: str) -> set[str]:

@@ -23,7 +23,6 @@ from orchestrator.machine.archives import check_place, unpacked
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.files import read_columns, read_rows
 from orchestrator.master.schedule import stages
-from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
@@ -34,11 +33,6 @@ from support.tiers import slow
 
 def port(text: str) -> PortName:
     return PortName(*text.split(".", 1))
-
-
-@pytest.fixture(scope="module")
-def system(dist: Path) -> System:
-    return closed_loop(dist)
 
 
 def with_connection(system: System, source: str, target: str) -> System:

@@ -30,11 +30,6 @@ ORDER = ("plant", "controller", "disturbance", "planner")
 OTHER_ORDER = ("controller", "plant", "planner", "disturbance")
 
 
-@pytest.fixture(scope="module")
-def system(dist: Path) -> System:
-    return closed_loop(dist)
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_a_fresh_run_of_each_fmu_is_the_reference(dist: Path, name: str):
     """To 1e-9: the libraries of mathematics of two machines may differ in the last place."""

@@ -9,8 +9,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from auv_fmu.vehicle import Vehicle, accelerations
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
 from orchestrator.paper import claims
 from orchestrator.paper.claims import CLAIMS, Claim
@@ -24,18 +22,11 @@ from orchestrator.paper.measures import (
 )
 from orchestrator.system.names import PortName
 from orchestrator.vehicle.signals import APPLIED, THETA_HAT, Y_D
+from support.tables import table_of
 from support.texts import numbers_in, tells
 
 ELL = 0.35
 ONES, TWOS, THREES = (1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (3.0, 3.0, 3.0)
-
-
-def table_of(time, parameters=None, **columns):
-    """A table whose columns are given with `__` for dots; a list of names shares one value."""
-    names = tuple(name.replace("__", ".") for name in columns)
-    values = [np.broadcast_to(value, len(time)) for value in columns.values()]
-    header = Header(names, Experiment(float(time[-1]), float(time[1])), parameters or {})
-    return Table.of(header, np.column_stack([time, *values]))
 
 
 def outcome(table=None, **metrics):
