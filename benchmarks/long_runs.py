@@ -30,6 +30,7 @@ from orchestrator.master.loop import LOOPS, chosen
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.observer import Observer
 from orchestrator.master.observers.selection import Selection
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.bundle import KINDS, NATIVE
 from orchestrator.vehicle.certificates import CertificatesFile
@@ -100,8 +101,7 @@ def main() -> None:
             observers.append(checkpoints)
             hooks.insert(0, checkpoints)
         simulate(
-            load("fig4", options.kind),
-            experiment,
+            planned(load("fig4", options.kind), experiment),
             observers,
             None,
             chosen(options.loop, experiment),

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from orchestrator.commands.options import (
     add_fmi,
-    add_force,
-    add_kind,
+    add_options,
     add_out,
     add_set,
     assignments,
@@ -20,6 +19,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
 from orchestrator.runs.bundle import DEFAULT_FOLDERS, NATIVE, PYTHON
 from orchestrator.runs.own_controller import BASES, build_own, new_controller
+from orchestrator.runs.request import Request
+from orchestrator.runs.run import Files
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle import gains
@@ -27,7 +28,7 @@ from orchestrator.vehicle import gains
 
 def add_build(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu build`."""
-    add_kind(parser)
+    add_options(parser, Request, "kind")
     add_fmi(parser)
     parser.add_argument(
         "--platforms",
@@ -44,7 +45,7 @@ def add_build(parser: argparse.ArgumentParser) -> None:
     )
     folders = f"{DEFAULT_FOLDERS[PYTHON]} or {DEFAULT_FOLDERS[NATIVE]}"
     add_out(parser, None, f"{folders}, or the folder of SCRIPT.py")
-    add_force(parser)
+    add_options(parser, Files, "force")
     parser.add_argument(
         "--loader",
         choices=("native", "plain"),

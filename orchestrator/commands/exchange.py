@@ -10,9 +10,7 @@ from pathlib import Path
 
 from orchestrator.commands.options import (
     add_fmi,
-    add_force,
-    add_kind,
-    add_order,
+    add_options,
     add_out,
     add_set,
     add_system,
@@ -26,17 +24,18 @@ from orchestrator.formats.container import write_container
 from orchestrator.formats.osp import write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS
+from orchestrator.master.experiment import ORDERS, order_of
 from orchestrator.runs.bundle import PYTHON
 from orchestrator.runs.folder import replaced
 from orchestrator.runs.preparation import (
     DEFAULT_STEP,
     SOME_TIME,
-    Request,
     left_behind,
     load,
     prepare,
 )
+from orchestrator.runs.request import Request
+from orchestrator.runs.run import Files
 from orchestrator.system.structure import System
 
 #: Writers by the names of their formats.
@@ -62,11 +61,11 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--step", type=float, metavar="S", help="communication step [s]; default: the scenario's"
     )
-    add_kind(parser)
+    add_options(parser, Request, "strict", "kind")
     add_fmi(parser)
     add_set(parser)
     add_out(parser, None, "exports/SCENARIO/")
-    add_force(parser)
+    add_options(parser, Files, "force")
     parser.set_defaults(action=_export)
 
 
@@ -76,7 +75,7 @@ def add_hosts(parser: argparse.ArgumentParser) -> None:
         "host", nargs="*", metavar="HOST", help=f"of {', '.join(HOSTS)}; default: all"
     )
     _add_scenario(parser)
-    add_kind(parser)
+    add_options(parser, Request, "kind")
     parser.add_argument(
         "--steps", type=int, default=5000, metavar="N", help="how many; default: 5000"
     )
@@ -93,7 +92,13 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
         default=1e-6,
         help="relative to the larger of one and the port's largest value; default: 1e-6",
     )
-    add_order(parser, f"{' and '.join(ORDERS)}, the one that fits")
+    parser.add_argument(
+        "--order",
+        type=order_of,
+        metavar=f"{'|'.join(ORDERS)}|NAME,...",
+        help="in which the tool steps the components, or the names of all of them; default: "
+        f"{' and '.join(ORDERS)}, the one that fits",
+    )
     parser.add_argument(
         "--initial",
         choices=_INITIAL,

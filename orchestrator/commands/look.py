@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.commands.options import (
-    add_experiment,
-    add_force,
+    add_options,
     add_set,
     add_system,
     read,
@@ -27,9 +26,10 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.observer import Observer
 from orchestrator.master.observers.progress import Progress
 from orchestrator.master.observers.table import Table
-from orchestrator.master.simulation import simulate
 from orchestrator.runs.folder import VIEW, replaced
 from orchestrator.runs.preparation import prepare
+from orchestrator.runs.request import Request
+from orchestrator.runs.run import Files
 from orchestrator.runs.stored import changed_files, read_record, read_result, table_in
 from orchestrator.system.names import PortName
 from orchestrator.vehicle.signals import CONTROL_POINT
@@ -64,7 +64,7 @@ def add_view(parser: argparse.ArgumentParser) -> None:
 def add_animate(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu animate`."""
     add_system(parser)
-    add_experiment(parser)
+    add_options(parser, Request, "strict", "stop_time", "step", "order", "kind")
     add_set(parser)
     parser.add_argument(
         "--fps",
@@ -79,7 +79,7 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
 
 def _add_file(parser: argparse.ArgumentParser, text: str, default: Path | None = None) -> None:
     parser.add_argument("--out", type=Path, metavar="FILE", default=default, help=text)
-    add_force(parser)
+    add_options(parser, Files, "force")
 
 
 def _plot(options: argparse.Namespace) -> int:
@@ -162,13 +162,7 @@ def _animate(options: argparse.Namespace) -> int:
     observers: list[Observer] = [seen, Progress(scenario.name)]
     title = scenario.title or scenario.name
     with _written(out, options.force) as file:
-        ending = simulate(
-            prepared.system,
-            prepared.experiment,
-            observers,
-            loop=prepared.loop,
-            hooks=prepared.hooks(),
-        )
+        ending = prepared.run(observers)
         if missing := seen.missing(*CONTROL_POINT):
             raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
         animate(title, seen, file, options.fps, scenario.z_up)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from orchestrator.commands.options import add_force, add_kind, add_out
+from orchestrator.commands.options import add_options, add_out
 from orchestrator.commands.streams import OK, show
 from orchestrator.paper.printed_table import write_table
 from orchestrator.paper.report import write_report
+from orchestrator.runs.request import Request
+from orchestrator.runs.run import Files
 from orchestrator.runs.scenario import names
 from orchestrator.studies.study import ready_studies
 
@@ -27,16 +29,16 @@ def add_report(parser: argparse.ArgumentParser) -> None:
         help="hold the printed table against every reading as well, and make the ready studies, "
         "or what is missing of them",
     )
-    add_kind(parser)
+    add_options(parser, Request, "kind")
     add_out(parser, Path("results", "report"))
-    add_force(parser)
+    add_options(parser, Files, "force")
     parser.set_defaults(action=_report)
 
 
 def add_table(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu table`."""
     add_out(parser, Path("results", "table"))
-    add_force(parser)
+    add_options(parser, Files, "force")
     parser.set_defaults(action=_table)
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from orchestrator.commands.options import add_force, add_out
+from orchestrator.commands.options import add_options, add_out
 from orchestrator.commands.streams import OK, show
 from orchestrator.exchange.reference import write_reference
 from orchestrator.paper.errata import errata_page
 from orchestrator.runs.bundle import current_fmus, run_fmus
 from orchestrator.runs.folder import replaced
+from orchestrator.runs.run import Files
 from orchestrator.runs.scenario_page import scenario_page
 from orchestrator.studies.ready_page import ready_page
 from orchestrator.studies.study_page import study_page
@@ -19,14 +20,14 @@ from orchestrator.studies.study_page import study_page
 def add_reference(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu reference`."""
     add_out(parser, Path("reference"))
-    add_force(parser)
+    add_options(parser, Files, "force")
     parser.set_defaults(action=_reference)
 
 
 def add_docs(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu docs`."""
     add_out(parser, Path("docs"))
-    add_force(parser)
+    add_options(parser, Files, "force")
     parser.set_defaults(action=_docs)
 
 

@@ -15,6 +15,7 @@ from fmpy.util import write_csv
 
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.files import CsvFile
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import completed
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import Component, read_component
@@ -72,7 +73,7 @@ def write_reference(dist: Path, folder: Path) -> list[Path]:
         written.append(_write_options(stem))
     written.append(folder / "auv_ref.csv")
     jacobi = Experiment(STOP_TIME, STEP, "jacobi")
-    completed(closed_loop(dist), jacobi, [CsvFile(written[-1])])
+    completed(planned(closed_loop(dist), jacobi), [CsvFile(written[-1])])
     written.append(_write_options(folder / "auv"))
     return written
 

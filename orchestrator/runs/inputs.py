@@ -55,11 +55,6 @@ class Inputs:
     between: str = _WAYS[0]
 
 
-def inputs_of(file: str | Path | None) -> Inputs | None:
-    """Inputs from a file, if one is named."""
-    return None if file is None else Inputs(Path(file))
-
-
 def read_inputs(
     inputs: Inputs, system: System, given: Collection[PortName]
 ) -> tuple[System, InputTable]:

@@ -19,7 +19,7 @@ from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import digest_of
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
-from orchestrator.master.schedule import stages
+from orchestrator.master.plan import stages
 from orchestrator.runs.bundle import PYTHON, current_fmus
 from orchestrator.studies.batch import tally
 from orchestrator.studies.batch.columns import COLUMNS

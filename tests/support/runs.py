@@ -14,8 +14,10 @@ from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.preparation import Prepared, Request, loaded, prepare
+from orchestrator.runs.preparation import Prepared, loaded, prepare
+from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.structure import System
@@ -31,7 +33,8 @@ def table_of(
 ) -> Table:
     """All rows of a run, however it ends."""
     table = Table()
-    simulate(system, experiment, [table], isolation, chosen(loop, experiment, isolation), hooks)
+    how = chosen(loop, experiment, isolation)
+    simulate(planned(system, experiment), [table], isolation, how, hooks)
     return table
 
 

@@ -17,6 +17,7 @@ import pytest
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.preparation import load, loaded
@@ -161,7 +162,7 @@ def test_rows_are_those_of_the_fmus():
     batch, _ = engines("fig5-pd")
     [system], table = systems("fig5-pd").values(), Table()
     changes = {port_name(name): value for name, value in run.parameters.items()}
-    simulate(system.with_parameters(changes), Experiment(1.01, 0.02), [table])
+    simulate(planned(system.with_parameters(changes), Experiment(1.01, 0.02)), [table])
     found = batch.table(run)
     assert np.array_equal(bits(found.group(*found.columns)), bits(table.group(*found.columns)))
     assert np.array_equal(found.time, table.time)

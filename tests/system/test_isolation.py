@@ -26,6 +26,7 @@ from orchestrator.master.loop import chosen
 from orchestrator.master.observers.files import read_rows
 from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
@@ -79,7 +80,7 @@ def left_over(mark: str) -> list[Path]:
 
 def run_isolated(system: System, timeout: float = 20.0, stop_time: float = 0.5) -> Table:
     table = Table()
-    simulate(system, Experiment(stop_time, STEP), [table], Isolation(timeout))
+    simulate(planned(system, Experiment(stop_time, STEP)), [table], Isolation(timeout))
     return table
 
 
@@ -93,7 +94,7 @@ def test_rows_are_those_of_a_run_in_one_process(dist: Path, order: str):
     system = closed_loop(dist)
     here, there = Table(), Table()
     for table, isolation in ((here, None), (there, Isolation())):
-        simulate(system, Experiment(3.0, 0.03, order), [table], isolation)
+        simulate(planned(system, Experiment(3.0, 0.03, order)), [table], isolation)
     assert here.header == there.header
     assert here.rows.tobytes() == there.rows.tobytes()
     assert there.failure is None
@@ -159,7 +160,7 @@ def test_an_isolated_fmu_that_fails_while_it_is_instantiated(
 def test_an_fmu_that_cannot_be_instantiated_is_bad_input(c_fmu, monkeypatch, isolation):
     monkeypatch.setenv("FOREIGN_INSTANTIATE", "refuses")
     with pytest.raises(InputError, match=r"bad: foreign\.fmu cannot be") as error:
-        simulate(foreign_system(c_fmu), Experiment(0.5, STEP), (), isolation)
+        simulate(planned(foreign_system(c_fmu), Experiment(0.5, STEP)), (), isolation)
     assert not isinstance(error.value, StartError)
 
 
@@ -194,12 +195,12 @@ def test_an_isolated_fmu_that_fails_at_the_end_loses_nothing(c_fmu, mark, phase,
 def test_a_value_that_is_not_finite_is_named_with_its_time(c_fmu, act, value, isolation, loop):
     table, experiment = Table(), Experiment(0.5, STEP)
     steps = chosen(loop, experiment, isolation)
-    simulate(foreign_system(c_fmu, act), experiment, [table], isolation, steps)
+    simulate(planned(foreign_system(c_fmu, act), experiment), [table], isolation, steps)
     assert table.failure == f"stopped at t = 0.12 s: bad.y is {value}"
     assert rows_until(table, 0.1)
     assert np.isfinite(table.rows).all()
     with pytest.raises(StartError, match=f"stopped at t = 0 s: bad.y is {value}"):
-        simulate(foreign_system(c_fmu, act, "ENTER"), Experiment(0.5, STEP), (), isolation)
+        simulate(planned(foreign_system(c_fmu, act, "ENTER"), Experiment(0.5, STEP)), (), isolation)
 
 
 def test_a_flood_of_output_and_messages_is_kept_within_bounds(c_fmu, capfd):
@@ -233,7 +234,7 @@ def test_nobody_hangs_where_the_keeper_is_killed(c_fmu: Path, mark: str):
                     os.kill(int(process.name), signal.SIGKILL)
 
     table = Kills()
-    simulate(foreign_system(c_fmu), Experiment(50.0, STEP), [table], Isolation(20.0))
+    simulate(planned(foreign_system(c_fmu), Experiment(50.0, STEP)), [table], Isolation(20.0))
     assert table.failure is not None
     assert "its process was ended by SIGKILL" in table.failure
     assert left_over(mark) == []
@@ -271,7 +272,7 @@ def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path, loop: s
     thread = threading.Thread(target=simulate, args=(system, experiment, [table], None, steps))
     thread.start()
     begun.wait()
-    assert len(simulate(talkative, Experiment(STEP, STEP), loop=steps).messages) == 101
+    assert len(simulate(planned(talkative, Experiment(STEP, STEP)), loop=steps).messages) == 101
     gc.collect()
     go_on.set()
     thread.join()
@@ -418,7 +419,10 @@ def test_an_fmu_finds_the_current_folder_that_it_has_left(workplace, loop):
     act = "(current_time < 0.13 and os.chdir('/')) or (os.getcwd() == '/') or 1 / 0"
     system = System("slave", {"a": read_component("a", build_slave(workplace, act))}, ())
     experiment, table = Experiment(0.02 * 2000, STEP), Table()
-    assert simulate(system, experiment, [table], loop=chosen(loop, experiment)).failure is None
+    assert (
+        simulate(planned(system, experiment), [table], loop=chosen(loop, experiment)).failure
+        is None
+    )
     assert len(table) == 2001
     assert Path.cwd() == workplace
 

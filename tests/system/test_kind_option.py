@@ -17,8 +17,8 @@ from fmpy.validation import validate_fmu
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.paper.report import write_report
-from orchestrator.paper.variations import Variation
 from orchestrator.runs import bundle
+from orchestrator.runs.request import Request
 from support.instances import NAMES
 from support.machine import contents
 
@@ -191,7 +191,7 @@ def test_container_takes_fmus_of_either_version(workplace: Path):
 
 @pytest.mark.slow
 def test_report_is_made_of_runs_of_the_kind(tmp_path: Path):
-    assert Variation("fig4", kind="native").label == "fig4 --kind native"
+    assert Request("fig4", kind="native").command_line == "fig4 --kind native"
     write_report(tmp_path, ["fig4"], ["auv-fmu", "report"], stop_time=0.1, kind="native")
     runs = json.loads((tmp_path / "run.json").read_text())["runs"]
     assert runs

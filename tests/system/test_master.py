@@ -22,7 +22,7 @@ from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.machine.archives import check_place, unpacked
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.files import read_columns, read_rows
-from orchestrator.master.schedule import stages
+from orchestrator.master.plan import stages
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System

@@ -15,10 +15,11 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment, decimations
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.observers.table import Table
-from orchestrator.master.schedule import delays, stages
+from orchestrator.master.plan import delays, planned, stages
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.bundle import NATIVE
-from orchestrator.runs.preparation import Request, load, prepare
+from orchestrator.runs.preparation import load, prepare
+from orchestrator.runs.request import Request
 from orchestrator.runs.result import simulate as simulated
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.graph import delayed
@@ -49,7 +50,7 @@ def ring(folder: Path, declares: bool = True, gain: float = 0.5, **others: objec
 @pytest.mark.parametrize("declares", [True, False])
 def test_a_ring_is_opened_before_its_first_component_and_one_line_says_so(folder, declares):
     system, table = ring(folder, declares), Table()
-    ending = simulate(system, Experiment(3 * H, H, coupling="delay"), [table])
+    ending = simulate(planned(system, Experiment(3 * H, H, coupling="delay")), [table])
     line = "a takes c.g one step late: direct feedthroughs form a ring"
     assert ending.messages == (line, *(f"{name}: initialises" for name in "abc"))
     assert stages(system, "gauss-seidel") == [["a"], ["b"], ["c"]]
@@ -205,5 +206,7 @@ def test_a_scenario_may_state_order_and_steps(workplace):
 
 @pytest.mark.parametrize("isolation", [None, Isolation(20.0)])
 def test_no_step_is_logged(folder, isolation):
-    ending = simulate(system_of({"a": relay(folder)}), Experiment(10 * H, H), (), isolation)
+    ending = simulate(
+        planned(system_of({"a": relay(folder)}), Experiment(10 * H, H)), (), isolation
+    )
     assert ending.messages == ("a: initialises",)

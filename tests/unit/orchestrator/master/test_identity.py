@@ -21,7 +21,8 @@ from orchestrator.master.hooks.events import Event, Stop
 from orchestrator.master.hooks.playback import InputTable
 from orchestrator.master.identity import digest_of
 from orchestrator.master.loop import chosen
-from orchestrator.runs.preparation import Prepared, Request
+from orchestrator.runs.preparation import Prepared
+from orchestrator.runs.request import Request
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.units import Linear

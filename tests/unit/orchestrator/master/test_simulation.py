@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -11,8 +9,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import completed, simulate
-from orchestrator.system.component import Component
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 from support.linear import SINE, Part, linear, system_of
@@ -49,7 +47,7 @@ class Watching:
 
 def test_rows_are_those_of_the_solution_from_the_start_to_the_end(system: System):
     table = Table()
-    ending = simulate(system, EXPERIMENT, [table])
+    ending = simulate(planned(system, EXPERIMENT), [table])
     assert (ending.failure, ending.messages, len(table)) == (None, (), 9)
     np.testing.assert_array_equal(table.time, 0.125 * np.arange(9))
     np.testing.assert_allclose(table["sine.y0"], np.sin(table.time), atol=1e-12)
@@ -59,7 +57,7 @@ def test_rows_are_those_of_the_solution_from_the_start_to_the_end(system: System
 
 def test_observers_are_told_header_rows_and_end(system: System):
     told: list[object] = []
-    ending = simulate(system, EXPERIMENT, [Watching(told)])
+    ending = simulate(planned(system, EXPERIMENT), [Watching(told)])
     header, *blocks, last = told
     assert header.parameters[port_name("sine.x1")] == 1.0
     assert header.experiment == EXPERIMENT
@@ -70,7 +68,7 @@ def test_observers_are_told_header_rows_and_end(system: System):
 def test_an_observer_that_fails_keeps_no_other_from_its_end(system: System):
     told: list[object] = []
     with pytest.raises(ValueError, match="no room"):
-        simulate(system, EXPERIMENT, [Watching(told), Watching([], fails=True)])
+        simulate(planned(system, EXPERIMENT), [Watching(told), Watching([], fails=True)])
     header, ending = told
     assert isinstance(header, Header) and mentions(ending.failure, "no room")
 
@@ -78,29 +76,8 @@ def test_an_observer_that_fails_keeps_no_other_from_its_end(system: System):
 def test_a_value_that_is_not_finite_ends_the_run_before_its_row(system: System):
     table = Table()
     grows = system.with_parameters({port_name("sine.A00"): 1e308, port_name("sine.x0"): 1.0})
-    ending = simulate(grows, EXPERIMENT, [table])
+    ending = simulate(planned(grows, EXPERIMENT), [table])
     assert mentions(ending.failure, "0.125 sine.y0")
     assert len(table) == 1
     with pytest.raises(InputError, match="sine"):
-        completed(grows, EXPERIMENT)
-
-
-def test_nothing_is_stepped_of_what_cannot_be_run(system: System):
-    told: list[object] = []
-    for wrong, experiment, word in (
-        (system, replace(EXPERIMENT, order=("sine",)), "double"),
-        (replace(system, steps={"sine": 0.2}), EXPERIMENT, "sine"),
-    ):
-        with pytest.raises(InputError, match=word):
-            simulate(wrong, experiment, [Watching(told)])
-    assert told == []
-
-
-def test_an_fmu_of_one_step_length_ends_with_its_last_whole_step(system: System, monkeypatch):
-    monkeypatch.setattr(Component, "takes_any_step", False)
-    table = Table()
-    ending = simulate(system, Experiment(1.05, 0.125), [table])
-    assert table.time[-1] == 1.0
-    assert mentions(" ".join(ending.messages), "double, sine 1 s")
-    with pytest.raises(InputError, match=r"0\.125 s"):
-        simulate(system, Experiment(0.1, 0.125))
+        completed(planned(grows, EXPERIMENT))

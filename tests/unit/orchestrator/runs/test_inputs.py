@@ -7,7 +7,8 @@ import pytest
 
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.inputs import Inputs, read_inputs
-from orchestrator.runs.preparation import Request, load, loaded, prepare
+from orchestrator.runs.preparation import load, loaded, prepare
+from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.system.names import port_name
 
@@ -79,7 +80,7 @@ def test_a_value_beside_the_table_is_refused(tmp_path):
     with pytest.raises(InputError, match="beside the table"):
         read(tmp_path, "time,plant.tau.u\n0,1\n", given=[U])
     # On the command line it wins over what the scenario has.
-    inputs = Inputs(tmp_path / "inputs.csv")
+    inputs = tmp_path / "inputs.csv"
     prepared = prepare(*loaded("fig3a", "native"), Request(kind="native", inputs=inputs))
     assert prepared.system.parameters[U] == 1.0
     assert np.array_equal(prepared.input_table.values, [[1.0]])

@@ -10,13 +10,13 @@ import pytest
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.preparation import (
     DEFAULT_STEP,
-    Request,
     check_brings_its_own,
     is_path,
     left_behind,
     prepare,
     read_fmu,
 )
+from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName, port_name
@@ -100,7 +100,6 @@ def test_a_run_is_another_one_where_its_rows_could_be_others(system):
     whole = prepare(scenario, system, Request())
     assert whole.identity == prepare(scenario, system, Request(loop="python")).identity
     assert whole.identity != prepare(scenario, system, Request(parameters={K: 2.0})).identity
-    assert whole.hooks() == []
 
 
 def test_one_fmu_is_a_system_of_itself(path: Path):

@@ -10,6 +10,7 @@ import pytest
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.observer import Ending, Header
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.preparation import loaded
 from orchestrator.studies.engine import INDICES
@@ -99,6 +100,6 @@ def test_what_is_never_reached_is_not_there():
 def test_closed_loop_has_all_of_them():
     _, system = loaded("fig4", "native")
     experiment, observer = Experiment(4.0, 0.02), Indices()
-    simulate(system, experiment, [observer], loop=chosen("auto", experiment))
+    simulate(planned(system, experiment), [observer], loop=chosen("auto", experiment))
     found = observer.values().keys()
     assert set(INDICES) - {"time_to_reach"} <= found <= set(INDICES)

@@ -12,6 +12,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.hooks.checkpoint import Checkpoints, check_gives_states, interval_in
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.system.structure import System
 from support.linear import SINE, Part, linear, system_of
@@ -29,7 +30,8 @@ def parts(folder: Path, **how: bool) -> System:
 def run(system: System, stop_time: float, *checkpoints: Checkpoints) -> Table:
     table = Table()
     # They come first: what others are told, they can tell again.
-    simulate(system, Experiment(stop_time, STEP), [*checkpoints, table], hooks=checkpoints)
+    plan = planned(system, Experiment(stop_time, STEP))
+    simulate(plan, [*checkpoints, table], hooks=checkpoints)
     return table
 
 

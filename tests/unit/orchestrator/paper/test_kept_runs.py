@@ -12,8 +12,9 @@ from orchestrator.machine.errors import InputError
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
 from orchestrator.paper.kept_runs import KeptRuns, key_of
-from orchestrator.paper.variations import Variation
-from orchestrator.runs.preparation import with_companion
+from orchestrator.paper.sections import companions
+from orchestrator.runs.preparation import prepared_of, with_companion
+from orchestrator.runs.request import Request
 
 
 class InThisProcess:
@@ -28,35 +29,35 @@ class InThisProcess:
             yield key, task()
 
 
-QUIET = Variation("fig4", {"plant.noise.std": 0.0})
+QUIET = Request("fig4", {"plant.noise.std": 0.0})
 
 
 @pytest.mark.parametrize(
     ("run", "label"),
     [
-        (Variation("fig4"), "fig4"),
+        (Request("fig4"), "fig4"),
         (QUIET, "fig4 --set plant.noise.std=0"),
-        (Variation("fig5", {"controller.printed_jacobian": True}),
+        (Request("fig5", {"controller.printed_jacobian": True}),
          "fig5 --set controller.printed_jacobian=true"),
-        (Variation("fig4", {"plant.noise.std": 1.23456789e-05}),
+        (Request("fig4", {"plant.noise.std": 1.23456789e-05}),
          "fig4 --set plant.noise.std=1.23456789e-05"),
-        (Variation("my file.toml", order="jacobi", stop_time=2.5, step=0.01),
+        (Request("my file.toml", order="jacobi", stop_time=2.5, step=0.01),
          "'my file.toml' --stop-time 2.5 --step 0.01 --order jacobi"),
     ],
 )  # fmt: skip
 def test_label_is_what_the_user_types(run, label):
-    assert run.label == label
+    assert run.command_line == label
 
 
 def test_a_companion_that_changes_nothing_is_the_scenario_itself():
-    assert Variation("fig5").companions() == [Variation("fig5-pd")]
-    assert Variation("fig4").companions() == []
+    assert companions(Request("fig5")) == [Request("fig5-pd")]
+    assert companions(Request("fig4")) == []
 
 
 def test_what_is_set_goes_for_the_companion_too():
-    [companion] = Variation("fig5", {"controller.eps_t": 1.0, "controller.k_d": 40.0}).companions()
-    assert companion == Variation("fig5-pd", {"controller.eps_t": 1.0})
-    assert Variation("fig5", order="jacobi").companions() == [Variation("fig5-pd", order="jacobi")]
+    [companion] = companions(Request("fig5", {"controller.eps_t": 1.0, "controller.k_d": 40.0}))
+    assert companion == Request("fig5-pd", {"controller.eps_t": 1.0})
+    assert companions(Request("fig5", order="jacobi")) == [Request("fig5-pd", order="jacobi")]
 
 
 def test_a_scenario_and_its_companion_are_run_as_it_says(tmp_path):
@@ -64,14 +65,14 @@ def test_a_scenario_and_its_companion_are_run_as_it_says(tmp_path):
     own.write_text(
         'compare = "fig5-pd"\norder = "jacobi"\nstop_time = 1.0\n[steps]\ncontroller = 0.2\n'
     )
-    run = Variation(str(own))
-    [companion] = run.companions()
-    for one in (run.prepared(), companion.prepared()):
+    run = Request(str(own))
+    [companion] = companions(run)
+    for one in (prepared_of(run), prepared_of(companion)):
         assert one.experiment.order == "jacobi"
         assert one.system.steps == {"controller": 0.2}
-    [as_one] = with_companion(run.prepared(), run.request)[1:]
-    assert companion.prepared().identity == as_one.identity
-    assert companion.label == (
+    [as_one] = with_companion(prepared_of(run), run)[1:]
+    assert prepared_of(companion).identity == as_one.identity
+    assert companion.command_line == (
         "fig5-pd --stop-time 1 --order jacobi --set planner.eta0.z=-2 (steps: controller = 0.2 s)"
     )
 
@@ -81,23 +82,23 @@ def test_keys_tell_what_is_run_and_not_how_it_is_called(tmp_path):
     copy.write_text('title = "Another"\nstop_time = 100.0\n')
     slow = tmp_path / "slow.toml"
     slow.write_text("stop_time = 100.0\n[steps]\ncontroller = 0.2\n")
-    key = key_of(Variation("fig4").prepared())
-    assert key_of(Variation("fig4", {"plant.noise.std": 0.001}).prepared()) == key
-    assert key_of(Variation(str(copy), {"plant.noise.std": 0.001}).prepared()) == key
+    key = key_of(prepared_of(Request("fig4")))
+    assert key_of(prepared_of(Request("fig4", {"plant.noise.std": 0.001}))) == key
+    assert key_of(prepared_of(Request(str(copy), {"plant.noise.std": 0.001}))) == key
     others = [
         QUIET,
-        Variation("fig4", order="jacobi"),
-        Variation("fig4", stop_time=50.0),
-        Variation("fig4", step=0.01),
-        Variation("fig5"),
-        Variation("fig5-pd"),
-        Variation(str(slow)),
+        Request("fig4", order="jacobi"),
+        Request("fig4", stop_time=50.0),
+        Request("fig4", step=0.01),
+        Request("fig5"),
+        Request("fig5-pd"),
+        Request(str(slow)),
     ]
-    assert len({key, *(key_of(run.prepared()) for run in others)}) == 1 + len(others)
+    assert len({key, *(key_of(prepared_of(run)) for run in others)}) == 1 + len(others)
 
 
 def test_equal_runs_are_made_once_and_used_again(tmp_path):
-    runs = [QUIET, Variation("fig4", {"plant.noise.std": 0.001}), Variation("fig4"), QUIET]
+    runs = [QUIET, Request("fig4", {"plant.noise.std": 0.001}), Request("fig4"), QUIET]
     first, crew = KeptRuns(tmp_path / "runs", stop_time=0.1), InThisProcess()
     first.make(runs, crew)
     assert len(crew.done) == 2
@@ -144,7 +145,7 @@ def test_what_no_run_needs_is_forgotten(tmp_path):
 
 
 def test_a_run_that_cannot_be_made_says_why(tmp_path):
-    broken = Variation("fig4", {"plant.noise.sdt": 0.0})
+    broken = Request("fig4", {"plant.noise.sdt": 0.0})
     outcomes, crew = KeptRuns(tmp_path), InThisProcess()
     outcomes.make([broken], crew)
     assert crew.done == []
@@ -155,4 +156,4 @@ def test_a_run_that_cannot_be_made_says_why(tmp_path):
 
 def test_every_run_of_claims_and_effects_can_be_made():
     for run in {run for each in (*CLAIMS, *EFFECTS) for run in each.runs}:
-        run.prepared()
+        prepared_of(run)
