@@ -29,6 +29,7 @@ from typing import Any
 
 import fmpy
 
+from fmus.kinds import NATIVE
 from orchestrator.formats.osp import write_osp
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import write_ssp
@@ -37,7 +38,6 @@ from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
 from orchestrator.runs import bundle
-from orchestrator.runs.bundle import NATIVE
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario

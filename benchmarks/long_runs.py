@@ -21,6 +21,7 @@ from typing import Any
 from memory import resident
 
 from auv_fmu.euler import STEP
+from fmus.kinds import KINDS, NATIVE
 from orchestrator import load
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.master.experiment import Experiment
@@ -32,7 +33,6 @@ from orchestrator.master.observers.observer import Observer
 from orchestrator.master.observers.selection import Selection
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.bundle import KINDS, NATIVE
 from orchestrator.vehicle.certificates import CertificatesFile
 from orchestrator.vehicle.metrics import Metrics
 

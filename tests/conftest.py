@@ -14,6 +14,7 @@ import pytest
 from hypothesis import Phase, settings
 from platformdirs import user_cache_path
 
+from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
 from orchestrator.machine.locks import claimed
 from orchestrator.runs import bundle
 
@@ -109,7 +110,7 @@ def _copy(fmus: Path, module: str, folder: Path, *options: str) -> None:
     shutil.copytree(fmus, folder, dirs_exist_ok=True)
 
 
-def _built(shared: Path, kind: str, fmi: str = bundle.FMI[0]) -> Path:
+def _built(shared: Path, kind: str, fmi: str = FMI_VERSIONS[0]) -> Path:
     """Make a bundle of the FMUs that runs take, unless another worker has done so."""
     folder = shared / f"{kind}{fmi}"
     with claimed(shared, wait=True), pytest.MonkeyPatch.context() as patch:
@@ -123,19 +124,19 @@ def _built(shared: Path, kind: str, fmi: str = bundle.FMI[0]) -> Path:
 @pytest.fixture(scope="session")
 def dist(shared: Path) -> Path:
     """A folder with the built bundle, to be read only."""
-    return _built(shared, bundle.PYTHON)
+    return _built(shared, PYTHON)
 
 
 @pytest.fixture(scope="session")
 def native(shared: Path) -> Path:
     """A folder with the FMUs in C, to be read only."""
-    return _built(shared, bundle.NATIVE)
+    return _built(shared, NATIVE)
 
 
 @pytest.fixture(scope="session")
 def dist3(shared: Path) -> Path:
     """A folder with the FMUs in C of FMI 3.0, to be read only."""
-    return _built(shared, bundle.NATIVE, "3")
+    return _built(shared, NATIVE, "3")
 
 
 @pytest.fixture

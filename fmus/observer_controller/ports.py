@@ -9,6 +9,7 @@ from fmus.ports.controllers import (
     EPS_T,
     GAMMA,
     INPUTS,
+    MEASURED_ANGLES,
     PRINTED_JACOBIAN,
     SIGMA,
     THETA_0,
@@ -67,6 +68,8 @@ PARAMETERS = ParameterSet(
     ),
     form=_OBSERVER,
 )
+
+GROUP_OF = MEASURED_ANGLES
 
 PORTS: tuple[Port, ...] = (
     *INPUTS,

@@ -7,6 +7,7 @@ module                   what it states
 :mod:`.quantities`       what passes through groups of ports: members and their units
 :mod:`.port`             one port: its declaration and what values it takes
 :mod:`.groups`           flat values of ports from groups, and groups from flat values
+:mod:`.behaviour`        what a component's behaviour may say: the hooks of both kinds
 :mod:`.vehicle`          parameters of (2)
 :mod:`.controllers`      what the controllers have in common
 :mod:`.planners`         what the planners have in common

@@ -7,6 +7,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
+from fmus.kinds import NATIVE, PYTHON
 from orchestrator.commands.options import (
     add_fmi,
     add_options,
@@ -17,7 +18,7 @@ from orchestrator.commands.options import (
 from orchestrator.commands.streams import OK, show
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
-from orchestrator.runs.bundle import DEFAULT_FOLDERS, NATIVE, PYTHON
+from orchestrator.runs.bundle import DEFAULT_FOLDERS
 from orchestrator.runs.own_controller import BASES, build_own, new_controller
 from orchestrator.runs.request import Request
 from orchestrator.runs.run import Files

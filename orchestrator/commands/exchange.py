@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from fmus.kinds import PYTHON
 from orchestrator.commands.options import (
     add_fmi,
     add_options,
@@ -25,7 +26,6 @@ from orchestrator.formats.osp import write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, order_of
-from orchestrator.runs.bundle import PYTHON
 from orchestrator.runs.folder import replaced
 from orchestrator.runs.preparation import (
     DEFAULT_STEP,

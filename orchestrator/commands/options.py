@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from fmus.kinds import FMI_VERSIONS, NATIVE
 from orchestrator.commands.streams import FAILED, OK, say
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.master.observers.observer import Ending
-from orchestrator.runs.bundle import FMI, NATIVE
 from orchestrator.runs.preparation import loaded
 from orchestrator.runs.request import Request, flag, options_of
 from orchestrator.runs.scenario import Scenario
@@ -64,9 +64,9 @@ def add_fmi(parser: argparse.ArgumentParser) -> None:
     """Which version of FMI."""
     parser.add_argument(
         "--fmi",
-        choices=FMI,
-        default=FMI[0],
-        help=f"version of the FMUs; 3 needs --kind {NATIVE}; default: {FMI[0]}",
+        choices=FMI_VERSIONS,
+        default=FMI_VERSIONS[0],
+        help=f"version of the FMUs; 3 needs --kind {NATIVE}; default: {FMI_VERSIONS[0]}",
     )
 
 
@@ -92,7 +92,7 @@ def add_out(parser: argparse.ArgumentParser, default: Path | None, otherwise: st
     )
 
 
-def read(options: argparse.Namespace, fmi: str = FMI[0]) -> tuple[Scenario, System]:
+def read(options: argparse.Namespace, fmi: str = FMI_VERSIONS[0]) -> tuple[Scenario, System]:
     """What is run; what is not as it should be, and does no harm, becomes a warning."""
     findings = Findings(options.strict)
     found = loaded(options.scenario, options.kind, fmi, options.variant, findings)

@@ -47,7 +47,7 @@ def _docs(options: argparse.Namespace) -> int:
         "paper.md": errata_page(),
     }
     with replaced(options.out, pages, force=options.force) as unfinished:
-        written = run_fmus("packaging.documentation", unfinished / "components")
+        written = run_fmus("documentation", unfinished / "components")
         for name, text in pages.items():
             (unfinished / name).write_text(text, encoding="utf-8")
     for path in (*written, *(unfinished / name for name in pages)):

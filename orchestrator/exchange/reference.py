@@ -60,22 +60,25 @@ def write_reference(dist: Path, folder: Path) -> list[Path]:
         The files written.
 
     """
-    written = []
-    for fmu in sorted(dist.glob("*.fmu")):
-        component = read_component(fmu.stem, fmu)
-        stem = folder / component.fmu.stem
-        inputs = reference_inputs(component)
-        tables = {"_in": inputs, "_ref": reference_outputs(component, inputs)}
-        for suffix, table in tables.items():
-            if len(table.dtype.names or ()) > 1:
-                written.append(stem.with_name(f"{stem.name}{suffix}.csv"))
-                write_csv(written[-1], table)
-        written.append(_write_options(stem))
+    fmus = sorted(dist.glob("*.fmu"))
+    written = [path for fmu in fmus for path in write_component_reference(fmu, folder)]
     written.append(folder / "auv_ref.csv")
     jacobi = Experiment(STOP_TIME, STEP, "jacobi")
     completed(planned(closed_loop(dist), jacobi), [CsvFile(written[-1])])
     written.append(_write_options(folder / "auv"))
     return written
+
+
+def write_component_reference(fmu: Path, folder: Path) -> list[Path]:
+    """Write the reference results of one FMU, and return the files written."""
+    component = read_component(fmu.stem, fmu)
+    inputs = reference_inputs(component)
+    written = []
+    for suffix, table in (("in", inputs), ("ref", reference_outputs(component, inputs))):
+        if len(table.dtype.names or ()) > 1:
+            written.append(folder / f"{fmu.stem}_{suffix}.csv")
+            write_csv(written[-1], table)
+    return [*written, _write_options(folder / fmu.stem)]
 
 
 def _write_options(stem: Path) -> Path:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from fmus.kinds import PYTHON
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.ledger import Ledger
@@ -19,7 +20,6 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.identity import code_of, digest_of
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.master.observers.table import Table
-from orchestrator.runs.bundle import PYTHON
 from orchestrator.runs.folder import opened
 from orchestrator.runs.preparation import Prepared, prepared_of
 from orchestrator.runs.request import Request

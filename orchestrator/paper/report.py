@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from fmus.kinds import PYTHON
 from orchestrator.machine.ledger import RECORD
 from orchestrator.machine.workers import Workers, workers
 from orchestrator.paper import errata, printed_table, readings
@@ -26,7 +27,7 @@ from orchestrator.paper.sections import (
     written,
 )
 from orchestrator.paper.variants import all_variants
-from orchestrator.runs.bundle import PYTHON, current_fmus
+from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.folder import inner, replaced
 from orchestrator.runs.record import PACKAGES, Stopwatch, write_files
 from orchestrator.runs.wiring import closed_loop

@@ -10,11 +10,11 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
+from fmus.kinds import PYTHON
 from orchestrator.figures import FIGURES, Drawn, draw
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.paper.kept_runs import KeptRun, KeptRuns
 from orchestrator.paper.page import actuator_values, numbers, picture, plain, table
-from orchestrator.runs.bundle import PYTHON
 from orchestrator.runs.folder import inner
 from orchestrator.runs.preparation import Prepared, prepared_of, with_companion
 from orchestrator.runs.request import Request

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from auv_fmu.euler import STEP
+from fmus.kinds import FMI_VERSIONS, PYTHON
 from orchestrator.figures import check_figure
 from orchestrator.formats.examination import open_inputs
 from orchestrator.formats.osp import STRUCTURE as OSP
@@ -37,7 +38,7 @@ from orchestrator.master.loop import PYTHON_LOOP, Loop, chosen
 from orchestrator.master.observers.observer import Ending, Observer
 from orchestrator.master.plan import Plan, planned
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.bundle import FMI, PYTHON, current_fmus
+from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.inputs import Inputs, read_inputs
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario, names, read_scenario
@@ -171,7 +172,7 @@ def warned(strict: bool = False) -> Iterator[Findings]:
 def loaded(
     name: str,
     kind: str = PYTHON,
-    fmi: str = FMI[0],
+    fmi: str = FMI_VERSIONS[0],
     variant: str | None = None,
     findings: Findings | None = None,
 ) -> tuple[Scenario, System]:
@@ -201,7 +202,7 @@ def loaded(
         return Scenario(named.stem, title=path.name or named.name), system
     scenario = read_scenario(name)
     check_figure(scenario.figure)
-    versions = RUNNABLE if fmi == FMI[0] else WRITABLE
+    versions = RUNNABLE if fmi == FMI_VERSIONS[0] else WRITABLE
     return scenario, closed_loop(current_fmus(kind, fmi), scenario, versions)
 
 
@@ -252,14 +253,14 @@ def left_behind(scenario: Scenario) -> str | None:
     return f"{scenario.name}: the system comes without the scenario's {names}" if names else None
 
 
-def check_brings_its_own(name: str, kind: str, fmi: str = FMI[0]) -> None:
+def check_brings_its_own(name: str, kind: str, fmi: str = FMI_VERSIONS[0]) -> None:
     """Check that no other FMUs are asked for than those that a system comes with.
 
     Raises:
         InputError: it would not have any effect.
 
     """
-    if (kind, fmi) != (PYTHON, FMI[0]):
+    if (kind, fmi) != (PYTHON, FMI_VERSIONS[0]):
         raise InputError(f"{name}: comes with its FMUs; kind and fmi are for the bundle's own")
 
 

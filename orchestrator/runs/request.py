@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
+from fmus.kinds import KINDS, PYTHON
 from orchestrator.master.experiment import COUPLINGS, ORDERS, Order, order_of, written_order
 from orchestrator.master.fmi.isolated import STEP_TIMEOUT
 from orchestrator.master.loop import LOOPS
-from orchestrator.runs.bundle import KINDS, PYTHON
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.values import literal
 

@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fmus.kinds import PYTHON
 from orchestrator.figures.plot import plot
 from orchestrator.machine.errors import InputError, did_you_mean, reason
 from orchestrator.machine.ledger import RECORD
@@ -21,7 +22,6 @@ from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Observer, Occurrence
 from orchestrator.master.observers.progress import Progress
 from orchestrator.master.observers.table import Table
-from orchestrator.runs.bundle import PYTHON
 from orchestrator.runs.folder import locked, replaced
 from orchestrator.runs.preparation import (
     Prepared,

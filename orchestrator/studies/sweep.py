@@ -15,12 +15,12 @@ from typing import Annotated, Any
 
 from tqdm import tqdm
 
+from fmus.kinds import PYTHON
 from orchestrator.machine.compiler import machines_compiler
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import PACKAGES, digest_of
 from orchestrator.master.loop import LOOPS
-from orchestrator.runs.bundle import PYTHON
 from orchestrator.runs.preparation import Prepared, loaded
 from orchestrator.runs.request import CliOption, Force, Kind, LoopName
 from orchestrator.runs.scenario import Scenario

@@ -26,9 +26,9 @@ from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.structure import System
 from support.cells import has_call
 from support.fmi3 import Fmi3Library, Logger, trials
-from support.instances import NAMES, REPRESENTATIVES
 from support.kinds import outcome
 from support.raw import Host, Status, instance
+from support.settings import NAMES, REPRESENTATIVES
 from support.status_table import creations, fmi3_rows, names_in_fmi3, rows
 from support.trials import CREATIONS
 from support.worker import Lost, Worker

@@ -11,10 +11,10 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.packaging.loader import FLAGS, FOLDER, compiler
-from fmus.packaging.own import build_own
+from fmus.python.loader import FLAGS, FOLDER, compiler
+from fmus.python.own import build_own
 from orchestrator.runs import bundle
-from support.instances import NAMES
+from support.settings import NAMES
 from support.tiers import slow
 
 LIBPYTHON = Path(
@@ -86,7 +86,7 @@ def with_libpython(tmp_path: Path) -> Path:
 def test_all_fmus_run_side_by_side_in_a_c_host(dist: Path, tmp_path: Path, with_libpython: Path):
     """1,000 steps each, state saved, serialised and restored bit for bit, all freed, status 0."""
     process = run(with_libpython, *unpacked(dist, tmp_path))
-    assert process.stdout.endswith("6 FMUs, 1000 steps each\n")
+    assert process.stdout.endswith(f"{len(NAMES)} FMUs, 1000 steps each\n")
     assert process.returncode == 0, process.stderr
 
 

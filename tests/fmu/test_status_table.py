@@ -14,8 +14,8 @@ import pytest
 from orchestrator.runs import bundle
 from support.calls import CASES, MODEL_EXCHANGE_FUNCTIONS
 from support.cells import has_call
-from support.instances import NAMES, REPRESENTATIVES
 from support.kinds import FIXTURES
+from support.settings import NAMES, REPRESENTATIVES
 from support.status_table import (
     CREATION,
     ERROR,

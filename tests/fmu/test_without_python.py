@@ -15,8 +15,8 @@ import fmpy
 import numpy as np
 import pytest
 
-from fmus.packaging.compilers import FLAGS
-from fmus.packaging.platforms import TARGETS
+from fmus.compilers import FLAGS
+from fmus.kinds import TARGETS
 from orchestrator.exchange import c_host
 from orchestrator.exchange.verify import verify
 from orchestrator.machine.compiler import machines_compiler
@@ -24,8 +24,8 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.runs import bundle
 from orchestrator.system.component import Component
 from orchestrator.system.structure import System
-from support.instances import NAMES
 from support.runs import run, system_of
+from support.settings import NAMES
 
 #: Both controllers, so that all FMUs of the paper are run.
 SCENARIOS = ("fig4", "fig5-pd")

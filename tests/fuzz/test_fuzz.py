@@ -20,10 +20,10 @@ from fuzz.reachable import faults, without_checksum
 from fuzz.sequences import Finding, Fuzzer, unpacked
 from support import states
 from support.calls import CASES, Call, Draw, Item
-from support.instances import EACH, NAMES, REPRESENTATIVES
 from support.native_states import Unwritable
 from support.raw import Description, Library, Variable, instance
 from support.sanitizers import GCC, compiled, sanitize, sanitizers
+from support.settings import EACH, NAMES, REPRESENTATIVES
 from support.tiers import slow
 from support.worker import Lost, Worker
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
@@ -12,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.packaging.discovery import components
+from fmus.discovery import components, ports_of
 
 ROOT = Path(__file__).parents[2]
 
@@ -22,7 +23,10 @@ FLOORS = {
         "machine", "system", "formats", "master", "vehicle", "figures", "runs", "exchange",
         "studies", "paper", "commands",
     ),
-    "fmus": ("ports", "slave", "native", "components", "packaging"),
+    "fmus": (
+        "ports", "components", "kinds", "archive", "discovery", "documentation", "compilers",
+        "python", "native", "build",
+    ),
 }  # fmt: skip
 
 #: What a package may import besides itself and the standard library.
@@ -30,10 +34,14 @@ ALLOWED = {
     "auv_fmu": set(),
     "fmus": {"auv_fmu", "markdown_it", "pythonfmu"},
     "orchestrator": {
-        "auv_fmu", "dask", "distributed", "fmpy", "libcosimpy", "lxml", "markdown_it", "matplotlib",
-        "numba", "numpy", "pandas", "PIL", "platformdirs", "pyarrow", "scipy", "tornado", "tqdm",
+        "auv_fmu", "dask", "distributed", "fmpy", "fmus", "libcosimpy", "lxml", "markdown_it",
+        "matplotlib", "numba", "numpy", "pandas", "PIL", "platformdirs", "pyarrow", "scipy",
+        "tornado", "tqdm",
     },
 }  # fmt: skip
+
+#: What else may be imported of `fmus`: how FMUs run, and PythonFMU, stays out of the process.
+DECLARED = re.compile(r"fmus\.(kinds|discovery|ports|\w+\.(ports|behaviour))(\.|$)")
 
 #: Rooms that run any system.
 GENERAL = ("machine", "system", "formats", "master")
@@ -98,19 +106,30 @@ def test_imports_run_downwards(package):
                 assert other <= own, f"{path} imports {'.'.join(imported)}, which is above it"
 
 
-def test_the_general_half_does_not_import_the_mathematics():
+def test_the_general_half_imports_neither_the_mathematics_nor_the_components():
     for path, name in modules("orchestrator"):
         if name and name[0] in GENERAL:
-            assert not any(imported[0] == "auv_fmu" for imported in imports(path)), path
+            assert {imported[0] for imported in imports(path)}.isdisjoint(("auv_fmu", "fmus")), path
+
+
+def test_the_orchestrator_knows_of_components_only_what_they_declare():
+    for path, _ in modules("orchestrator"):
+        for imported in imports(path):
+            if imported[0] == "fmus":
+                assert DECLARED.match(".".join(imported)), f"{path} imports {'.'.join(imported)}"
+
+
+def test_what_components_declare_brings_no_pythonfmu_into_the_process():
+    declared = [f"{package}.ports" for package in components().values()]
+    code = f"import sys, fmus.kinds, fmus.discovery, {', '.join(declared)}; "
+    code += "from fmus.discovery import fingerprint; fingerprint('python'); "
+    code += "sys.exit('pythonfmu' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def ports() -> set[str]:
     """Names of all ports and of their groups."""
-    found = {
-        port.name
-        for module in components().values()
-        for port in import_module(module.replace(".slave", ".ports")).PORTS
-    }
+    found = {port.name for component in components() for port in ports_of(component)}
     return found | {re.split(r"[.\[]", name)[0] for name in found}
 
 

@@ -35,17 +35,12 @@ from support.raw import (
     Variable,
 )
 from support.raw_fmi import OF_MODEL_EXCHANGE
+from support.settings import choices_of, trials_of
 
 Arguments = dict[str, Any]
 
 #: A reference that no FMU of this size has.
 UNKNOWN = 4_294_967_295
-
-#: Texts that a port takes, which modelDescription.xml has no place for.
-CHOICES = {
-    "saturation": ("tanh", "algebraic", "arctan"),
-    "observer": ("euler", "exact", "integral"),
-}
 
 #: Byte 0xff, which no UTF-8 has, as a string that keeps it (`surrogateescape`).
 NOT_UTF_8 = "\udcff"
@@ -132,13 +127,13 @@ class Draw:
         """One that a run goes on well with."""
         start, low, high = variable.start, variable.minimum, variable.maximum
         if variable.kind == "String":
-            return self.random.choice(CHOICES.get(variable.name, (start,)))
+            return self.random.choice(choices_of(self.description.name, variable.name) or (start,))
         if variable.kind == "Boolean":
             return self.random.randrange(2)
         if variable.kind == "Integer":
             some = (-(2**31), -1, 0, 1, 42, 2**31 - 1) if low is None else (start,)
             return self.random.choice(some)
-        spread = SPREADS.get(self.description.name, 0.5)
+        spread = trials_of(self.description.name).spread
         value = (start or 0.0) * self.random.uniform(1.0 - spread, 1.0 + spread)
         value = value or self.random.uniform(-0.5, 0.5)
         value = value if low is None else max(low, value)
@@ -438,44 +433,14 @@ for _mode_call in (
     _case(_mode_call)(lambda draw: {})
 
 
-class Setting(NamedTuple):
-    """Values that a case needs, each of which is good, and values with which all is well again."""
-
-    at_start: Mapping[str, float]
-    values: Mapping[str, float]
-    good: Mapping[str, float]
-    time: float = 0.0
-
-
-#: How far good values may lie from those at the start, where they must fit together [share].
-SPREADS = {"PathPlanner": 0.02}
-
-#: Values with which a state or an output of a step leaves the range of numbers.
-OVERFLOWING = {
-    "AuvPlant": Setting({"m11": 1e-9}, {"tau_w.u": 1e300}, {"tau_w.u": 0.0}),
-    "ObserverController": Setting({}, {"dy_d.x": 1e150}, {"dy_d.x": 0.0}),
-    "PdController": Setting({}, {"y.x": 1e155}, {"y.x": 0.0}),
-    "DisturbanceGenerator": Setting({}, {"omega_d": 1e308}, {"omega_d": 1.0}, 1e3),
-}
-
-#: Values that no state and outputs at the start time follow from.
-NO_START = {
-    "AuvPlant": Setting({}, {"tau_min.u": 0.0, "tau_max.u": 0.0}, {"tau_max.u": 80.0}),
-    "ObserverController": Setting({}, {"dy_d.x": 1e200}, {"dy_d.x": 0.0}),
-    "PdController": Setting({}, {"dy_d.x": 1e200}, {"dy_d.x": 0.0}),
-    "MotionPlanner": Setting({}, {"m11": 1e-9, "tau_d.u": 1e300}, {"tau_d.u": 5.0}),
-    "PathPlanner": Setting({}, {"turn_max": 0.0}, {"turn_max": 4.0}),
-}
-
-
 @_case("fmi2ExitInitializationMode", "values that give no start")
 def _no_start(draw: Draw) -> Arguments | None:
-    return {} if draw.description.name in NO_START else None
+    return {} if trials_of(draw.description.name).no_start else None
 
 
 @_case("fmi2GetReal", "outputs of values that give no start")
 def _outputs_of_no_start(draw: Draw) -> Arguments | None:
-    if draw.description.name not in NO_START:
+    if trials_of(draw.description.name).no_start is None:
         return None
     return _items(*(Item(v.reference) for v in draw.description.of("output", "Real")))
 
@@ -502,7 +467,7 @@ def _too_long(draw: Draw) -> Arguments | None:
 
 @_case("fmi2DoStep", "values that the equations overflow with")
 def _overflow(draw: Draw) -> Arguments | None:
-    setting = OVERFLOWING.get(draw.description.name)
+    setting = trials_of(draw.description.name).overflow
     return None if setting is None else {"time": draw.time + setting.time, "h": 0.02}
 
 

@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from random import Random
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from fmus.packaging.kinds import PYTHON
+from fmus.discovery import ports_of
+from fmus.kinds import PYTHON
 from fmus.ports.description_fmi2 import fmi2_description
 from support import states
-from support.calls import CASES, NO_START, OVERFLOWING, Call, Draw, Saved, Setting, make
-from support.instances import component
+from support.calls import CASES, Call, Draw, Saved, make
 from support.raw import Description, Host, Library, Status, Variable, description_in, instance
+from support.settings import Setting, Trials, trials_of
 from support.status_table import ERROR, Cell, Row, rows
 
 #: Step of the trials [s], and how many come before the state stepping is tried.
 H, STEPS = 0.02, 3
 
-#: The rows that need values of their own, by the names of the FMUs that have such values.
-_SETTINGS: Mapping[tuple[str, str], Mapping[str, Setting]] = {
-    ("fmi2DoStep", "values that the equations overflow with"): OVERFLOWING,
-    ("fmi2ExitInitializationMode", "values that give no start"): NO_START,
-    ("fmi2GetReal", "outputs of values that give no start"): NO_START,
+#: The rows that need values of their own.
+_SETTINGS: Mapping[tuple[str, str], Callable[[Trials], Setting | None]] = {
+    ("fmi2DoStep", "values that the equations overflow with"): lambda trials: trials.overflow,
+    ("fmi2ExitInitializationMode", "values that give no start"): lambda trials: trials.no_start,
+    ("fmi2GetReal", "outputs of values that give no start"): lambda trials: trials.no_start,
 }
 
 
@@ -43,12 +44,22 @@ def has_call(name: str, key: tuple[str, str]) -> bool:
 @cache
 def _description(name: str) -> Description:
     """What the FMU of a component says of itself, without building it."""
-    ports = component(name).ports
-    return description_in(ElementTree.fromstring(fmi2_description(name, "", "", ports)), PYTHON)
+    text = fmi2_description(name, "", "", ports_of(name))
+    return description_in(ElementTree.fromstring(text), PYTHON)
 
 
 def _draw(description: Description, time: float = 0.0) -> Draw:
     return Draw(Random(1), description, ["own"], ["other"], ["freed"], time)
+
+
+def company_of(library: Library, other: Library) -> Company:
+    """Company for trials on an FMU, which another one gives a state to."""
+    with instance(other) as foreign:
+        content = foreign.content()
+    beside = Host(library)
+    assert beside.instantiate()
+    assert beside.setup() == beside.enter() == beside.exit() == Status.OK
+    return Company(beside, content)
 
 
 def check(library: Library, key: tuple[str, str], state: str, company: Company) -> None:
@@ -84,7 +95,8 @@ class Trial:
         self.cell: Cell = row.cells[state]
         self.mode = "stepping" if state == ERROR else state
         self.time = 0.0
-        self.setting = _SETTINGS.get(row.key, {}).get(host.description.name)
+        found = _SETTINGS.get(row.key)
+        self.setting = found and found(trials_of(host.description.name))
         self._reach(state)
         self.good = host.get_state()
         freed = host.get_state()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fmus.packaging.kinds import NATIVE, PYTHON
+from fmus.kinds import NATIVE, PYTHON
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Ending

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fmus.kinds import NATIVE
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.fmi.instance import Ended
 from orchestrator.master.hooks.hook import NEVER, Run
@@ -12,7 +13,6 @@ from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.bundle import NATIVE
 from orchestrator.runs.preparation import load
 from orchestrator.system.names import port_name
 from support.machine import LOOPS

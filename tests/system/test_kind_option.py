@@ -14,13 +14,14 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
+from fmus.kinds import FMI_VERSIONS, KINDS
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.paper.report import write_report
 from orchestrator.runs import bundle
 from orchestrator.runs.request import Request
-from support.instances import NAMES
 from support.machine import contents
+from support.settings import NAMES
 
 SECOND = ["--stop-time", "1"]
 
@@ -80,13 +81,13 @@ def test_fmu_is_valid_and_small_and_says_who_made_it(native: Path, name: str):
 
 @pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
 def test_run_writes_the_same_table_to_the_bit(workplace: Path, order: str):
-    for kind in bundle.KINDS:
+    for kind in KINDS:
         options = [*SECOND, "--order", order, "--kind", kind, "--no-figures", "--out", kind]
         assert main(["run", "fig4", *options]) == 0
     for name in ("result.csv", "metrics.json", "certificates.csv"):
-        tables = [(workplace / kind / name).read_bytes() for kind in bundle.KINDS]
+        tables = [(workplace / kind / name).read_bytes() for kind in KINDS]
         assert tables[0] == tables[1]
-    assert {kind: {*kinds(workplace / kind).values()} for kind in bundle.KINDS} == {
+    assert {kind: {*kinds(workplace / kind).values()} for kind in KINDS} == {
         "python": {"python"},
         "native": {"native"},
     }
@@ -181,7 +182,7 @@ def test_export_with_fmi_3_is_an_ssp_2(workplace: Path, capsys):
 
 @pytest.mark.skipif(find_spec("fmu_manipulation_toolbox") is None, reason="no FMU toolbox")
 def test_container_takes_fmus_of_either_version(workplace: Path):
-    for fmi in bundle.FMI:
+    for fmi in FMI_VERSIONS:
         options = ["--kind", "native", "--fmi", fmi, "--format", "container", "--out", fmi]
         assert main(["export", "fig4", *options]) == 0
         with zipfile.ZipFile(workplace / fmi / "fig4.fmu") as archive:

@@ -161,7 +161,7 @@ def test_refusals_are_the_same(dist: Path, native: Path, scenario, values, time)
 def build(folder: Path, packages: Path, kind: str) -> Path:
     """Build FMUs of a kind from the sources in a folder, in a process of its own."""
     subprocess.run(
-        [sys.executable, "-m", "fmus.packaging.build", "--kind", kind, "--out", str(folder)],
+        [sys.executable, "-m", "fmus.build", "--kind", kind, "--out", str(folder)],
         env={**os.environ, "PYTHONPATH": str(packages)},
         check=True, capture_output=True, cwd=packages,
     )  # fmt: skip

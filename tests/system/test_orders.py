@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment, decimations
@@ -17,7 +18,6 @@ from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import delays, planned, stages
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.bundle import NATIVE
 from orchestrator.runs.preparation import load, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.result import simulate as simulated

@@ -10,7 +10,7 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 from fmpy.util import read_csv, read_ref_opt_file
 
-from fmus.packaging.discovery import components
+from fmus.discovery import components
 from orchestrator.commands.main import main
 from orchestrator.exchange.reference import reference_outputs
 from orchestrator.exchange.verify import verify

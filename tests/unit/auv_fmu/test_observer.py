@@ -8,15 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_fmu import observer, output_feedback
-from auv_fmu.output_feedback import Gains, virtual_velocity
-from auv_fmu.saturation import hyperbolic_tangent
+from auv_fmu.observer import EULER, INTEGRAL
+from auv_fmu.output_feedback import Gains, Measurement
+from auv_fmu.saturation import TANH, saturation
 from support.strategies import speeds, vectors
 
 three = vectors(speeds, 3)
 
 
 def s(z):
-    return hyperbolic_tangent(z)[0]
+    return saturation(TANH, z)
 
 
 def test_observer_finds_a_constant_velocity():
@@ -53,7 +54,7 @@ def test_observer_is_the_one_of_the_proof(y, y_hat, dy, dy_hat_o, ddy_r):
     y, y_hat, dy, dy_hat_o, ddy_r = map(np.array, (y, y_hat, dy, dy_hat_o, ddy_r))
     z = y - y_hat
     dy_hat = np.array(observer.dy_hat(dy_hat_o, s(z), z, lambda_, k_d))
-    ddy_hat_o = np.array(observer.ddy_hat_o(ddy_r, s(z), lambda_, k_d))
+    ddy_hat_o = np.array(observer.rate(EULER, ddy_r, s(z), lambda_, k_d))
 
     def dy_o(t):
         z = y + t * dy - (y_hat + t * dy_hat)
@@ -69,10 +70,11 @@ def test_24_starts_from_dy_r():
 
     Fig. 4 at its start: a reference at rest, and a control point that is 6.6 m away.
     """
-    state, y_d = output_feedback.initial_state(Gains(), (2.35, 6.0, 0.0)), (0.35, 0.0, -2.0)
-    e_z = np.subtract(state.y_hat, y_d)
-    dy_r = virtual_velocity((0.0, 0.0, 0.0), s(e_z), 1.0)
-    assert state.dy_hat_o == (0.0, 0.0, 0.0)
+    gains, origin, y = Gains(form=INTEGRAL), (0.0, 0.0, 0.0), (2.35, 6.0, 0.0)
+    state = output_feedback.initial_state(gains, y)
+    measured = Measurement(y, origin, (0.35, 0.0, -2.0), origin, origin)
+    dy_r = output_feedback.evaluate(gains, state, measured, 0.02).dy_hat
+    assert state.dy_hat_o == origin
     np.testing.assert_allclose(dy_r, -np.tanh([2.0, 6.0, 2.0]))
 
 
@@ -87,7 +89,7 @@ def test_state_of_the_observer_is_equation_24():
     integral = np.zeros(3)
     for t in (np.arange(n) + 0.5) * h:
         z = np.arctanh(0.9 * np.cos(w * t))
-        integral += h * np.array(observer.ddy_hat_o(w * np.cos(w * t), s(z), lambda_, k_d))
+        integral += h * np.array(observer.rate(EULER, w * np.cos(w * t), s(z), lambda_, k_d))
     expected = np.sin(w * end) + k_d * lambda_ * 0.9 * np.sin(w * end) / w
     np.testing.assert_allclose(integral, expected, rtol=1e-6)
 
