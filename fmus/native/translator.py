@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import import_module
 
 from fmus.native.functions import function_in_c
@@ -38,6 +39,7 @@ _P, _S, _I = (
 _O, _E = "model_outputs *outputs", "Error *error"
 
 
+@cache
 def translated(package: str) -> str:
     """The equations of a component, and the functions that the component calls.
 

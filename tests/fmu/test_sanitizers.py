@@ -11,7 +11,10 @@ import pytest
 from support.sanitizers import GCC, MEMORY, THREADS, sanitize, sanitized_host
 from support.settings import NAMES
 
-pytestmark = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(GCC is None, reason="gcc is not installed"),
+]
 
 #: Calls of a host that makes them at random, and how often it starts anew.
 CALLS, SEEDS = 5_000, range(2)

@@ -20,7 +20,6 @@ from support.cells import check, company_of
 from support.raw import Description, Library, Variable, variable
 from support.raw_fmi import MODEL_EXCHANGE
 from support.status_table import names_in_fmi3
-from support.trials import SKIPPED
 
 Logger = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
 
@@ -153,8 +152,9 @@ def trials(folder: Path, other: Path) -> Any:
 
     def trial(cell: tuple[tuple[str, str], str]) -> str:
         try:
-            return "" if check(library, *cell, company) else SKIPPED
+            check(library, *cell, company)
         except AssertionError as error:
             return str(error) or "an assertion fails"
+        return ""
 
     return trial

@@ -88,6 +88,10 @@ class Description:
 
 def read_description(folder: Path) -> Description:
     root = ElementTree.parse(folder / "modelDescription.xml").getroot()
+    return description_in(root, NATIVE if (folder / "sources").is_dir() else PYTHON)
+
+
+def description_in(root: ElementTree.Element, kind: str) -> Description:
     implementation = root.find("CoSimulation")
     assert implementation is not None
     return Description(
@@ -95,7 +99,7 @@ def read_description(folder: Path) -> Description:
         root.attrib["guid"],
         implementation.attrib["modelIdentifier"],
         tuple(_variable(element) for element in root.iterfind("ModelVariables/ScalarVariable")),
-        NATIVE if (folder / "sources").is_dir() else PYTHON,
+        kind,
     )
 
 

@@ -11,10 +11,17 @@ from typing import Any, NamedTuple
 from fmus.discovery import components, package_folder, ports_of
 from fmus.ports.behaviour import Behaviour, read_behaviour
 from fmus.ports.groups import ParameterSet
+from support.tiers import slow
 
 #: Names of all components, and of those with inputs.
 NAMES = [*components()]
 WITH_INPUTS = [n for n in NAMES if any(port.causality == "input" for port in ports_of(n))]
+
+#: One with noise and one without: between them they have ports of all types, states, and all that
+#: can go wrong. What every component has from the same base is tried on these, and on the others
+#: with `-m slow`.
+REPRESENTATIVES = ("AuvPlant", "ObserverController")
+EACH = [*REPRESENTATIVES, *slow(*(name for name in NAMES if name not in REPRESENTATIVES))]
 
 
 class Setting(NamedTuple):

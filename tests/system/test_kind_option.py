@@ -37,6 +37,7 @@ def kinds(folder: Path) -> dict[str, str]:
     return {name: fmu["kind"] for name, fmu in record["fmus"].items()}
 
 
+@pytest.mark.slow
 def test_build_writes_fmus_ssp_checksums_and_bill(workplace, capsys):
     assert main(["build", "--kind", "native"]) == 0
     folder = workplace / "fmus/dist/native"
@@ -53,6 +54,7 @@ def test_build_writes_fmus_ssp_checksums_and_bill(workplace, capsys):
     assert "is up to date" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_kinds_take_each_others_place_in_a_folder(dist: Path, native: Path, workplace: Path):
     shutil.copytree(native, workplace / "here")
     assert main(["build", "--out", "here"]) == 0
@@ -144,6 +146,7 @@ def test_loaded_system_can_be_run_saved_and_verified(workplace: Path, capsys):
     assert main(["verify", "saved/result.csv", *options]) == 0
 
 
+@pytest.mark.slow
 def test_cache_has_a_folder_a_kind_and_version(workplace: Path):
     folders = {
         (kind, fmi): bundle.current_fmus(kind, fmi)
@@ -187,6 +190,7 @@ def test_container_takes_fmus_of_either_version(workplace: Path):
         assert root.get("fmiVersion") == f"{fmi}.0"
 
 
+@pytest.mark.slow
 def test_report_is_made_of_runs_of_the_kind(tmp_path: Path):
     assert Request("fig4", kind="native").command_line == "fig4 --kind native"
     write_report(tmp_path, ["fig4"], ["auv-fmu", "report"], stop_time=0.1, kind="native")
@@ -230,6 +234,7 @@ def test_system_keeps_the_fmus_it_was_loaded_with():
         simulate(load("fig4"), kind="native")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
 def test_one_archive_has_libraries_for_several_machines(native: Path, workplace: Path):
     options = ["--kind", "native", "--platforms", "linux64,darwin64", "--out", "all"]

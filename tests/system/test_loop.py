@@ -29,6 +29,7 @@ from orchestrator.system.structure import System
 from orchestrator.system.units import Linear
 from support.machine import LOOPS
 from support.mixed import ACTS, CALLS, Shape, altered, system_of, systems
+from support.runs import table_of
 
 #: Step [s].
 H = 0.5
@@ -52,9 +53,7 @@ def run(
     events: Sequence[Event] = (),
     isolation: Isolation | None = None,
 ) -> Table:
-    table = Table()
-    steps = chosen(loop, experiment, isolation)
-    simulate(planned(system, experiment), [table], isolation, steps, [Events(events)])
+    table = table_of(system, experiment, loop, isolation, [Events(events)])
     assert table.header.loop == loop
     return table
 

@@ -39,7 +39,7 @@ from support.machine import (
     without_privileges,
 )
 
-pytestmark = pytest.mark.usefixtures("workplace")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("workplace")]
 
 
 @pytest.fixture(autouse=True)

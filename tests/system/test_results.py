@@ -197,6 +197,7 @@ def peak_memory(*arguments: str) -> int:
     return usage.ru_maxrss * 1024
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_length_of_a_run():
     """60,000 rows of 95 values are 46 MB: none of it is kept."""
     short = peak_memory("--stop-time", "20", "--no-figures")
@@ -204,6 +205,7 @@ def test_memory_does_not_grow_with_the_length_of_a_run():
     assert long - short < 10e6
 
 
+@pytest.mark.slow
 def test_simulate_again_and_again_in_one_process_in_flat_memory():
     """300 runs; 100 before, in which Python and the FMUs fill their caches."""
 

@@ -14,7 +14,6 @@ from orchestrator.master.fmi.instance import ComponentFailed
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.hook import Run
-from orchestrator.master.loop import PYTHON_LOOP, Loop, chosen
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
@@ -22,6 +21,7 @@ from orchestrator.master.stepper import made
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from support.linear import QUARTER_TRUCK, SINE, TWO_MASSES, Model, Part, error, linear, system_of
+from support.runs import whole as run
 
 H = 0.1
 
@@ -36,18 +36,6 @@ def gains(k: float, l: float) -> dict[str, Part]:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("linear")
-
-
-def run(
-    system: System,
-    experiment: Experiment,
-    loop: Loop = PYTHON_LOOP,
-    isolation: Isolation | None = None,
-) -> Table:
-    table = Table()
-    simulate(planned(system, experiment), [table], isolation, loop)
-    assert table.failure is None
-    return table
 
 
 def ring(folder, k: float, l: float, names: str = "sab", **kind: object) -> System:
@@ -80,7 +68,7 @@ def test_both_loops_and_isolation_make_the_same_rows(folder, coupling):
     made()
     table, *others = (
         run(system, experiment),
-        run(system, experiment, chosen("compiled", experiment)),
+        run(system, experiment, loop="compiled"),
         run(system, experiment, isolation=Isolation()),
     )
     for other in others:

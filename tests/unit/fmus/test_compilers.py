@@ -122,6 +122,7 @@ HEADS = {
 }
 
 
+@pytest.mark.slow
 @needs_zig
 @pytest.mark.parametrize("name", HEADS)
 def test_zig_makes_libraries_for_other_machines(name: str, tmp_path, monkeypatch):

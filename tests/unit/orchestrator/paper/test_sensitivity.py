@@ -7,9 +7,6 @@ import csv
 import numpy as np
 import pytest
 
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.observer import Header
-from orchestrator.master.observers.table import Table
 from orchestrator.paper import choices
 from orchestrator.paper.choices import (
     FIVE,
@@ -33,6 +30,7 @@ from orchestrator.system.names import port_name
 from orchestrator.vehicle.signals import APPLIED as APPLIED_PORTS
 from orchestrator.vehicle.signals import COMMANDED as COMMANDED_PORTS
 from orchestrator.vehicle.signals import ELL, POSTURE, Y_D, tracking_error
+from support.tables import table_of
 from support.variants import (
     APPLIED,
     COMMANDED,
@@ -50,14 +48,10 @@ from support.variants import (
 COLUMNS = (*POSTURE, *Y_D, *APPLIED_PORTS, *COMMANDED_PORTS)
 
 
-def table_of(rows=10_001, **columns):
+def run_of(rows=10_001, **columns):
     """A run of 200 s in steps of 20 ms; what is not given is zero."""
-    values = np.zeros((rows, 1 + len(COLUMNS)))
-    values[:, 0] = 0.02 * np.arange(rows)
-    for name, column in columns.items():
-        values[:, 1 + COLUMNS.index(name.replace("__", "."))] = column
-    header = Header(COLUMNS, Experiment(200.0, 0.02), {port_name(ELL): 0.35})
-    return Table.of(header, values)
+    zeros = dict.fromkeys((name.replace(".", "__") for name in COLUMNS), 0.0)
+    return table_of(0.02 * np.arange(rows), {port_name(ELL): 0.35}, **{**zeros, **columns})
 
 
 def test_numbers_are_read_off_rows():
@@ -67,7 +61,7 @@ def test_numbers_are_read_off_rows():
     # The control point is 0.35 m ahead, which is up at a pitch of 90 degrees; and y_d comes nearer.
     y_d = 1.0 + 0.35 + 2.0 / (1.0 + 0.02 * np.arange(10_001))
     found = numbers_of(
-        table_of(
+        run_of(
             plant__tau_applied__u=force,
             plant__tau__q=-2.0 * force,
             plant__eta__x=1.0,
@@ -84,19 +78,19 @@ def test_numbers_are_read_off_rows():
 
 def test_errors_of_all_rows_are_the_tracking_error():
     rng = np.random.default_rng(1)
-    table = table_of(9, **{name.replace(".", "__"): rng.normal(size=9) for name in COLUMNS})
+    table = run_of(9, **{name.replace(".", "__"): rng.normal(size=9) for name in COLUMNS})
     np.testing.assert_allclose(errors(table), tracking_error(table), rtol=1e-13, atol=1e-15)
 
 
 def test_a_run_that_ends_early_has_no_numbers():
-    assert np.isnan(numbers_of(table_of(9_000))).all()
+    assert np.isnan(numbers_of(run_of(9_000))).all()
 
 
 def test_formulas_are_those_that_someone_would_code():
     """By the rows themselves, at every end time."""
     tau = np.random.default_rng(2).uniform(-80.0, 80.0, (10_000, 3))
     columns = zip(APPLIED_PORTS, np.vstack(([0.0] * 3, tau)).T, strict=True)
-    numbers = numbers_of(table_of(**{name.replace(".", "__"): tau for name, tau in columns}))
+    numbers = numbers_of(run_of(**{name.replace(".", "__"): tau for name, tau in columns}))
     for time in (20.0, 82.0, 200.0):
         taken = tau[: round(time / 0.02)]
         for formula, coded in (

@@ -5,24 +5,16 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.observer import Ending, Header
-from orchestrator.master.observers.table import Table
-from orchestrator.system.names import PortName
+from orchestrator.master.observers.observer import Ending
+from orchestrator.system.names import port_name
 from orchestrator.vehicle.metrics import Metrics, indices
+from support.tables import table_of
 
-
-def table_of(**columns: np.ndarray) -> Table:
-    names = tuple(name.replace("__", ".") for name in columns)
-    n = len(next(iter(columns.values())))
-    parameters = {
-        PortName("plant", f"{limit}.{k}"): value
-        for limit, value in (("tau_min", -2.0), ("tau_max", 2.0))
-        for k in "uqr"
-    }
-    parameters[PortName("plant", "ell")] = 0.35
-    rows = np.column_stack([np.arange(n) * 0.001, *columns.values()])
-    return Table.of(Header(names, Experiment((n - 1) * 0.001, 0.001), parameters), rows)
+PARAMETERS = {
+    port_name(f"plant.{limit}.{k}"): value
+    for limit, value in (("tau_min", -2.0), ("tau_max", 2.0))
+    for k in "uqr"
+} | {port_name("plant.ell"): 0.35}
 
 
 def test_effort_of_a_known_signal():
@@ -33,6 +25,7 @@ def test_effort_of_a_known_signal():
     zeros = np.zeros_like(t)
     found = indices(
         table_of(
+            t, PARAMETERS,
             plant__tau__u=command, plant__tau__q=zeros, plant__tau__r=command / 3,
             plant__tau_applied__u=applied, plant__tau_applied__q=zeros,
             plant__tau_applied__r=command / 3,
@@ -56,6 +49,7 @@ def test_final_error_is_the_largest_of_the_last_5_seconds():
     far = np.where(t < 2.9, 9.0, 0.0)
     found = indices(
         table_of(
+            t, PARAMETERS,
             plant__eta__x=far, plant__eta__y=ones, plant__eta__z=-2 * t, plant__eta__phi=zeros,
             plant__eta__theta=zeros, plant__eta__psi=zeros, planner__y_d__x=0.35 * ones,
             planner__y_d__y=zeros, planner__y_d__z=zeros,
@@ -75,7 +69,7 @@ def test_indices_do_not_depend_on_the_blocks_in_which_rows_come():
     columns |= {f"plant__eta__{k}": random.normal(size=7001)
                 for k in ("x", "y", "z", "phi", "theta", "psi")}  # fmt: skip
     columns |= {f"planner__y_d__{k}": random.normal(size=7001) for k in "xyz"}
-    table = table_of(**columns)
+    table = table_of(0.001 * np.arange(7001), PARAMETERS, **columns)
     found = Metrics()
     found.begin(table.header)
     for start, end in ((0, 1), (1, 2), (2, 700), (700, 6000), (6000, 7001)):

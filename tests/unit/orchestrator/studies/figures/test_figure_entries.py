@@ -43,25 +43,25 @@ BANDS = {"kind": "bands", "x": "plant.eta0.z", "show": "late_error"}
 @pytest.mark.parametrize(
     ("figure", "complaint"),
     [
-        (3, r"is no table; write \[figures.NAME\]"),
-        ({"x": "plant.eta0.z"}, "lacks kind; there are bands, maps, front, influence"),
-        ({**BANDS, "kind": "band"}, "kind = 'band' is of the wrong type"),
-        ({"kind": "maps", "x": "plant.eta0.z"}, "lacks y and show"),
+        (3, r"\[figures.NAME\]"),
+        ({"x": "plant.eta0.z"}, "kind.*bands, maps, front, influence"),
+        ({**BANDS, "kind": "band"}, "kind = 'band'"),
+        ({"kind": "maps", "x": "plant.eta0.z"}, "y and show"),
         ({**BANDS, "show": []}, "lacks show"),
-        ({**BANDS, "y": "late_error"}, "a figure of kind 'bands' has no y"),
+        ({**BANDS, "y": "late_error"}, "'bands'.* y"),
         ({**BANDS, "colour": "red"}, "unknown entry 'colour'"),
         (
             {**BANDS, "show": "late_errors"},
-            "show: runs have no number 'late_errors'; did you mean",
+            "show: .*'late_errors'.*late_error",
         ),
-        ({**BANDS, "x": "plant.eta0.x"}, "x: runs have no number 'plant.eta0.x'"),
-        ({**BANDS, "x": "controller.observer"}, "x: runs have no number 'controller.observer'"),
-        ({**BANDS, "by": "controller.observe"}, "by: runs have no column 'controller.observe'"),
-        ({**BANDS, "where": {"step": 0.1}}, "where: runs have no column 'step'"),
-        ({**BANDS, "limits": {"late_error": "one"}}, "limits = .* is of the wrong type"),
+        ({**BANDS, "x": "plant.eta0.x"}, "x: .*'plant.eta0.x'"),
+        ({**BANDS, "x": "controller.observer"}, "x: .*'controller.observer'"),
+        ({**BANDS, "by": "controller.observe"}, "by: .*'controller.observe'"),
+        ({**BANDS, "where": {"step": 0.1}}, "where: .*'step'"),
+        ({**BANDS, "limits": {"late_error": "one"}}, "limits = "),
         (
             {"kind": "front", "x": ["peak_command", "lost"], "y": "late_error"},
-            "x is a list; a figure of kind 'front' has one x",
+            "x.*'front'",
         ),
     ],
 )
@@ -74,9 +74,9 @@ def test_mistakes_are_told_in_a_line(figure, complaint):
 @pytest.mark.parametrize(
     ("figures", "complaint"),
     [
-        ({"../mine": BANDS}, "'../mine' is no name of a file"),
-        ({"labels": "late"}, "labels is not a table of texts"),
-        ({"labels": {"late_error": 1}}, "labels is not a table of texts"),
+        ({"../mine": BANDS}, "'../mine'"),
+        ({"labels": "late"}, "labels"),
+        ({"labels": {"late_error": 1}}, "labels"),
     ],
 )
 def test_names_and_labels_are_checked(figures, complaint):
