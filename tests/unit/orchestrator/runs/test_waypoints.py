@@ -76,7 +76,7 @@ def test_path_of_a_scenario_lies_beside_it_and_goes_to_its_planner(tmp_path: Pat
     ("text", "reason"),
     [
         ('[path]\nfiel = "path.csv"\n', "path: unknown entry 'fiel'; did you mean file?"),
-        ('[path]\ncomponent = "planner"\n', "path: name a file"),
+        ('[path]\ncomponent = "planner"\n', "path: lacks file"),
         ('[path]\nfile = "none.csv"\n', "none.csv: no such file"),
         (
             '[path]\nfile = "path.csv"\n[parameters]\nplanner.count = 2\n',
