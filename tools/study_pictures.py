@@ -16,12 +16,10 @@ from PIL import Image
 from orchestrator.figures.style import SETTINGS
 from orchestrator.runs.preparation import loaded
 from orchestrator.studies.figures import draw_figures, read_figures
-from orchestrator.studies.ready_page import PICTURES
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import StudyResult
 from orchestrator.studies.study import read_study
-
-_DOCS = Path(__file__).parents[1] / "docs"
+from pages import DOCS, PICTURES
 
 #: Pictures are 1,000 pixels wide.
 _DPI = 140
@@ -38,7 +36,7 @@ def main() -> None:
         with TemporaryDirectory() as drawn:
             list(draw_figures(plans, study.title, StudyResult(folder), Path(drawn)))
             for picture in sorted(Path(drawn).glob("*.png")):
-                file = _DOCS / PICTURES / f"{name}-{picture.name}"
+                file = DOCS / PICTURES / f"{name}-{picture.name}"
                 Image.open(picture).convert("RGB").save(file, optimize=True)
                 print(f"{file.name}: {file.stat().st_size / 1000:.0f} kB")
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from itertools import pairwise
 
-from orchestrator.commands import build, check, exchange, look, paper, run_and_sweep, upkeep
+from orchestrator.commands import build, check, exchange, look, paper, run_and_sweep
 from orchestrator.commands.options import BAD_INPUT, FAILED, INTERRUPTED
 from orchestrator.commands.streams import Unheard, say
 from orchestrator.machine.errors import InputError, StartError
@@ -58,6 +58,6 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=version("auv-fmu"))
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for group in (build, run_and_sweep, check, look, paper, exchange, upkeep):
+    for group in (build, run_and_sweep, check, look, paper, exchange):
         group.add_to(commands)
     return parser

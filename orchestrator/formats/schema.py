@@ -150,7 +150,8 @@ def _kind(annotation: Any, metadata: Sequence[Any] = ()) -> str:
         if isinstance(one, str):
             return one
         if isinstance(one, OneOf):
-            return " or ".join(f"`{name}`" for name in one.names)
+            *others, last = (f"`{name}`" for name in one.names)
+            return f"{', '.join(others)} or {last}"
     arguments = get_args(annotation)
     match get_origin(annotation):
         case typing.Annotated:

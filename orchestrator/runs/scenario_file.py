@@ -158,7 +158,7 @@ class ScenarioFile(TomlTable):
     inputs: InputsTable = entry(
         "A table of inputs over time: [see below](#inputs).", "inputs keep their values"
     )
-    ours: dict[str, Any] = entry(
+    ours: Annotated[dict[str, Any], "table of texts"] = entry(
         'Which of the values above are not the paper\'s, and why: `stop_time = "why"`, '
         '`plant.noise.std = "why"`.',
         "none",

@@ -1,19 +1,8 @@
-"""The readings in short are those of the documentation."""
+"""Mentions of readings in the report."""
 
 import re
-from pathlib import Path
 
-from orchestrator.paper.readings import READINGS, linked, section
-
-PAGE = Path(__file__).parents[4] / "docs" / "readings.md"
-
-
-def test_every_reading_is_there_by_its_heading():
-    text = PAGE.read_text(encoding="utf-8")
-    documented = re.findall(r"^(\d+)\. \*\*(.+?)\*\*", text, re.MULTILINE)
-    assert [(int(number), heading) for number, heading in documented] == [
-        (number, heading) for number, (heading, _) in READINGS.items()
-    ]
+from orchestrator.paper.documents import linked, readings
 
 
 def test_mentions_lead_to_their_sections():
@@ -26,4 +15,8 @@ def test_mentions_lead_to_their_sections():
 def test_what_is_no_mention_stays():
     for text in ("#### Reading 6", "reading 99 is none", "readings of 3 sensors", "6 readings"):
         assert linked(text) == text
-    assert linked(section()) == section()
+
+
+def test_readings_are_numbered():
+    numbers = re.findall(r"^#### Reading (\d+)$", readings(), re.MULTILINE)
+    assert numbers == [str(n) for n in range(1, 17)]

@@ -144,7 +144,10 @@ BANDS = {"kind": "bands", "x": "plant.eta0.z", "show": "late_error"}
             {"figures": {"f": {"x": "a.b"}}},
             'figures: f: lacks kind; write kind = "bands" or "maps"',
         ),
-        ({"figures": {"f": {**BANDS, "kind": "band"}}}, "kind = 'band': write bands or maps"),
+        (
+            {"figures": {"f": {**BANDS, "kind": "band"}}},
+            "kind = 'band': write bands, maps, front or",
+        ),
         ({"figures": {"f": {"kind": "maps", "x": "a.b"}}}, "figures: f: lacks y and show"),
         ({"figures": {"f": {**BANDS, "show": []}}}, "figures: f: lacks show"),
         ({"figures": {"f": {**BANDS, "y": "lost"}}}, "a figure of kind 'bands' has no y"),
