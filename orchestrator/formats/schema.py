@@ -24,9 +24,6 @@ from orchestrator.machine.errors import Findings, did_you_mean, shortened
 Name = Annotated[str, "name"]
 Names = Name | list[Name]
 
-#: Limits of a number, as the metadata of a type has them.
-_LIMITS = ("ge", "le", "gt")
-
 #: Types in words.
 _WORDS = {str: "text", int: "whole number", float: "number", bool: "true or false", Any: "value"}
 
@@ -120,6 +117,9 @@ def json_schema(table: type[TomlTable]) -> dict[str, Any]:
     for part in (schema, *schema.get("$defs", {}).values()):
         for declared in part.get("properties", {}).values():
             declared.pop("example", None)
+            if declared.get("additionalProperties") is True:
+                # Versions of pydantic differ in whether they say so.
+                del declared["additionalProperties"]
             if default := declared.pop("without", ""):
                 declared["description"] += f" Without it: {default}."
     return {"$schema": GenerateJsonSchema.schema_dialect, **schema}
@@ -167,12 +167,8 @@ def _kind(annotation: Any, metadata: Sequence[Any] = ()) -> str:
             words = ", ".join([f"table of {one}s", *others])
         case _:
             words = _WORDS.get(annotation, "table")
-    limits = {
-        name: getattr(one, name) for one in metadata for name in _LIMITS if hasattr(one, name)
-    }
-    if limits.keys() == {"ge", "le"}:
-        words = f"{words} from {limits['ge']} to {limits['le']:,}"
-    return f"positive {words}" if limits == {"gt": 0.0} else words
+    limits = [getattr(one, end) for end in ("ge", "le") for one in metadata if hasattr(one, end)]
+    return f"{words} from {limits[0]} to {limits[1]:,}" if limits else words
 
 
 def _table_in(annotation: Any) -> type[TomlTable] | None:

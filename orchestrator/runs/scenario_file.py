@@ -57,7 +57,7 @@ class EventTable(TomlTable):
     repeat: bool = entry(
         "Whether it happens each time that `when` becomes true, or only the first time.", "`false`"
     )
-    duration: Annotated[float, Field(gt=0.0)] = entry(
+    duration: Annotated[float, Field(gt=0.0), "positive number"] = entry(
         "How long it lasts [s].", "for good", key="for"
     )
     label: str = entry("Its name in figures.", "what it does")

@@ -271,7 +271,7 @@ def test_animation_is_written(workplace):
         (["gains", "--set", "controller.lambda=much"], "not a real number"),
         (["gains", "--set", "controller.saturation=sigmoid"], "use one of tanh, algebraic"),
         (["animate", "fig4", "--stop-time", "0.1", "--out", "film.avi"], "write a .gif"),
-        (["run", "digits.toml"], "must be smaller than 1e308 s"),
+        (["run", "digits.toml"], "write a finite number"),
         (["run", "more_digits.toml"], "not a scenario: Exceeds the limit"),
         (["run", "parameter.toml"], "not a real number"),
         (["run", "infinite.toml"], "must be finite"),
