@@ -1,12 +1,10 @@
 """Pages of the components, from their `page.md` and their declared ports.
 
-`python -m fmus.packaging.documentation --out DIR` writes them as Markdown for the repository; the
-build puts the same text as HTML into each FMU.
+The build puts them as HTML into each FMU; `tools/pages.py` writes them into docs/components.
 """
 
 from __future__ import annotations
 
-import argparse
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import import_module
@@ -158,19 +156,3 @@ def licences(kind: str) -> str:
     if kind == NATIVE:
         return ours
     return f"{ours}\n\nPythonFMU, contained in resources and binaries\n\n{texts['pythonfmu']}"
-
-
-def main() -> None:
-    """Write the pages for the repository."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("docs", "components"))
-    folder = parser.parse_args().out
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in components():
-        path = folder / f"{name}.md"
-        path.write_text(page(name), encoding="utf-8")
-        print(path)
-
-
-if __name__ == "__main__":
-    main()

@@ -17,13 +17,13 @@ from orchestrator.runs.waypoints import path_parameters
 from orchestrator.system.names import PortName, file_name, flattened, port_name
 from orchestrator.vehicle.signals import PLANNER
 
-#: What a file is not that cannot be read.
+#: What a message calls a file that cannot be read.
 _WHAT = "not a scenario"
 
 FOLDER = Path(__file__).parent / "scenarios"
 
-#: What is run besides those that come with the bundle.
-KINDS = "a .toml, .ssp, .ssd or .fmu file, an OspSystemStructure.xml, or a folder with a .ssd"
+#: What is run besides the scenarios that come with the bundle.
+_OTHERS = "a .toml, .ssp, .ssd or .fmu file, an OspSystemStructure.xml, or a folder with a .ssd"
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def read_scenario(name: str) -> Scenario:
         InputError: there is no such scenario, or its file has a mistake.
 
     """
-    path = path_of(name, FOLDER, "scenario", KINDS)
+    path = path_of(name, FOLDER, "scenario", _OTHERS)
     text = text_of(path, _WHAT)
     with explained(path, _WHAT):
         return _scenario(path, text)
@@ -97,9 +97,8 @@ def _scenario(path: Path, text: str) -> Scenario:
     if "path" in content:
         content["parameters"] |= _path_parameters(path, content.pop("path"), content["parameters"])
     if "inputs" in content:
-        content["inputs"] = Inputs(
-            **{**content["inputs"], "file": path.parent / content["inputs"]["file"]}
-        )
+        said = content["inputs"]
+        content["inputs"] = Inputs(**said | {"file": path.parent / said["file"]})
     content["ours"] = {key: str(why) for key, why in flattened(content.get("ours", {}))}
     content["components"] = {
         component: str(path.parent / fmu) if fmu.endswith(".fmu") else fmu

@@ -34,7 +34,7 @@ MOST_RUNS = 1_000_000_000
 #: What may vary beside parameters.
 STEP = "step"
 
-#: What a file is not that cannot be read.
+#: What a message calls a file that cannot be read.
 _WHAT = "not a study"
 
 
