@@ -6,7 +6,6 @@ their colours: a palette would take colours out of their scales.
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -29,14 +28,14 @@ def main() -> None:
     """Write the pictures of the studies in some folders."""
     SETTINGS["savefig.dpi"] = _DPI
     for folder in map(Path, sys.argv[1:]):
-        name = json.loads((folder / "study.json").read_text(encoding="utf-8"))["study"]
-        study = read_study(name)
+        result = StudyResult(folder)
+        study = read_study(result.record["study"])
         space = Space(study, {scenario: loaded(scenario) for scenario in study.scenario})
-        plans = read_figures(name, study.figures, space.columns, space.has_scenarios)
+        plans = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
         with TemporaryDirectory() as drawn:
-            list(draw_figures(plans, study.title, StudyResult(folder), Path(drawn)))
+            list(draw_figures(plans, study.title, result, Path(drawn)))
             for picture in sorted(Path(drawn).glob("*.png")):
-                file = DOCS / PICTURES / f"{name}-{picture.name}"
+                file = DOCS / PICTURES / f"{study.name}-{picture.name}"
                 Image.open(picture).convert("RGB").save(file, optimize=True)
                 print(f"{file.name}: {file.stat().st_size / 1000:.0f} kB")
 

@@ -1,1 +1,1 @@
-"""How a system is written down: SSP, libcosim's configuration, a container FMU."""
+"""How it is written down: SSP, libcosim's configuration, a container FMU; schemas of TOML files."""
