@@ -67,7 +67,7 @@ class TomlTable(BaseModel):
         findings.refuse()
 
 
-def entry(meaning: str, default: str, *, key: str | None = None) -> Any:
+def entry(meaning: str, default: str = "", *, key: str | None = None) -> Any:
     """Declare an entry that may be left out.
 
     Args:

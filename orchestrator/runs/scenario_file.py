@@ -17,7 +17,7 @@ _AT_ONCE = ("release", "reset", "stop")
 
 
 class PathTable(TomlTable):
-    """`[path]`."""
+    """Waypoints from a table: `[path]`."""
 
     file: str = needed(
         "A table in CSV, its path relative to this file, with the columns `x,y,z` [m] or `t,x,y,z` "
@@ -31,7 +31,7 @@ class PathTable(TomlTable):
 
 
 class InputsTable(TomlTable):
-    """`[inputs]`."""
+    """Inputs over time, from a table: `[inputs]`."""
 
     file: str = needed(
         "A table in CSV or Parquet, its path relative to this file: `time` [s] first, then inputs "
@@ -46,7 +46,7 @@ class InputsTable(TomlTable):
 
 
 class EventTable(TomlTable):
-    """`[[events]]`."""
+    """Something that happens during the run: `[[events]]`."""
 
     at: float = entry("When it happens [s].", "at `when`")
     when: str = entry(
@@ -62,20 +62,20 @@ class EventTable(TomlTable):
     )
     label: str = entry("Its name in figures.", "what it does")
     set: dict[str, Any] = entry(
-        "New values of tunable parameters, and of inputs that nothing feeds.", ""
+        "New values of tunable parameters, and of inputs that nothing feeds."
     )
-    override: dict[str, Any] = entry("Values that signals have from now on.", "")
-    bias: dict[str, Any] = entry("What is added to signals from now on.", "")
-    freeze: Names = entry("Signals that keep what they were last.", "")
+    override: dict[str, Any] = entry("Values that signals have from now on.")
+    bias: dict[str, Any] = entry("What is added to signals from now on.")
+    freeze: Names = entry("Signals that keep what they were last.")
     drop: Names = entry(
-        "Sensors that fail: who listens keeps what it heard last, as with `freeze`.", ""
+        "Sensors that fail: who listens keeps what it heard last, as with `freeze`."
     )
-    lose: Names = entry("Actuators that fail: overridden with zero.", "")
-    release: Names = entry("Signals that are what they are without events again.", "")
+    lose: Names = entry("Actuators that fail: overridden with zero.")
+    release: Names = entry("Signals that are what they are without events again.")
     reset: Names = entry(
-        "Components that begin anew, with their parameters as they are at that time.", ""
+        "Components that begin anew, with their parameters as they are at that time."
     )
-    stop: Literal[True] = entry("`true`: the run ends here, and has not failed.", "")
+    stop: Literal[True] = entry("`true`: the run ends here, and has not failed.")
 
     @model_validator(mode="after")
     def _happens_once_and_does_one_thing(self) -> Self:
@@ -93,7 +93,7 @@ class EventTable(TomlTable):
 
 
 class ScenarioFile(TomlTable):
-    """A scenario."""
+    """A scenario of auv-fmu."""
 
     title: str = entry(
         "Heading of the figures and of the section in the report.", "the name of the file"

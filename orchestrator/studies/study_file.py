@@ -55,7 +55,7 @@ class GridTable(RangeTable):
 
 
 class SampleTable(TomlTable):
-    """`[sample]`."""
+    """Points drawn at random: `[sample]`."""
 
     method: Annotated[str, OneOf(METHODS)] = entry("How points are drawn.", f"`{METHODS[0]}`")
     n: Annotated[int, Field(ge=1, le=MOST_RUNS)] = needed("How many points.", "64")
@@ -93,18 +93,17 @@ _KINDS: Mapping[str, _Kind] = {
 
 
 class FigureTable(TomlTable):
-    """`[figures.NAME]`."""
+    """A figure: `[figures.NAME]`."""
 
     kind: Annotated[str, OneOf(tuple(_KINDS))] = needed(
         "What it is.", " or ".join(f'"{kind}"' for kind in _KINDS)
     )
     x: Names = entry(
         "Value along the horizontal axis; of `bands` also several, a column of panels each; of "
-        "`influence` what moves the others.",
-        "",
+        "`influence` what moves the others."
     )
-    y: Name = entry("Value along the vertical axis.", "")
-    show: Names = entry("What is shown, a row each.", "")
+    y: Name = entry("Value along the vertical axis.")
+    show: Names = entry("What is shown, a row each.")
     by: Names = entry(
         "Columns that tell runs apart, by colours or in panels of their own; `[]` for none.",
         "the scenario, if there are several",
@@ -125,7 +124,7 @@ class FigureTable(TomlTable):
 
 
 class FiguresTable(TomlTable):
-    """`[figures]`."""
+    """What is drawn: `[figures]`."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, FigureTable]
@@ -135,7 +134,7 @@ class FiguresTable(TomlTable):
 
 
 class StudyFile(TomlTable):
-    """A study."""
+    """A study of auv-fmu."""
 
     scenario: Name | Annotated[list[Name], Field(min_length=1)] = needed(
         "What is run: a scenario of `auv-fmu list`, or the path of a .toml, .ssp, .ssd or .fmu "
