@@ -12,7 +12,7 @@ import pytest
 from orchestrator.commands import paper
 from orchestrator.commands.main import main
 from orchestrator.paper.claims import CLAIMS
-from orchestrator.paper.documents import errata
+from orchestrator.paper.prose import errata
 from orchestrator.paper.effects import EFFECTS
 from orchestrator.paper.report import write_report
 from orchestrator.paper.sections import make_studies, sections

@@ -2,7 +2,7 @@
 
 import re
 
-from orchestrator.paper.documents import linked, readings
+from orchestrator.paper.prose import linked, readings
 
 
 def test_mentions_lead_to_their_sections():
