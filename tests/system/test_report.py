@@ -12,8 +12,8 @@ import pytest
 from orchestrator.commands import paper
 from orchestrator.commands.main import main
 from orchestrator.paper.claims import CLAIMS
-from orchestrator.paper.prose import errata
 from orchestrator.paper.effects import EFFECTS
+from orchestrator.paper.prose import errata
 from orchestrator.paper.report import write_report
 from orchestrator.paper.sections import make_studies, sections
 from orchestrator.runs.wiring import closed_loop
