@@ -17,6 +17,9 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from math import cbrt, radians, sqrt, tan
 from pathlib import Path
+from typing import Any
+
+from pydantic.json_schema import GenerateJsonSchema
 
 from auv_fmu.control_point import ELL
 from auv_fmu.output_feedback import Gains
@@ -27,7 +30,7 @@ from auv_fmu.vehicle import Vehicle
 from fmus.packaging.discovery import components
 from fmus.packaging.documentation import page as component_page
 from orchestrator.figures import FIGURES
-from orchestrator.formats.schema import TomlTable, entries, json_schema
+from orchestrator.formats.schema import TomlTable, entries
 from orchestrator.paper.page import table
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.scenario_file import EventTable, InputsTable, PathTable, ScenarioFile
@@ -139,8 +142,29 @@ def _table(*header: str, rows: Iterable[tuple[str, ...]]) -> str:
     return table(header, list(rows))
 
 
-def _json(schema: type[TomlTable]) -> str:
-    return json.dumps(json_schema(schema), indent=2, ensure_ascii=False) + "\n"
+def _json(table: type[TomlTable]) -> str:
+    """The JSON schema of a file, from which an editor completes and explains its entries."""
+    schema = table.model_json_schema(schema_generator=_WithoutNull)
+    for part in (schema, *schema.get("$defs", {}).values()):
+        for declared in part.get("properties", {}).values():
+            declared.pop("example", None)
+            if declared.get("additionalProperties") is True:
+                # Versions of pydantic differ in whether they say so.
+                del declared["additionalProperties"]
+            if default := declared.pop("without", ""):
+                declared["description"] += f" Without it: {default}."
+    schema = {"$schema": GenerateJsonSchema.schema_dialect, **schema}
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+
+
+class _WithoutNull(GenerateJsonSchema):
+    """Leaves out defaults, of which TOML has none to write, and titles that repeat the key."""
+
+    def default_schema(self, schema: Any) -> dict[str, Any]:
+        return self.generate_inner(schema["schema"])
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        return False
 
 
 @cache

@@ -1,6 +1,6 @@
 """Schemas of TOML files: what each entry may hold, what it means, and what is wrong with a file.
 
-A table is a model of pydantic, from which an editor's JSON schema and the reference pages follow.
+A table is a model of pydantic, from which `tools/pages.py` writes pages and editors' JSON schemas.
 Pydantic takes a moment to import, so a module of schemas is imported when there is a file to read.
 """
 
@@ -15,7 +15,6 @@ from typing import Annotated, Any, ClassVar, NamedTuple, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema, ErrorDetails, core_schema
 
 from orchestrator.machine.errors import Findings, did_you_mean, shortened
@@ -109,30 +108,6 @@ def entries(table: type[TomlTable]) -> dict[str, Entry]:
         )
         for key, field in _fields(table).items()
     }
-
-
-def json_schema(table: type[TomlTable]) -> dict[str, Any]:
-    """The JSON schema of a file, from which an editor completes and explains its entries."""
-    schema = table.model_json_schema(schema_generator=_WithoutNull)
-    for part in (schema, *schema.get("$defs", {}).values()):
-        for declared in part.get("properties", {}).values():
-            declared.pop("example", None)
-            if declared.get("additionalProperties") is True:
-                # Versions of pydantic differ in whether they say so.
-                del declared["additionalProperties"]
-            if default := declared.pop("without", ""):
-                declared["description"] += f" Without it: {default}."
-    return {"$schema": GenerateJsonSchema.schema_dialect, **schema}
-
-
-class _WithoutNull(GenerateJsonSchema):
-    """Leaves out defaults, of which TOML has none to write, and titles that repeat the key."""
-
-    def default_schema(self, schema: Any) -> dict[str, Any]:
-        return self.generate_inner(schema["schema"])
-
-    def field_title_should_be_set(self, schema: Any) -> bool:
-        return False
 
 
 def _fields(table: type[TomlTable]) -> dict[str, FieldInfo]:
