@@ -13,6 +13,7 @@ from orchestrator.machine.errors import Findings
 from orchestrator.master.fmi.binary import binary_of, check_binary
 from orchestrator.runs.preparation import SOME_TIME, Request, loaded, prepare
 from orchestrator.runs.waypoints import impossible_paths
+from orchestrator.studies.study import is_study, read_study
 from orchestrator.system.component import Component
 from orchestrator.system.graph import rings
 
@@ -20,7 +21,7 @@ from orchestrator.system.graph import rings
 def add_to(commands: Any) -> None:
     """Add this command to the parser."""
     check = commands.add_parser(
-        "check", help="say all that is wrong with an FMU, an SSP or a scenario"
+        "check", help="say all that is wrong with an FMU, an SSP, a scenario or a study"
     )
     check.add_argument("file", metavar="FILE|DIR|SCENARIO", help="what is looked at, not run")
     add_variant(check)
@@ -30,6 +31,8 @@ def add_to(commands: Any) -> None:
 def _check(options: argparse.Namespace) -> int:
     findings = Findings()
     look = _fmu if options.file.endswith(".fmu") else _system
+    if is_study(options.file):
+        look = _study
     to_know = look(options, findings)
     for kind, texts in (
         ("problem", findings.problems),
@@ -42,6 +45,13 @@ def _check(options: argparse.Namespace) -> int:
         return BAD_INPUT
     show(f"{options.file}: nothing is wrong with it")
     return OK
+
+
+def _study(options: argparse.Namespace, findings: Findings) -> list[str]:
+    """Look at the file of a study, and not at what it runs; there is nothing more to be known."""
+    with findings.collecting():
+        read_study(options.file)
+    return []
 
 
 def _fmu(options: argparse.Namespace, findings: Findings) -> list[str]:

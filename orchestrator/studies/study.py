@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -33,6 +34,9 @@ MOST_RUNS = 1_000_000_000
 
 #: What may vary beside parameters.
 STEP = "step"
+
+#: Entries that tell a study from a scenario.
+_OWN = {"scenario", "vary", "sample"}
 
 #: What a message calls a file that cannot be read.
 _WHAT = "not a study"
@@ -140,6 +144,15 @@ def read_study(name: str) -> Study:
     text = text_of(path, _WHAT)
     with explained(path, _WHAT):
         return study_of(path.stem, tomllib.loads(text), path)
+
+
+def is_study(path: str) -> bool:
+    """Whether a file is that of a study: a TOML file with a table or entry that no scenario has."""
+    if not path.endswith(".toml"):
+        return False
+    with suppress(InputError, ValueError, RecursionError):
+        return bool(_OWN & tomllib.loads(text_of(Path(path), _WHAT)).keys())
+    return False
 
 
 def study_of(name: str, content: Mapping[str, Any], path: Path | None = None) -> Study:
