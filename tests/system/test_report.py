@@ -15,7 +15,7 @@ from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
 from orchestrator.paper.prose import errata
 from orchestrator.paper.report import write_report
-from orchestrator.paper.sections import make_studies, sections
+from orchestrator.paper.sections import make_studies, study_sections
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.studies.study import ready_studies
 from orchestrator.vehicle.gains import check
@@ -155,7 +155,7 @@ def test_studies_are_in_the_report_and_kept_for_the_next(folder, tmp_path):
     pytest.importorskip("distributed", reason="needs the extra studies")
     (tmp_path / "many.toml").write_text(STUDY)
     [study] = make_studies([str(tmp_path / "many.toml")], tmp_path / "kept", "python", ["me"])
-    text = "\n\n".join(sections([study], tmp_path / "kept", tmp_path))
+    text = "\n\n".join(study_sections([study], tmp_path / "kept", tmp_path))
     assert "### Many \\| of mine\n" in text
     assert "What they **show**." in text
     [picture] = re.findall(r"\]\((figures/[^)]+)\)\]", text)
