@@ -1,12 +1,10 @@
 """Pages of the components, from their `page.md` and their declared ports.
 
-`python -m fmus.documentation --out DIR` writes them as Markdown for the repository; the
-build puts the same text as HTML into each FMU.
+The build puts them as HTML into each FMU; `tools/pages.py` writes them into docs/components.
 """
 
 from __future__ import annotations
 
-import argparse
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -143,19 +141,3 @@ def html(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
     body = body.replace("<table>", '<div class="table"><table>')
     body = body.replace("</table>", "</table></div>")
     return Template(_HTML.read_text(encoding="utf-8")).substitute(title=name, body=body)
-
-
-def main() -> None:
-    """Write the pages for the repository."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("docs", "components"))
-    folder = parser.parse_args().out
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in components():
-        path = folder / f"{name}.md"
-        path.write_text(page(name), encoding="utf-8")
-        print(path)
-
-
-if __name__ == "__main__":
-    main()

@@ -13,6 +13,7 @@ from orchestrator.master.fmi.binary import binary_of, check_binary
 from orchestrator.runs.preparation import SOME_TIME, loaded, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.waypoints import impossible_paths
+from orchestrator.studies.study import is_study, read_study
 from orchestrator.system.component import Component
 from orchestrator.system.graph import rings
 
@@ -27,6 +28,8 @@ def add_check(parser: argparse.ArgumentParser) -> None:
 def _check(options: argparse.Namespace) -> int:
     findings = Findings()
     look = _fmu if options.file.endswith(".fmu") else _system
+    if is_study(options.file):
+        look = _study
     to_know = look(options, findings)
     for kind, texts in (
         ("problem", findings.problems),
@@ -39,6 +42,13 @@ def _check(options: argparse.Namespace) -> int:
         return BAD_INPUT
     show(f"{options.file}: nothing is wrong with it")
     return OK
+
+
+def _study(options: argparse.Namespace, findings: Findings) -> list[str]:
+    """Look at the file of a study, and not at what it runs; there is nothing more to be known."""
+    with findings.collecting():
+        read_study(options.file)
+    return []
 
 
 def _fmu(options: argparse.Namespace, findings: Findings) -> list[str]:

@@ -19,7 +19,7 @@ COMMANDS = {
     "list": ("build", "list the scenarios"),
     "gains": ("build", "check the conditions of Theorems 1 and 2"),
     "run": ("run_and_sweep", "run a scenario, a scenario file or an SSP"),
-    "check": ("check", "say all that is wrong with an FMU, an SSP or a scenario"),
+    "check": ("check", "say all that is wrong with an FMU, an SSP, a scenario or a study"),
     "sweep": ("run_and_sweep", "make the runs of a study, or those that are missing"),
     "plot": ("look", "draw any signals of stored results"),
     "view": ("look", "write a page to turn a stored result and play it"),
@@ -32,8 +32,6 @@ COMMANDS = {
     "export": ("exchange", "write a scenario for other tools"),
     "hosts": ("exchange", "run a scenario in other co-simulation tools"),
     "verify": ("exchange", "compare a table from another tool with ours"),
-    "reference": ("upkeep", "write reference results of every FMU"),
-    "docs": ("upkeep", "write the pages that say what the code says"),
 }  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 from typing import TextIO
 
-from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.errors import InputError, did_you_mean, reason
 
 #: Longest file that is read as a whole, and longest line of one that is not [characters].
 _LONGEST, _LONGEST_LINE = 10_000_000, 1_000_000
@@ -100,3 +100,32 @@ def _bounded(file: TextIO) -> Iterator[str]:
         if len(line) == _LONGEST_LINE:
             raise ValueError(f"a line is longer than {_LONGEST_LINE:,} characters")
         yield line
+
+
+def names_in(folder: Path) -> list[str]:
+    """The names of the files that come with the program in a folder, without their ending."""
+    return sorted(path.stem for path in folder.glob("*.toml"))
+
+
+def path_of(name: str, folder: Path, what: str, files: str) -> Path:
+    """The path of a file that comes with the program, by its name, or of any file of the user's.
+
+    Args:
+        name: of the file, or its path, which ends in .toml.
+        folder: of those that come with the program.
+        what: it is, for the message.
+        files: that may be given in place of a name, for the message.
+
+    Raises:
+        InputError: there is none of that name.
+
+    """
+    if name.endswith(".toml"):
+        return Path(name)
+    known = names_in(folder)
+    if name not in known:
+        raise InputError(
+            f"no {what} {name!r}; there are {', '.join(known)}, or give {files}"
+            f"{did_you_mean(name, known)}"
+        )
+    return folder / f"{name}.toml"

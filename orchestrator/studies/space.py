@@ -12,7 +12,6 @@ import numpy as np
 from fmpy.model_description import ModelVariable
 
 from orchestrator.machine.errors import InputError, reason, shortened
-from orchestrator.runs.entries import is_finite
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
@@ -30,7 +29,7 @@ from orchestrator.studies.study import (
 )
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from orchestrator.system.values import Value, type_of, typed
+from orchestrator.system.values import Value, is_finite, type_of, typed
 
 #: Types of values by those of FMI's variables.
 _KINDS = {"Real": float, "Integer": int, "Enumeration": int, "Boolean": bool, "String": str}

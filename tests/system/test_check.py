@@ -89,6 +89,20 @@ def test_run_says_the_first_and_how_many_more(workplace, capsys):
     assert not out
 
 
+def test_all_mistakes_of_a_study_are_said(tmp_path, capsys):
+    file = tmp_path / "mine.toml"
+    file.write_text('titel = "x"\n[sample]\nn = 0\n[sample.range]\nplant.ell = [0.3, 0.4]\n')
+    assert main(["check", str(file)]) == 2
+    said = [line.partition("mine.toml: ")[2] for line in capsys.readouterr().out.splitlines()]
+    assert {text.partition(";")[0] for text in said} == {
+        "sample: n = 0: write a whole number from 1 to 1,000,000,000",
+        "unknown entry 'titel'",
+        "lacks scenario",
+    }
+    file.write_text('scenario = "fig5"\n[vary]\nplant.ell = [0.3, 0.4]\n')
+    assert main(["check", str(file)]) == 0
+
+
 def test_all_mistakes_of_an_archive_are_said(dist, workplace, capsys):
     path = changed(
         dist / "auv.ssp",

@@ -112,7 +112,7 @@ def test_full_disk_at_any_stage(workplace, capsys, size):
         assert not [name for name in names if name.startswith(".") or name.endswith("g")]
 
 
-@pytest.mark.parametrize("arguments", [["build"], ["export", "fig4"], ["reference"]])
+@pytest.mark.parametrize("arguments", [["build"], ["export", "fig4"]])
 def test_full_disk_leaves_what_was_there_and_nothing_else(workplace, capsys, arguments):
     with small_disk(workplace / "disk", 600_000) as disk:
         (disk / "r").mkdir()

@@ -12,13 +12,13 @@ from fmpy.util import read_csv, read_ref_opt_file
 
 from fmus.discovery import components
 from orchestrator.commands.main import main
-from orchestrator.exchange.reference import reference_outputs
 from orchestrator.exchange.verify import verify
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+from reference import reference_outputs
 from support.runs import run, write
 from support.texts import mentions, numbers_in, tells
 

@@ -5,20 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
-from orchestrator.machine.errors import InputError, did_you_mean
-from orchestrator.runs.entries import (
-    Entry,
-    are_names,
-    check_entries,
-    flattened,
-    is_number,
-    is_table,
-    is_text,
-)
+from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.studies.engine import INDICES
 from orchestrator.studies.figures.study_data import SCENARIO, is_known
+from orchestrator.system.names import flattened
 
 #: What a figure can be.
 BANDS, MAPS, FRONT, INFLUENCE = "bands", "maps", "front", "influence"
@@ -35,7 +27,7 @@ _USUAL = ("late_error", "peak_command", "lost")
 
 @dataclass(frozen=True)
 class FigureEntry:
-    """A figure that is to be drawn; :data:`ENTRIES` says what each entry means.
+    """A figure that is to be drawn; :mod:`.study_file` says what each entry means.
 
     Attributes:
         name: of its files.
@@ -53,57 +45,6 @@ class FigureEntry:
     labels: Mapping[str, str] = field(default_factory=dict)
 
 
-class _Kind(NamedTuple):
-    """What a figure of a kind needs, and what it may have beside."""
-
-    needs: Sequence[str]
-    may: Sequence[str]
-
-
-#: The kinds of figures, by the names that study files have for them.
-KINDS: Mapping[str, _Kind] = {
-    BANDS: _Kind(("x", "show"), ("by", "where", "limits")),
-    MAPS: _Kind(("x", "y", "show"), ("by", "where", "limits")),
-    FRONT: _Kind(("x", "y"), ("by", "where")),
-    INFLUENCE: _Kind(("x", "show"), ("by", "where")),
-}
-
-
-def _are_names(value: Any) -> bool:
-    return is_text(value) or are_names(value)
-
-
-def _are_numbers(value: Any) -> bool:
-    return is_table(value) and all(is_number(number) for _, number in flattened(value))
-
-
-#: What the table of a figure may hold, in the order of the reference page.
-ENTRIES: Mapping[str, Entry] = {
-    "kind": Entry(
-        f"name out of {', '.join(KINDS)}", lambda value: value in tuple(KINDS), "What it is.", ""
-    ),
-    "x": Entry(
-        "name, or list of names",
-        _are_names,
-        "Value along the horizontal axis; of `bands` also several, a column of panels each; of "
-        "`influence` what moves the others.",
-        "",
-    ),
-    "y": Entry("name", is_text, "Value along the vertical axis.", ""),
-    "show": Entry("name, or list of names", _are_names, "What is shown, a row each.", ""),
-    "by": Entry(
-        "name, or list of names",
-        _are_names,
-        "Columns that tell runs apart, by colours or in panels of their own; `[]` for none.",
-        "the scenario, if there are several",
-    ),
-    "where": Entry(
-        "table of values", is_table, "Only runs of which these columns have these values.", "none"
-    ),
-    "limits": Entry("table of numbers", _are_numbers, "Lines at values of what is shown.", "none"),
-}
-
-
 def read_figures(
     where: str, figures: Mapping[str, Any], varied: Mapping[str, type], is_compared: bool
 ) -> tuple[FigureEntry, ...]:
@@ -111,25 +52,28 @@ def read_figures(
 
     Args:
         where: they stand, for messages.
-        figures: what the study file says of them; without a figure the usual one is drawn.
+        figures: that the study file has; without any the usual one is drawn.
         varied: the types of what varies, by name.
         is_compared: whether there are several scenarios.
 
     Raises:
-        InputError: an entry cannot be what it shall be.
+        Refused: a figure names what runs do not have.
 
     """
     tables = dict(figures)
-    labels = _labels(where, tables.pop(LABELS, {}))
+    labels = dict(flattened(tables.pop(LABELS, {})))
     numbers = [name for name, kind in varied.items() if kind is not str]
     if not tables and numbers:
         tables["influence"] = {"kind": INFLUENCE, "x": numbers, "show": list(_USUAL)}
     by = (SCENARIO,) if is_compared else ()
-    plans = []
+    findings, plans = Findings(), []
     for name, table in tables.items():
-        if not _NAME.fullmatch(name):
-            raise InputError(f"{where}: figures: {name!r} is no name of a file: letters, digits, -")
-        _check(f"{where}: figures: {name}", table, (*numbers, *INDICES), (*varied, *by))
+        with findings.collecting():
+            if not _NAME.fullmatch(name):
+                raise InputError(
+                    f"{where}: figures: {name!r} is no name of a file: letters, digits, -"
+                )
+            _check_names(f"{where}: figures: {name}", table, (*numbers, *INDICES), (*varied, *by))
         plans.append(
             FigureEntry(
                 name,
@@ -143,17 +87,14 @@ def read_figures(
                 labels,
             )
         )
+    findings.refuse()
     return tuple(plans)
 
 
-def _labels(where: str, table: Any) -> dict[str, str]:
-    if not (is_table(table) and all(is_text(label) for _, label in flattened(table))):
-        raise InputError(f"{where}: figures: {LABELS} is not a table of texts")
-    return dict(flattened(table))
-
-
-def _check(where: str, table: Any, numbers: Sequence[str], columns: Sequence[str]) -> None:
-    """Check that a figure holds what its kind needs, and names what runs have.
+def _check_names(
+    where: str, table: Mapping[str, Any], numbers: Sequence[str], columns: Sequence[str]
+) -> None:
+    """Check that a figure names what runs have.
 
     Args:
         where: it stands, for messages.
@@ -162,19 +103,6 @@ def _check(where: str, table: Any, numbers: Sequence[str], columns: Sequence[str
         columns: those that tell runs apart.
 
     """
-    if not is_table(table):
-        raise InputError(f"{where}: is no table; write [figures.NAME]")
-    check_entries(where, table, ENTRIES)
-    kind = table.get("kind")
-    if kind is None:
-        raise InputError(f"{where}: lacks kind; there are {', '.join(KINDS)}")
-    needs, may = KINDS[kind]
-    if missing := [key for key in needs if not table.get(key)]:
-        raise InputError(f"{where}: lacks {' and '.join(missing)}")
-    if more := [key for key in table if key not in ("kind", *needs, *may)]:
-        raise InputError(f"{where}: a figure of kind {kind!r} has no {more[0]}")
-    if kind in (MAPS, FRONT) and not is_text(table["x"]):
-        raise InputError(f"{where}: x is a list; a figure of kind {kind!r} has one x")
     for key in ("x", "y", "show", "limits"):
         for value in _listed(table.get(key, ())):
             if not is_known(value, numbers):
@@ -190,6 +118,6 @@ def _check(where: str, table: Any, numbers: Sequence[str], columns: Sequence[str
 
 
 def _listed(value: Any) -> list[str]:
-    if is_table(value):
+    if isinstance(value, Mapping):
         return [name for name, _ in flattened(value)]
-    return [value] if is_text(value) else list(value)
+    return [value] if isinstance(value, str) else list(value)

@@ -89,8 +89,8 @@ def test_a_value_beside_the_table_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("entry", "reason"),
     [
-        ("file = 3", "wrong type"),
-        ('between = "linear"', "name a file"),
+        ("file = 3", "file = 3: write a text"),
+        ('between = "linear"', "inputs: lacks file; write file = "),
         ('file = "a.csv"\nform = "x"', "unknown entry 'form'"),
     ],
 )
@@ -104,7 +104,7 @@ def test_an_entry_that_is_none_is_refused(tmp_path, entry, reason):
 def test_an_empty_entry_names_no_file(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text("inputs = {}\n")
-    with pytest.raises(InputError, match=r"mine\.toml: inputs: name a file"):
+    with pytest.raises(InputError, match=r"mine\.toml: inputs: lacks file"):
         read_scenario(str(file))
 
 

@@ -3,10 +3,13 @@
 For each FMU, in the manner of the FMI cross-check: `NAME_in.csv` with inputs over time,
 `NAME_ref.csv` with the outputs, `NAME_ref.opt` with the experiment. For the system: `auv_ref.csv`
 and `auv_ref.opt`, from a Jacobi run, which is what most tools do.
+
+`python tools/reference.py [FOLDER]` writes them anew, into `reference` or FOLDER.
 """
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import fmpy
@@ -17,6 +20,7 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import completed
+from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import Component, read_component
 
@@ -89,3 +93,15 @@ def _write_options(stem: Path) -> Path:
         encoding="utf-8",
     )
     return path
+
+
+def main() -> None:
+    """Write the reference results."""
+    folder = Path(*sys.argv[1:2] or ["reference"])
+    folder.mkdir(parents=True, exist_ok=True)
+    for path in write_reference(current_fmus(), folder):
+        print(path)
+
+
+if __name__ == "__main__":
+    main()
