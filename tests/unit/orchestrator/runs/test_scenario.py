@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.scenario import ENTRIES, Scenario, names, read_scenario
+from orchestrator.runs.scenario import Scenario, names, read_scenario
+from orchestrator.runs.scenario_file import ScenarioFile
 from support.texts import mentions
 
 TEXT = """
@@ -85,4 +86,4 @@ def test_unknown_names_are_refused_with_those_that_there_are():
 
 def test_every_entry_of_a_scenario_can_be_written():
     fields = set(Scenario.__dataclass_fields__) - {"name", "digest"}
-    assert ENTRIES.keys() == fields | {"path"}
+    assert ScenarioFile.model_fields.keys() == fields | {"path"}

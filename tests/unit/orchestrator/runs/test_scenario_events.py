@@ -90,7 +90,7 @@ def test_what_is_overridden_is_transformed_as_the_signal_is(system):
         ({"at": 1.0, "stop": True, "for": 1.0}, "stop duration"),
         ({"at": 1.0, "repeat": True, "stop": True}, "repeat `when`"),
         ({"at": 1.0, "loose": "plant.tau.u"}, "'loose' lose"),
-        ({"at": True, "stop": True}, "at type number"),
+        ({"at": True, "stop": True}, "at number"),
         ({"at": 1.0, "stop": False}, "stop"),
         ({"at": 1.0, "set": {"plant.m11": 3.0}}, "plant.m11 fixed"),
         ({"at": 1.0, "set": {"plant.tau.u": 3.0}}, "controller.tau.u override"),
