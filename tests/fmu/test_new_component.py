@@ -12,10 +12,10 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
-from reference import STEP, STOP_TIME, write_component_reference
 
 from fmus.compilers import machines_compiler
 from fmus.discovery import components
+from reference import STEP, STOP_TIME, write_component_reference
 
 ROOT = Path(__file__).parents[2]
 NAME, FOLDER = "FirstOrderLag", "first_order_lag"
