@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from fmpy.model_description import ScalarVariable
 
+from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.compiler import COMPILERS, LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.master.experiment import Experiment
@@ -110,10 +111,10 @@ def _plan(system: System, experiment: Experiment, library: Library) -> str:
     for names, taken in zip([[], *parts], takings, strict=True):
         at = len(copies)
         copies += taken
-        found.append(
-            f"{{targets + {at}, sources + {at}, ones, zeros, NULL, members + {first}, "
-            f"{len(taken)}, 0, {len(names)}, 1, 0}}"
-        )
+        what = {"targets": f"targets + {at}", "sources": f"sources + {at}"}
+        what |= {"factors": "ones", "offsets": "zeros", "members": f"members + {first}"}
+        counts = {"n_connections": len(taken), "n_members": len(names), "every": 1}
+        found.append(_struct(**what, **counts))
         first += len(names)
     connections, *stepped = found
     return f"""\
@@ -155,8 +156,8 @@ def _setting(fmu: str, variable: ScalarVariable, value: Value) -> str:
         case "String":
             return f"set_string({fmu}, {variable.valueReference}, {_text(str(value))});"
         case kind:
-            name = _text(f"fmi2Set{kind}")
-            return f"set_integer({fmu}, {name}, {variable.valueReference}, {int(value)});"
+            name = "fmi2SetBoolean" if kind == "Boolean" else "fmi2SetInteger"
+            return f'set_integer({fmu}, "{name}", {variable.valueReference}, {int(value)});'
 
 
 def run(
@@ -183,7 +184,6 @@ def run(
     )  # fmt: skip
     if process.returncode != 0:
         raise InputError(last_line(process.stderr, f"exit status {process.returncode}"))
-    with (folder / TABLE).open(encoding="utf-8") as lines:
-        header = lines.readline().strip().split(",")
-        rows = np.loadtxt(lines, delimiter=",", ndmin=2)
-    return rows[:, [header.index(name) for name in names]], float(process.stdout)
+    columns = read_columns(folder / TABLE)
+    rows = np.vstack([*read_rows(folder / TABLE)])
+    return rows[:, [1 + columns.index(name) for name in names]], float(process.stdout)

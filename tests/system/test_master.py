@@ -19,9 +19,9 @@ from fmpy.util import read_csv
 
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import ssp_bytes
+from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.archives import check_place, unpacked
 from orchestrator.machine.errors import InputError
-from orchestrator.master.observers.files import read_columns, read_rows
 from orchestrator.master.schedule import stages
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
