@@ -73,7 +73,8 @@ random samples, over any parameter of any component. It needs some packages more
                 [--loop auto|python|compiled] [--scheduler ADDRESS] [--workers N] [--out DIR]
 
 The runs are made side by side in processes of this machine, as many as it has cores, or by the
-workers of [a Dask cluster](cluster.md). What comes out goes into `results/NAME/`, or DIR:
+workers of [a Dask cluster](cluster.md), which needs `.[cluster]`. What comes out goes into
+`results/NAME/`, or DIR:
 
 $files
 

@@ -31,7 +31,7 @@ ALLOWED = {
     "fmus": {"auv_fmu", "markdown_it", "pythonfmu"},
     "orchestrator": {
         "auv_fmu", "dask", "distributed", "fmpy", "libcosimpy", "lxml", "markdown_it", "matplotlib",
-        "numba", "numpy", "pandas", "PIL", "platformdirs", "pyarrow", "scipy", "tornado", "tqdm",
+        "numba", "numpy", "pandas", "PIL", "platformdirs", "pyarrow", "scipy", "tqdm",
     },
 }  # fmt: skip
 
