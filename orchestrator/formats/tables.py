@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
@@ -22,6 +22,9 @@ ROWS = 8192
 #: What separates the values of a row.
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 
+#: What a file is not that cannot be read.
+_NO_RUN = "not a table of a run"
+
 #: The number of a line, and its values.
 Record = tuple[int, list[str]]
 
@@ -33,7 +36,7 @@ def read_columns(path: Path) -> tuple[str, ...]:
         InputError: the file is no table of a run.
 
     """
-    with _of_a_run(path):
+    with explained(path, _NO_RUN):
         if path.suffix == ".parquet":
             with parquet().ParquetFile(path) as file:
                 return _after_time(file.schema_arrow.names)
@@ -52,7 +55,7 @@ def read_rows(path: Path, strings: Collection[str] = ()) -> Iterator[np.ndarray]
         InputError: the file is no table of a run.
 
     """
-    with _of_a_run(path):
+    with explained(path, _NO_RUN):
         if path.suffix == ".parquet":
             with parquet().ParquetFile(path) as file:
                 names = [name for name in file.schema_arrow.names if name not in strings]
@@ -97,8 +100,8 @@ def records(
     with explained(path, what), lines_of(path, newline="") as lines:
         first = next(lines, "")
         marks = [mark for mark in SEPARATORS if mark in first] or [","]
-        mark = next((mark for mark in marks if are_names(_names(first, mark))), marks[0])
-        reader = _reader(chain([first], lines), mark)
+        mark = next((m for m in marks if are_names(next(_reader([first], m)))), marks[0])
+        reader = _reader(chain([first], lines), mark, strict=True)
         try:
             names = next(reader)
             yield names, _records(reader, len(names))
@@ -118,15 +121,8 @@ def parquet() -> Any:
     return import_module("pyarrow.parquet")
 
 
-def _names(line: str, separator: str) -> list[str]:
-    try:
-        return next(_reader(iter([line]), separator), [])
-    except csv.Error:
-        return []
-
-
-def _reader(lines: Iterator[str], separator: str) -> Any:
-    return csv.reader(lines, delimiter=separator, skipinitialspace=True, strict=True)
+def _reader(lines: Iterable[str], separator: str, strict: bool = False) -> Any:
+    return csv.reader(lines, delimiter=separator, skipinitialspace=True, strict=strict)
 
 
 def _records(reader: Any, width: int) -> Iterator[Record]:
@@ -154,12 +150,3 @@ def _after_time(names: Sequence[str]) -> tuple[str, ...]:
 def _no_number(text: str) -> float:
     """Stand in for a text among numbers."""
     return 0.0
-
-
-@contextmanager
-def _of_a_run(path: Path) -> Iterator[None]:
-    with explained(path, "not a table of a run"):
-        try:
-            yield
-        except csv.Error as error:
-            raise ValueError(str(error)) from error

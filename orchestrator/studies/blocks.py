@@ -43,17 +43,9 @@ FATAL = "every process that made it died"
 _engine: list[Engine] = []
 
 
-class Answer(NamedTuple):
-    """What a worker has made of a block.
-
-    Attributes:
-        seconds: that it took.
-        outcomes: of its runs, or of the first of them where all took too long.
-
-    """
-
-    seconds: float
-    outcomes: list[Outcome]
+#: How long a block has taken [s], and the outcomes of its runs, or of the first of them where all
+#: took too long.
+Answer = tuple[float, list[Outcome]]
 
 
 class Crew(Protocol):
@@ -72,7 +64,6 @@ class Crew(Protocol):
 
     def send(self, block: list[Point], limit: float) -> None:
         """Have a block made, or what of it takes no longer than a limit [s]."""
-        ...
 
     def receive(self) -> tuple[list[Point], Answer | None]:
         """Wait for a block that was sent, and what has come of it; None: nobody has survived it.
@@ -203,7 +194,7 @@ def answer(engine: Engine, runs: list[Point], limit: float) -> Answer:
         seconds = monotonic() - start
         if seconds > limit:
             break
-    return Answer(seconds, outcomes)
+    return seconds, outcomes
 
 
 def cannot_make(block: list[Point], error: Exception) -> InputError:
@@ -272,11 +263,12 @@ class _Making:
                 return
             block, answer = self._crew.receive()
             under_way -= 1
-            done = [(block, answer and answer.outcomes)]
+            done = [(block, answer and answer[1])]
             if answer:
-                n = len(answer.outcomes)
+                seconds, outcomes = answer
+                n = len(outcomes)
                 rests.extend(block[i : i + n] for i in range(n, len(block), n))
-                self._pace = answer.seconds / sum(run.stop_time / run.step for run in block[:n])
+                self._pace = seconds / sum(run.stop_time / run.step for run in block[:n])
 
     def _room(self) -> int:
         return max(1, self._crew.ahead * self._crew.threads)
