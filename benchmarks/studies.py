@@ -25,9 +25,9 @@ from unittest.mock import patch
 
 from orchestrator.runs.preparation import Prepared, loaded, prepare
 from orchestrator.runs.request import Request
-from orchestrator.studies import cluster
+from orchestrator.studies import blocks as blocks_module
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.cluster import making
+from orchestrator.studies.blocks import making
 from orchestrator.studies.engine import INDICES, Engine, Outcome, Point
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
@@ -122,7 +122,7 @@ def block(n: int) -> float:
     """Seconds that a block takes to get there and back when there is nothing to do."""
     space = starts(n, 1.0)
     with (
-        patch.object(cluster, "_MOST_RUNS", 1),
+        patch.object(blocks_module, "_MOST_RUNS", 1),
         making(Idle(), (space[i] for i in range(n)), workers=1) as blocks,
     ):
         start = perf_counter()

@@ -1,14 +1,16 @@
-"""A host that is a C program: `host.c` beside this file, and the plan that it runs."""
+"""A host that is a C program: `host.c` beside this file, compiled with the system it runs."""
 
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Callable, Iterator, Sequence
-from itertools import count
+from collections.abc import Callable, Iterable, Sequence
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
+from fmpy.model_description import ScalarVariable
 
+from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.compiler import COMPILERS, LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.master.experiment import Experiment
@@ -20,32 +22,50 @@ from orchestrator.system.values import Value
 
 SOURCE = Path(__file__).with_name("host.c")
 
-#: What the host reads and writes.
-PLAN, TABLE = "plan.txt", "table.csv"
+#: What the host is compiled with, and what it writes.
+PLAN, TABLE = "plan.h", "table.csv"
 
 #: Where the library of an unpacked FMU is.
 Library = Callable[[Component], Path]
 
 
-def compiled(folder: Path, command: Sequence[str] = (), name: str = "host") -> Path:
-    """The host as a program.
+def library_of(component: Component) -> Path:
+    """The library of an FMU for this machine, unpacked."""
+    identifier = component.description.coSimulation.modelIdentifier
+    return component.folder / "binaries" / "linux64" / f"{identifier}.so"
+
+
+def compiled(
+    folder: Path,
+    system: System,
+    experiment: Experiment,
+    library: Library = library_of,
+    command: Sequence[str] = (),
+    name: str = "host",
+) -> Path:
+    """Compile the host of a system.
 
     Args:
         folder: where it is put.
+        system: to run; its connections are of Reals.
+        experiment: whose steps are all of one length.
+        library: where the library of an FMU is; beside its folder `binaries` is `resources`.
         command: of a C compiler; empty: this machine's.
         name: of the program.
 
     Raises:
-        InputError: there is no compiler, or it fails.
+        InputError: the host cannot make such a run, there is no compiler, or it fails.
 
     """
     found = command or (machines_compiler(),)
     if found[0] is None:
         raise InputError(f"there is no C compiler: neither {' nor '.join(COMPILERS)}")
+    (folder / PLAN).write_text(_plan(system, experiment, library), encoding="utf-8")
     program = folder / name
     is_windows = program.suffix == ".exe"
     # For Windows as the libraries: ziglang makes a C library for every level, which takes minutes.
-    options = ["-std=c99", "-Os" if is_windows else "-O2", "-o", str(program), str(SOURCE)]
+    options = ["-std=c99", "-ffp-contract=off", "-Os" if is_windows else "-O2", f"-I{folder}"]
+    options += ["-o", str(program), str(SOURCE)]
     if not is_windows:
         options.append("-ldl")  # until glibc 2.34, dlopen is in a library of its own
     try:
@@ -57,67 +77,98 @@ def compiled(folder: Path, command: Sequence[str] = (), name: str = "host") -> P
     return program
 
 
-def library_of(component: Component) -> Path:
-    """The library of an FMU for this machine, unpacked."""
-    identifier = component.description.coSimulation.modelIdentifier
-    return component.folder / "binaries" / "linux64" / f"{identifier}.so"
-
-
-def plan(system: System, experiment: Experiment, library: Library = library_of) -> str:
-    """What the host is to do, as it reads it.
-
-    Args:
-        system: to run; its connections are of Reals.
-        experiment: whose steps are all of one length.
-        library: where the library of an FMU is; beside its folder `binaries` is `resources`.
-
-    Raises:
-        InputError: it asks for what the host does not do.
-
-    """
+def _plan(system: System, experiment: Experiment, library: Library) -> str:
+    """What the host is compiled with: FMUs and members in the order of the stages."""
     if system.steps or any(connection.transformation for connection in system.connections):
         raise InputError("the C program has one step for all components, and no transformations")
-    columns: dict[PortName, int] = {}
-    lines = [f"step {experiment.step!r}", f"steps {experiment.full_steps}"]
-    for component in system.components.values():
-        lines += _fmu(component, library(component), system.parameters_of(component.name))
-        for causality in ("input", "output"):
-            for port in component.having(causality):
-                if port.type == "Real":
-                    columns[PortName(component.name, port.name)] = len(columns)
-                    lines.append(f"{causality} {port.valueReference} {port.name}")
-
-    def copies(word: str, connections: Sequence[Connection]) -> Iterator[str]:
-        return (f"{word} {columns[c.target]} {columns[c.source]}" for c in connections)
-
-    lines += copies("connect", system.connections)
-    number = dict(zip(system.components, count()))
     parts = stages(system, experiment.order)
-    for names, taken in zip(parts, gathered(system, parts), strict=True):
-        lines += ["stage", *copies("gather", taken), *(f"member {number[n]}" for n in names)]
-    return "\n".join(lines) + "\n"
+    columns: dict[PortName, int] = {}
+    references: list[int] = []
+    fmus, parameters = [], []
+    for number, name in enumerate(chain(*parts)):
+        component = system.components[name]
+        path = library(component)
+        fmu = {
+            "name": _text(name),
+            "guid": _text(component.description.guid),
+            "resources": _text((path.parents[2] / "resources").as_uri()),
+            "path": _text(str(path)),
+        }
+        for causality in ("input", "output"):
+            ports = [port for port in component.having(causality) if port.type == "Real"]
+            first = len(columns)
+            fmu[f"{causality}s"] = _struct(
+                references=f"references + {first}", n=len(ports), values=f"row + {first}"
+            )
+            columns |= {PortName(name, port.name): first + i for i, port in enumerate(ports)}
+            references += [port.valueReference for port in ports]
+        fmus.append(_struct(**fmu))
+        for parameter, value in system.parameters_of(name).items():
+            parameters.append(_setting(f"&fmus[{number}]", component.variable(parameter), value))
+    copies: list[Connection] = []
+    found, first = [], 0
+    takings = [system.connections, *gathered(system, parts)]
+    for names, taken in zip([[], *parts], takings, strict=True):
+        at = len(copies)
+        copies += taken
+        what = {"targets": f"targets + {at}", "sources": f"sources + {at}"}
+        what |= {"factors": "ones", "offsets": "zeros", "members": f"members + {first}"}
+        counts = {"n_connections": len(taken), "n_members": len(names), "every": 1}
+        found.append(_struct(**what, **counts))
+        first += len(names)
+    connections, *stepped = found
+    return f"""\
+enum {{ FMUS = {len(fmus)}, COLUMNS = {len(columns)} }};
+static const double STEP = {experiment.step!r};
+static const char header[] = {_text(",".join(("time", *map(str, columns))))};
+static double row[COLUMNS];
+static const reference references[] = {_listed(references)};
+static fmu fmus[] = {_listed(fmus)};
+static member members[FMUS];
+static const size_t targets[] = {_listed(columns[copy.target] for copy in copies)};
+static const size_t sources[] = {_listed(columns[copy.source] for copy in copies)};
+static const double ones[] = {_listed(1.0 for _ in copies)}, zeros[{len(copies)}];
+static const stage connections = {connections};
+static const stage stages[] = {_listed(stepped)};
+static void set_parameters(void) {{ {" ".join(parameters)} }}
+"""
 
 
-def _fmu(component: Component, library: Path, values: dict[str, Value]) -> Iterator[str]:
-    yield f"fmu {component.name}"
-    yield f"guid {component.description.guid}"
-    yield f"resources {(library.parents[2] / 'resources').as_uri()}"
-    yield f"library {library}"
-    for name, value in values.items():
-        variable = component.variable(name)
-        text = int(value) if isinstance(value, bool) else value
-        yield f"{variable.type.lower()} {variable.valueReference} {text}"
+def _listed(items: Iterable[object]) -> str:
+    return f"{{{', '.join(map(str, items))}}}"
+
+
+def _struct(**members: object) -> str:
+    return _listed(f".{name} = {value}" for name, value in members.items())
+
+
+def _text(value: str) -> str:
+    """A string of C, whatever is in it."""
+    safe = (chr(b) if chr(b).isalnum() and b < 128 else f"\\{b:03o}" for b in value.encode())
+    return f'"{"".join(safe)}"'
+
+
+def _setting(fmu: str, variable: ScalarVariable, value: Value) -> str:
+    """The call that sets a parameter."""
+    match variable.type:
+        case "Real":
+            return f"set_real({fmu}, {variable.valueReference}, {float(value)!r});"
+        case "String":
+            return f"set_string({fmu}, {variable.valueReference}, {_text(str(value))});"
+        case kind:
+            name = "fmi2SetBoolean" if kind == "Boolean" else "fmi2SetInteger"
+            return f'set_integer({fmu}, "{name}", {variable.valueReference}, {int(value)});'
 
 
 def run(
-    command: Sequence[str | Path], folder: Path, what: str, names: Sequence[str]
+    command: Sequence[str | Path], folder: Path, steps: int, names: Sequence[str]
 ) -> tuple[np.ndarray, float]:
     """Run the host.
 
     Args:
         command: that starts it.
-        folder: where it is started, for :data:`PLAN` and :data:`TABLE`.
-        what: the plan.
+        folder: where it is started, for :data:`TABLE`.
+        steps: how many.
         names: of the columns that are wanted.
 
     Returns:
@@ -127,14 +178,12 @@ def run(
         InputError: it fails.
 
     """
-    (folder / PLAN).write_text(what, encoding="utf-8")
     process = subprocess.run(
-        [*command, PLAN, TABLE],
+        [*command, str(steps), TABLE],
         cwd=folder, capture_output=True, text=True, errors="replace", check=False,
     )  # fmt: skip
     if process.returncode != 0:
         raise InputError(last_line(process.stderr, f"exit status {process.returncode}"))
-    with (folder / TABLE).open(encoding="utf-8") as lines:
-        header = lines.readline().strip().split(",")
-        rows = np.loadtxt(lines, delimiter=",", ndmin=2)
-    return rows[:, [header.index(name) for name in names]], float(process.stdout)
+    columns = read_columns(folder / TABLE)
+    rows = np.vstack([*read_rows(folder / TABLE)])
+    return rows[:, [1 + columns.index(name) for name in names]], float(process.stdout)

@@ -206,9 +206,9 @@ def _container(system: System, folder: Path, steps: int, step: float) -> Ran:
 
 
 def _c_program(system: System, folder: Path, steps: int, step: float) -> Ran:
-    what = c_host.plan(system, Experiment(steps * step, step, "jacobi"))
+    program = c_host.compiled(folder, system, Experiment(steps * step, step, "jacobi"))
     names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
-    rows, seconds = c_host.run([c_host.compiled(folder)], folder, what, names)
+    rows, seconds = c_host.run([program], folder, steps, names)
     return Ran(rows[1:], seconds)
 
 

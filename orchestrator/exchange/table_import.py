@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from array import array
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from orchestrator.machine.user_files import explained, lines_of
+from orchestrator.formats.tables import SEPARATORS, Record, records
 from orchestrator.master.experiment import ROUNDING
 from orchestrator.system.values import BOOLEANS, finite
-
-#: What separates the values of a row.
-_SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 
 #: Columns that name the time, in lower case.
 _TIME = ("time", "t")
@@ -59,17 +52,17 @@ def read_table(path: Path, ports: Mapping[str, str], known: Collection[str]) -> 
             or a port has two columns.
 
     """
-    with explained(path, "not a table that can be compared"), lines_of(path, newline="") as lines:
-        first = next(lines, "")
-        reader = _reader(chain([first], lines), _separator(first))
-        try:
-            return _table(reader, ports, known)
-        except csv.Error as error:
-            raise ValueError(f"line {reader.line_num}: {error}") from error
+    what = "not a table that can be compared"
+    with records(path, what, _places_of_time) as (names, rows):
+        return _table(names, rows, ports, known)
 
 
-def _table(reader: Any, ports: Mapping[str, str], known: Collection[str]) -> ForeignTable:
-    names = next(reader)
+def _table(
+    names: Sequence[str], rows: Iterable[Record], ports: Mapping[str, str], known: Collection[str]
+) -> ForeignTable:
+    if not _places_of_time(names):
+        separators = ", ".join(SEPARATORS.values())
+        raise ValueError(f"no column of its first line is named time (separators are {separators})")
     clock, *more = _places_of_time(names)
     if more:
         raise ValueError(f"{1 + len(more)} columns are named {names[clock].strip()}")
@@ -83,8 +76,10 @@ def _table(reader: Any, ports: Mapping[str, str], known: Collection[str]) -> For
         if port is not None and place != clock:
             places[port] = place
     time, columns = array("d"), {port: array("d") for port in places}
-    for row in _rows(reader, len(names)):
-        where = f"line {reader.line_num}"
+    for expected, (line, row) in enumerate(rows, start=2):
+        if line != expected:
+            raise ValueError(f"line {expected} is empty")
+        where = f"line {line}"
         time.append(finite(row[clock], f"{where}, time:"))
         if time[-1] < 0.0:
             raise ValueError(f"{where}: time {time[-1]:g} s is before the start at 0 s")
@@ -105,42 +100,10 @@ def _table(reader: Any, ports: Mapping[str, str], known: Collection[str]) -> For
     )
 
 
-def _reader(lines: Iterator[str], separator: str) -> Any:
-    return csv.reader(lines, delimiter=separator, skipinitialspace=True, strict=True)
-
-
-def _separator(header: str) -> str:
-    """The separator with which a line of names has one for the time."""
-    for separator in _SEPARATORS:
-        with suppress(csv.Error):
-            if _places_of_time(next(_reader(iter([header]), separator), [])):
-                return separator
-    separators = ", ".join(_SEPARATORS.values())
-    raise ValueError(f"no column of its first line is named time (separators are {separators})")
-
-
 def _places_of_time(names: Sequence[str]) -> list[int]:
     lowered = [name.strip().lower() for name in names]
     found = ([i for i, name in enumerate(lowered) if name == time] for time in _TIME)
     return next(filter(None, found), [])
-
-
-def _rows(reader: Any, width: int) -> Iterator[list[str]]:
-    """The rows below the names; empty lines may follow the last one only."""
-    empty, line = 0, reader.line_num
-    for row in reader:
-        line += 1
-        if reader.line_num != line:
-            # A lone quote, and the next one some rows later: what is between would be one value.
-            raise ValueError(f"line {line}: a value in quotes goes on in the next line")
-        if not row:
-            empty = empty or reader.line_num
-            continue
-        if empty:
-            raise ValueError(f"line {empty} is empty")
-        if len(row) != width:
-            raise ValueError(f"line {reader.line_num} has {len(row)} values below {width} names")
-        yield row
 
 
 def _port_of(name: str, known: Collection[str], longest: int) -> str | None:

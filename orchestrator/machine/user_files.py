@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -31,7 +32,7 @@ def explained(path: Path, what: str) -> Iterator[None]:
         raise InputError(f"{path}: cannot be read: {error.strerror or reason(error)}") from error
     except RecursionError as error:
         raise InputError(f"{path}: {what}: nested too deeply") from error
-    except ValueError as error:
+    except (ValueError, csv.Error) as error:
         raise InputError(f"{path}: {what}: {reason(error)}") from error
 
 

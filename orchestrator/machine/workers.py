@@ -5,20 +5,24 @@ from __future__ import annotations
 import logging
 import os
 import signal
+import tempfile
 import threading
 import time
-from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import partial
 from itertools import islice
 from multiprocessing import active_children, get_context, parent_process
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 from shutil import rmtree
 from typing import Any, TypeVar
 
 from tqdm import tqdm
 
+from orchestrator.machine import cache
 from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts, held_interrupts, without_interrupt
@@ -28,17 +32,69 @@ from orchestrator.machine.locks import process_folder
 _PATIENCE = 0.1
 
 #: How often a process is told to leave before it is ended.
-_REMINDERS = 50
+_REMINDERS = 8
 
 _Key = TypeVar("_Key", bound=Hashable)
 
 
 class Workers:
-    """Some processes, as :func:`workers` gives them."""
+    """Some processes, as :func:`workers` gives them.
 
-    def __init__(self, pool: ProcessPoolExecutor, n: int, interrupts: Interrupts) -> None:
-        """Use a pool of n processes."""
-        self._pool, self._n, self._interrupts = pool, n, interrupts
+    Attributes:
+        n: how many.
+
+    """
+
+    def __init__(self, n: int, begin: Callable[[], object], interrupts: Interrupts) -> None:
+        """Start no process yet.
+
+        Args:
+            n: how many there may be.
+            begin: called in each of them first.
+            interrupts: signals to stop.
+
+        """
+        self.n = n
+        self._begin, self._interrupts = begin, interrupts
+        self._others = set(active_children())
+        self._pool = self._fresh()
+
+    def renew(self) -> None:
+        """End all processes, of which one has died: what follows is done by others."""
+        self.close(at_once=True)
+        self._pool = self._fresh()
+
+    def submit(self, task: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Have a process do something.
+
+        Raises:
+            InputError: none can be started.
+
+        """
+        try:
+            with without_interrupt():
+                return self._pool.submit(task, *arguments)
+        except BrokenProcessPool as error:
+            # One has died that had nothing to do: that is said where the task is waited for.
+            future: Future[Any] = Future()
+            future.set_exception(error)
+            return future
+        except (OSError, RuntimeError) as error:
+            raise InputError(f"no process can be started: {reason(error)}") from error
+
+    def done(self, futures: Iterable[Future[Any]]) -> set[Future[Any]]:
+        """Wait until one of some tasks is done.
+
+        Raises:
+            KeyboardInterrupt: there was a signal to stop.
+
+        """
+        found: set[Future[Any]] = set()
+        while not found:
+            found, _ = wait(futures, _PATIENCE, FIRST_COMPLETED)
+            if self._interrupts:
+                raise KeyboardInterrupt
+        return found
 
     def results(
         self, tasks: Mapping[_Key, Callable[[], Any]], unit: str
@@ -55,17 +111,22 @@ class Workers:
         with tqdm(total=len(tasks), unit=unit, disable=None) as bar:
             while True:
                 # No more than can be begun: what a process has been given it cannot give back.
-                with without_interrupt(), _started():
-                    for key, task in islice(left, self._n - len(keys)):
-                        keys[self._pool.submit(task)] = key
+                for key, task in islice(left, self.n - len(keys)):
+                    keys[self.submit(task)] = key
                 if not keys:
                     return
-                done, _ = wait(keys, _PATIENCE, FIRST_COMPLETED)
-                if self._interrupts:
-                    raise KeyboardInterrupt
-                for future in done:
+                for future in self.done(keys):
                     bar.update()
                     yield keys.pop(future), _result(future, unit)
+
+    def close(self, at_once: bool = False) -> None:
+        """End all processes, when they are done with what they have been given or at once."""
+        if at_once:
+            _end(set(active_children()) - self._others)
+        self._pool.shutdown(cancel_futures=True)
+
+    def _fresh(self) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(self.n, get_context("spawn"), self._begin)
 
 
 def _result(future: Future[Any], unit: str) -> Any:
@@ -78,22 +139,36 @@ def _result(future: Future[Any], unit: str) -> Any:
 
 
 @contextmanager
-def workers() -> Iterator[Workers]:
+def workers(n: int | None = None, setup: Callable[[], object] = bool) -> Iterator[Workers]:
     """Processes for the time of the context; an exception ends them at once.
 
     FMUs are libraries that a process loads, so the processes are fresh ones, not copies of this.
+
+    Args:
+        n: how many; None: one for each core.
+        setup: called first in each of them.
+
     """
-    others = set(active_children())
-    n = os.cpu_count() or 1
+    # What a killed process leaves goes with the folder of this one.
+    environment = {"TMPDIR": str(process_folder())} | cache.environment()
     with held_interrupts() as interrupts:
-        pool = ProcessPoolExecutor(n, get_context("spawn"), _begin)
+        crew = Workers(n or _cores(), partial(_begin, environment, setup), interrupts)
         try:
-            yield Workers(pool, n, interrupts)
+            yield crew
         except BaseException:
-            _end(set(active_children()) - others)
+            crew.close(at_once=True)
             raise
-        finally:
-            pool.shutdown(cancel_futures=True)
+        crew.close()
+
+
+def _cores() -> int:
+    """How many cores this process may use."""
+    n = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    # The share of a container; "max" where there is no limit.
+    with suppress(OSError, ValueError):
+        quota, period = map(int, Path("/sys/fs/cgroup/cpu.max").read_text().split())
+        n = min(n, -(-quota // period))
+    return n
 
 
 def _end(processes: Collection[BaseProcess]) -> None:
@@ -108,17 +183,10 @@ def _end(processes: Collection[BaseProcess]) -> None:
         process.kill()
 
 
-@contextmanager
-def _started() -> Iterator[None]:
-    """Processes that cannot be started, in words."""
-    try:
-        yield
-    except (OSError, RuntimeError) as error:
-        raise InputError(f"no process can be started: {reason(error)}") from error
-
-
-def _begin() -> None:
+def _begin(environment: Mapping[str, str], setup: Callable[[], object]) -> None:
     """In a new process: leave by SIGTERM as by any other exit, without temporary folders."""
+    os.environ.update(environment)
+    tempfile.tempdir = environment["TMPDIR"]
     signal.signal(signal.SIGTERM, _leave)
     if hasattr(signal, "SIGHUP"):
         # The end of the terminal is for the process to answer that has started this one.
@@ -127,6 +195,7 @@ def _begin() -> None:
     # As in the process that has started this one.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     imported_apart("matplotlib", "matplotlibrc")
+    setup()
 
 
 def _follow() -> None:

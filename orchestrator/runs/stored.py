@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from orchestrator.figures.visible import VisibleRows
+from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.ledger import RECORD, is_changed, located
 from orchestrator.machine.user_files import explained, text_of
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.files import FORMATS, read_columns, read_rows
+from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
 from orchestrator.runs.record import read_ending, read_header

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +10,7 @@ from auv_fmu import path_planner
 from auv_fmu.actuators import Limits
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.vehicle import Vehicle
-from orchestrator.machine.user_files import explained, lines_of
+from orchestrator.formats.tables import records
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import finite
@@ -21,9 +19,8 @@ from orchestrator.vehicle.signals import ACTUATORS
 #: The name of its model.
 _MODEL = "PathPlanner"
 
-#: The columns of a table, without times and with them, and what may separate them.
-_PLACE, _TIMED = ("x", "y", "z"), ("t", "x", "y", "z")
-_SEPARATORS = ",;\t"
+#: The columns of a table, without times and with them.
+_PLACE, _TIMED = ["x", "y", "z"], ["t", "x", "y", "z"]
 
 
 def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
@@ -37,15 +34,14 @@ def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
         InputError: there is no such table, or it has a mistake.
 
     """
-    with explained(path, "not a table of waypoints"), lines_of(path, newline="") as lines:
-        first = next(lines, "")
-        separator = next((mark for mark in _SEPARATORS if mark in first), _SEPARATORS[0])
-        reader = csv.DictReader(chain([first], lines), delimiter=separator, skipinitialspace=True)
-        names = [name.strip().lower() for name in reader.fieldnames or ()]
-        if sorted(names) not in (sorted(_PLACE), sorted(_TIMED)):
+    with records(path, "not a table of waypoints", _are_of_waypoints) as (first, rows):
+        names = [*map(_plain, first)]
+        if not _are_of_waypoints(first):
             raise ValueError(f"its columns are {', '.join(names)}; use x, y, z or t, x, y, z")
-        reader.fieldnames = names
-        waypoints = [_waypoint(row, names, f"line {reader.line_num}") for row in reader]
+        waypoints = [
+            {n: finite(text, f"line {line}, {n}:") for n, text in zip(names, values, strict=True)}
+            for line, values in rows
+        ]
         if not 2 <= len(waypoints) <= MOST:
             raise ValueError(f"it has {len(waypoints)} waypoints; a path has 2 to {MOST}")
     values: dict[str, Any] = {"count": len(waypoints), "timed": "t" in names}
@@ -85,7 +81,9 @@ def _planned(values: Mapping[str, Any]) -> Parameters:
     )
 
 
-def _waypoint(row: Mapping[Any, Any], names: Sequence[str], where: str) -> dict[str, float]:
-    if None in row or None in row.values():
-        raise ValueError(f"{where} has not {len(names)} values")
-    return {name: finite(row[name], f"{where}, {name}:") for name in names}
+def _plain(name: str) -> str:
+    return name.strip().lower()
+
+
+def _are_of_waypoints(names: Sequence[str]) -> bool:
+    return sorted(map(_plain, names)) in (_PLACE, _TIMED)

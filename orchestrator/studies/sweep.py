@@ -25,6 +25,7 @@ from orchestrator.runs.preparation import Prepared, loaded
 from orchestrator.runs.request import CliOption, Force, Kind, LoopName
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
+from orchestrator.studies.blocks import making
 from orchestrator.studies.engine import Engine
 from orchestrator.studies.figures import draw_figures, figure_files, read_figures
 from orchestrator.studies.fmu_engine import FmuEngine
@@ -33,13 +34,13 @@ from orchestrator.studies.store import Store, StudyResult, read_record, store
 from orchestrator.studies.study import BATCH, ENGINES, FMU, Study, read_study, study_of
 
 #: Packages whose versions the runs and their table depend on.
-_PACKAGES = (*PACKAGES, "numba", "distributed", "pyarrow", "scipy")
+_PACKAGES = (*PACKAGES, "numba", "pyarrow", "scipy")
 
 #: What a study says of its runs.
 _STATED = ("vary", "sample", "parameters", "stop_time", "step", "order")
 
 #: What a study needs besides.
-_NEEDED = ("distributed", "numba", "pyarrow", "scipy")
+_NEEDED = ("numba", "pyarrow", "scipy")
 
 #: Fewer runs than this are not worth a word on what would make them faster.
 _MANY = 100
@@ -148,7 +149,7 @@ def swept(
         KeyboardInterrupt: somebody wants it to stop.
 
     """
-    check_installed()
+    check_installed(_NEEDED if means.scheduler is None else (*_NEEDED, "distributed"))
     systems = {name: loaded(name, means.kind) for name in study.scenario}
     space = Space(study, systems)
     plans = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
@@ -171,14 +172,16 @@ def swept(
     return result
 
 
-def check_installed() -> None:
-    """Check that what studies need is there.
+def check_installed(needed: Sequence[str] = _NEEDED) -> None:
+    """Check that the packages are there that studies need.
 
     Raises:
         InputError: it is not.
 
     """
-    missing = [package for package in _NEEDED if find_spec(package) is None]
+    missing = [package for package in needed if find_spec(package) is None]
+    if "distributed" in missing:
+        raise InputError("--scheduler needs Dask: pip install 'auv-fmu[cluster]'")
     if missing:
         raise InputError(f"studies need {', '.join(missing)}: pip install 'auv-fmu[studies]'")
 
@@ -268,9 +271,6 @@ def _complete(
         name: of the study, for a bar; None: without one.
 
     """
-    # Whoever looks at a study that is done needs not wait for Dask.
-    from orchestrator.studies.cluster import making  # noqa: PLC0415
-
     runs = (space[number] for number in unfinished.missing(len(space)))
     with (
         making(engine, runs, scheduler=means.scheduler, workers=means.workers) as blocks,

@@ -20,7 +20,7 @@ PAGE = DOCS / "studies.md"
 TEXT = PAGE.read_text(encoding="utf-8")
 
 needs_extra = pytest.mark.skipif(
-    not all(map(find_spec, ("distributed", "pyarrow", "scipy"))),
+    not all(map(find_spec, ("numba", "pyarrow", "scipy"))),
     reason="needs the extra `studies`",
 )
 

@@ -100,8 +100,8 @@ def test_host_runs_where_there_is_nothing_but_a_c_library(
 ):
     """5,000 steps; the table is that of the FMUs in Python, with tolerance 0."""
     root = in_root()
-    host = c_host.compiled(tmp_path)
     system = system_of(native, scenario)
+    host = c_host.compiled(tmp_path, system, WHOLE, place(Path("/"), "linux64", ".so"))
     for component in system.components.values():
         shutil.copytree(unpacked / component.fmu.stem, tmp_path / component.fmu.stem)
     binaries = [host, *tmp_path.glob("*/binaries/linux64/*.so")]
@@ -109,8 +109,7 @@ def test_host_runs_where_there_is_nothing_but_a_c_library(
         target = tmp_path / library.relative_to("/")
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(library, target)
-    plan = c_host.plan(system, WHOLE, place(Path("/"), "linux64", ".so"))
-    c_host.run([*root, tmp_path, "/host"], tmp_path, plan, [])
+    c_host.run([*root, tmp_path, "/host"], tmp_path, WHOLE.full_steps, [])
     said = verify(tmp_path / c_host.TABLE, system_of(dist, scenario), 0.0)
     assert "to 100 s, in gauss-seidel order" in said
 
@@ -120,36 +119,40 @@ def zig(machine: str) -> list[str]:
 
 
 def run_elsewhere(
-    system: System, folder: Path, command: Sequence[str | Path], library: c_host.Library
+    system: System,
+    folder: Path,
+    machine: str,
+    library: c_host.Library,
+    command: Sequence[str | Path],
+    name: str = "host",
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of all Reals on another machine, and here."""
+    """Rows of all Reals on another machine, where the command runs a program, and here."""
     here = run(system, SHORT.stop_time, SHORT.step)
     names = [name for name in here.header.columns if not name.endswith(".fault")]
-    rows, _ = c_host.run(command, folder, c_host.plan(system, SHORT, library), names)
+    program = c_host.compiled(folder, system, SHORT, library, zig(machine), name)
+    rows, _ = c_host.run([*command, program], folder, SHORT.full_steps, names)
     return rows, here.group(*names)
 
 
 @pytest.fixture(scope="module")
 def windows(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The host for Windows, and the libraries that the build makes for it."""
+    """The libraries that the build makes for Windows."""
     folder = tmp_path_factory.mktemp("windows")
     bundle.build(folder, kind="native", platforms="win64")
     for name in NAMES:
         fmpy.extract(folder / f"{name}.fmu", unzipdir=folder / name)
-    c_host.compiled(folder, zig("x86_64-windows"), "host.exe")
     return folder
 
 
 @pytest.fixture(scope="module")
 def arm(unpacked: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The host for ARM, and libraries made from the sources: FMI 2.0 has no name for it."""
+    """Libraries for ARM, made from the sources: FMI 2.0 has no name for it."""
     folder = tmp_path_factory.mktemp("arm")
     for name in NAMES:
         made = folder / name / "binaries" / "arm" / f"{name}.so"
         made.parent.mkdir(parents=True)
         command = [*zig("aarch64-linux"), *FLAGS, "-o", made, "fmi2.c", "-lm"]
         subprocess.run(command, cwd=unpacked / name / "sources", check=True)
-    c_host.compiled(folder, zig("aarch64-linux"), "host")
     return folder
 
 
@@ -159,9 +162,10 @@ def arm(unpacked: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @each_scenario
 def test_windows_gives_the_same_but_for_rounding(native: Path, windows: Path, scenario: str):
     """Its C library has another sine."""
-    command = [str(WINE), windows / "host.exe"]
     library = place(windows, "win64", ".dll")
-    there, here = run_elsewhere(system_of(native, scenario), windows, command, library)
+    there, here = run_elsewhere(
+        system_of(native, scenario), windows, "x86_64-windows", library, [str(WINE)], "host.exe"
+    )
     np.testing.assert_allclose(there, here, rtol=0.0, atol=1e-9)
 
 
@@ -171,9 +175,8 @@ def test_windows_gives_the_same_but_for_rounding(native: Path, windows: Path, sc
 @pytest.mark.skipif(not ARM_LIBRARIES.is_dir(), reason="there is no C library for ARM")
 @each_scenario
 def test_arm_gives_the_same_bit_for_bit(native: Path, arm: Path, scenario: str):
-    command = [str(QEMU), "-L", ARM_LIBRARIES, arm / "host"]
-    library = place(arm, "arm", ".so")
-    there, here = run_elsewhere(system_of(native, scenario), arm, command, library)
+    library, command = place(arm, "arm", ".so"), [str(QEMU), "-L", ARM_LIBRARIES]
+    there, here = run_elsewhere(system_of(native, scenario), arm, "aarch64-linux", library, command)
     np.testing.assert_array_equal(there, here)
 
 

@@ -36,8 +36,7 @@ ALLOWED = {
     "orchestrator": {
         "auv_fmu", "dask", "distributed", "fmpy", "fmus", "libcosimpy", "lxml", "markdown_it",
         "matplotlib", "numba", "numpy", "pandas", "PIL", "platformdirs", "pyarrow", "pydantic",
-        "pydantic_core", "scipy",
-        "tornado", "tqdm",
+        "pydantic_core", "scipy", "tqdm",
     },
 }  # fmt: skip
 

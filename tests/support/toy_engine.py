@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from orchestrator.studies.engine import Outcome, Point
@@ -40,3 +40,13 @@ def outcome(run: Point, process: int = 0) -> Outcome:
 def run(number: int, parameters: Mapping[str, Any] = {}) -> Point:
     """A run of a second's steps."""
     return Point(number, "toy", {"toy.x": 0.1 * number, **parameters}, 1.0, 0.02)
+
+
+def numbers_and_squares(blocks: Iterable[Sequence[Outcome]]) -> list[tuple[int, Any]]:
+    """What has come of runs, in their order."""
+    return sorted((made.number, made.indices.get("square")) for block in blocks for made in block)
+
+
+def expected(runs: Iterable[Point]) -> list[tuple[int, Any]]:
+    """What is to come of them."""
+    return [(run.number, outcome(run).indices["square"]) for run in runs]

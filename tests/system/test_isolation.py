@@ -19,11 +19,11 @@ import pytest
 
 from orchestrator.commands.main import main
 from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.formats.tables import read_rows
 from orchestrator.machine.errors import InputError, StartError
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.loop import chosen
-from orchestrator.master.observers.files import read_rows
 from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned

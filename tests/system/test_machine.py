@@ -22,8 +22,8 @@ import pytest
 from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.commands.streams import INTERRUPTED
+from orchestrator.formats.tables import read_rows
 from orchestrator.machine.locks import claimed
-from orchestrator.master.observers.files import read_rows
 from orchestrator.runs import record
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.stored import read_result

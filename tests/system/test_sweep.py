@@ -23,7 +23,7 @@ from orchestrator.studies.sweep import Means, faster
 from support import others
 from support.machine import contents
 
-pytest.importorskip("distributed", reason="needs Dask: the extra `studies`")
+pytest.importorskip("numba", reason="needs the extra `studies`")
 
 STUDY = """
 title = "Two starts"

@@ -2,32 +2,24 @@
 
 from __future__ import annotations
 
-import json
-import os
 import signal
 import socket
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from ctypes import c_double
 from dataclasses import dataclass
-from functools import partial
 from math import inf, isfinite
 from numbers import Real
-from select import poll
-from subprocess import PIPE, Popen, TimeoutExpired
-from time import monotonic
 from typing import Any
 
 import numpy as np
 from fmpy.fmi2 import fmi2OK, fmi2Pending, fmi2Warning
 
-from orchestrator.machine.errors import InputError, StartError, reason
+from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts
 from orchestrator.master.fmi.channel import LONGEST_NOTE, LONGEST_STATE, Channel, sizes
-from orchestrator.master.fmi.instance import ComponentFailed, Ended, Instance, Part
+from orchestrator.master.fmi.instance import ComponentFailed, Ended, Part
 from orchestrator.master.fmi.log import Log
-from orchestrator.master.fmi.supervisor import END
 from orchestrator.master.stepper_types import CMember
 from orchestrator.system.component import Component
 from orchestrator.system.values import StringTable, Value, is_integer, is_of
@@ -40,19 +32,10 @@ _START = 60.0
 
 #: How often the wait for an FMU looks about [s], how long it still waits when the user wants to
 #: stop [s], and how long an FMU has to be freed when the run has failed [s].
-_GLANCE, _PATIENCE, _FAREWELL = 0.1, 1.0, 5.0
+_GLANCE, _PATIENCE, FAREWELL = 0.1, 1.0, 5.0
 
 #: Statuses that a message can have.
 _STATUSES = range(fmi2OK, fmi2Pending + 1)
-
-#: What the supervisor begins with: the modules that this process would find, and no main module.
-_BEGIN = """
-import json, sys
-order = json.loads(sys.stdin.buffer.raw.readline())
-sys.path[:] = order["path"]
-from orchestrator.master.fmi.supervisor import keep
-keep(order)
-"""
 
 
 @dataclass(frozen=True)
@@ -270,7 +253,7 @@ class IsolatedInstance:
     def farewell(self) -> None:
         """Give the process some time to end; there is no use in waiting for one that hangs."""
         if not self._hangs:
-            self._status(min(self._timeout, _FAREWELL))
+            self._status(min(self._timeout, FAREWELL))
 
     def _take_outputs(self) -> int:
         # Those of a step that has ended the run are there already.
@@ -381,7 +364,7 @@ class IsolatedInstance:
         return ComponentFailed(text, fatal=True)
 
     def _lost(self) -> ComponentFailed:
-        status = self._status(_FAREWELL)
+        status = self._status(FAREWELL)
         return ComponentFailed(
             f"{self.name}: its process {_end(status)} in {self._doing}", fatal=True
         )
@@ -406,120 +389,3 @@ def _end(status: int | None) -> str:
     name = names.get(-status, f"signal {-status}")
     memory = ", perhaps for want of memory" if -status == signal.SIGKILL else ""
     return f"was ended by {name} ({signal.strsignal(-status)}{memory})"
-
-
-class _Supervisor:
-    """The process that has the FMUs' processes: see :mod:`.supervisor`."""
-
-    def __init__(
-        self, components: Mapping[str, Component], connections: Sequence[socket.socket]
-    ) -> None:
-        folders = [component.folder for component in components.values()]
-        descriptors = [connection.fileno() for connection in connections]
-        order = {
-            "path": [entry for entry in sys.path if isinstance(entry, str)],
-            "temporary": sorted({str(folder.parent) for folder in folders}),
-            "components": [
-                (component.name, str(component.fmu), component.digest, str(folder), descriptor)
-                for component, folder, descriptor in zip(
-                    components.values(), folders, descriptors, strict=True
-                )
-            ],
-        }
-        self._process = Popen(
-            [sys.executable, "-P", "-c", _BEGIN],
-            stdin=PIPE,
-            stdout=PIPE,
-            bufsize=0,
-            pass_fds=descriptors,
-            start_new_session=True,
-        )
-        self._statuses: dict[int, int] = {}
-        self._text = b""
-        self._write(json.dumps(order).encode() + b"\n")
-
-    def status(self, number: int, patience: float) -> int | None:
-        """Exit status of the process of a component, for which it waits some seconds.
-
-        Returns:
-            None: it has not ended.
-
-        """
-        due = monotonic() + patience
-        reports = self._process.stdout
-        assert reports is not None
-        ready = poll()
-        ready.register(reports)
-        while number not in self._statuses and (left := due - monotonic()) > 0.0:
-            if ready.poll(1000.0 * left):
-                text = os.read(reports.fileno(), 4096)
-                if not text:
-                    # Its children die with the supervisor.
-                    return -signal.SIGKILL
-                *lines, self._text = (self._text + text).split(b"\n")
-                for line in lines:
-                    ended, exit_status = map(int, line.split())
-                    self._statuses[ended] = exit_status
-        return self._statuses.get(number)
-
-    def end(self) -> None:
-        """End all processes that are left."""
-        self._write(END)
-        try:
-            self._process.wait(_FAREWELL)
-        except TimeoutExpired:
-            self._process.kill()
-        with self._process:
-            pass
-
-    def _write(self, text: bytes) -> None:
-        assert self._process.stdin is not None
-        with suppress(OSError):
-            self._process.stdin.write(text)
-
-
-@contextmanager
-def isolated(
-    components: Mapping[str, Component], log: Log, isolation: Isolation, interrupts: Interrupts
-) -> Iterator[dict[str, Instance]]:
-    """Instances of components, each in a process of its own; all are gone at the end.
-
-    Args:
-        components: by their names.
-        log: takes what the FMUs say.
-        isolation: how long they may take.
-        interrupts: that end the wait for an FMU.
-
-    Raises:
-        InputError: an FMU cannot be loaded.
-        StartError: no process can be started.
-        ComponentFailed: an FMU has failed while it was instantiated.
-
-    """
-    with ExitStack() as stack:
-        try:
-            pairs = [socket.socketpair() for _ in components]
-            for pair in pairs:
-                for end in pair:
-                    stack.enter_context(end)
-            supervisor = _Supervisor(components, [there for _, there in pairs])
-        except OSError as error:
-            raise StartError(f"cannot start processes for FMUs: {reason(error)}") from error
-        stack.callback(supervisor.end)
-        instances = []
-        for number, component in enumerate(components.values()):
-            here, there = pairs[number]
-            there.close()
-            status = partial(supervisor.status, number)
-            instances.append(
-                IsolatedInstance(component, here, status, log, isolation.step_timeout, interrupts)
-            )
-        try:
-            for instance in instances:
-                instance.wait()
-            yield {instance.name: instance for instance in instances}
-        finally:
-            for instance in instances:
-                instance.leave()
-            for instance in instances:
-                instance.farewell()

@@ -1,26 +1,20 @@
-"""Rows written to files as they come, and read again."""
+"""Rows written to files as they come."""
 
 from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
-from importlib.util import find_spec
 from io import BufferedWriter, RawIOBase, StringIO
-from itertools import compress, islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.user_files import lines_of
+from orchestrator.formats.tables import ROWS, parquet
 from orchestrator.master.observers.observer import Ending, Header
-
-#: Rows that are written to Parquet, or read, at once.
-_ROWS = 8192
 
 #: What Parquet needs at most: bytes of a value, and bytes that describe a column of the rows that
 #: are written at once.
@@ -165,7 +159,7 @@ class ParquetFile:
             InputError: pyarrow is not installed.
 
         """
-        _check_pyarrow()
+        self._parquet = parquet()
         self._path = path
 
     def begin(self, header: Header) -> None:
@@ -178,18 +172,18 @@ class ParquetFile:
         self._schema = self._arrow.schema(list(zip(("time", *header.columns), kinds, strict=True)))
         self._output = _Output(self._path)
         self._file = BufferedWriter(self._output)
-        self._writer = import_module("pyarrow.parquet").ParquetWriter(self._file, self._schema)
+        self._writer = self._parquet.ParquetWriter(self._file, self._schema)
         self._waiting = [np.empty((0, len(self._schema)))]
-        self._n, self._room = 0, min(header.experiment.rows, _ROWS)
+        self._n, self._room = 0, min(header.experiment.rows, ROWS)
         self._take_room()
 
     def take(self, rows: np.ndarray) -> None:
         """Write some rows, when there are enough of them: always as many at once."""
         self._waiting.append(rows.copy())
-        while sum(map(len, self._waiting)) >= _ROWS:
+        while sum(map(len, self._waiting)) >= ROWS:
             waiting = np.vstack(self._waiting)
-            self._waiting = [waiting[_ROWS:]]
-            self._write(waiting[:_ROWS])
+            self._waiting = [waiting[ROWS:]]
+            self._write(waiting[:ROWS])
             self._take_room()
 
     def end(self, ending: Ending) -> None:
@@ -225,86 +219,3 @@ class ParquetFile:
 
 #: Writers by the ending of their files.
 FORMATS: dict[str, type[CsvFile] | type[ParquetFile]] = {"csv": CsvFile, "parquet": ParquetFile}
-
-
-def read_columns(path: Path) -> tuple[str, ...]:
-    """The names of the columns behind the time.
-
-    Raises:
-        InputError: the file is no table of a run.
-
-    """
-    with _explained(path):
-        if path.suffix == ".parquet":
-            with _parquet(path) as file:
-                return _behind_time(file.schema_arrow.names)
-        with lines_of(path) as lines:
-            return _behind_time(next(csv.reader(lines), ()))
-
-
-def read_rows(path: Path, strings: Collection[str] = ()) -> Iterator[np.ndarray]:
-    """The rows of a file, time first, some thousand at a time.
-
-    Args:
-        path: of the file.
-        texts: columns that hold texts, and are left out.
-
-    Raises:
-        InputError: the file is no table of a run.
-
-    """
-    with _explained(path):
-        if path.suffix == ".parquet":
-            with _parquet(path) as file:
-                names = [name for name in file.schema_arrow.names if name not in strings]
-                for batch in file.iter_batches(_ROWS, columns=names):
-                    columns = [column.to_numpy(zero_copy_only=False) for column in batch.columns]
-                    yield np.column_stack(columns).astype(float, copy=False)
-        elif strings:
-            with lines_of(path, newline="") as lines:
-                table = csv.reader(lines)
-                kept = [name not in strings for name in next(table, ())]
-                while records := list(islice(filter(None, table), _ROWS)):
-                    if any(len(record) != len(kept) for record in records):
-                        raise ValueError(f"a row has not {len(kept)} values, as there are names")
-                    yield np.array([list(map(float, compress(it, kept))) for it in records])
-        else:
-            with lines_of(path) as lines:
-                width = 1 + len(_behind_time(next(csv.reader(lines), ())))
-                filled = (line for line in lines if line.strip())
-                while block := list(islice(filled, _ROWS)):
-                    rows = np.loadtxt(block, delimiter=",", comments=None, quotechar='"', ndmin=2)
-                    if rows.shape[1] != width:
-                        raise ValueError(f"rows of {rows.shape[1]} values below {width} names")
-                    yield rows
-
-
-def _behind_time(names: Sequence[str]) -> tuple[str, ...]:
-    if not names:
-        raise ValueError("it is empty")
-    first, *others = names
-    if first != "time":
-        raise ValueError(f"its first column is {first!r}, not 'time'")
-    return tuple(others)
-
-
-def _parquet(path: Path) -> Any:
-    _check_pyarrow()
-    return import_module("pyarrow.parquet").ParquetFile(path)
-
-
-def _check_pyarrow() -> None:
-    if find_spec("pyarrow") is None:
-        raise InputError("Parquet needs pyarrow: pip install 'auv-fmu[parquet]'")
-
-
-@contextmanager
-def _explained(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except InputError:
-        raise
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {reason(error)}") from error
-    except (ValueError, csv.Error) as error:
-        raise InputError(f"{path}: not a table of a run: {reason(error)}") from error

@@ -73,7 +73,6 @@ def test_workers_of_a_report_read_it_no_more(workplace):
 @pytest.mark.slow
 def test_numba_takes_nothing_from_the_current_folder(workplace):
     pytest.importorskip("numba", reason="needs the extra `studies`")
-    pytest.importorskip("distributed", reason="needs the extra `studies`")
     Path(".numba_config.yaml").write_text(
         "cache_dir: planted\ncache_locator_classes: evil.Locator\ndisable_jit: 1\n"
     )

@@ -1,11 +1,10 @@
-"""Runs made by real schedulers and worker processes, of which some are lost."""
+"""Runs made by real schedulers and their workers, of which some are lost."""
 
 from __future__ import annotations
 
 import json
 import os
 import re
-import signal
 import socket
 import subprocess
 import sys
@@ -16,78 +15,19 @@ from pathlib import Path
 
 import pytest
 
-from support.tiers import slow
-from support.toy_engine import Toy, outcome, run
+from support.toy_engine import Toy, expected, numbers_and_squares, run
 
-pytest.importorskip("distributed", reason="needs the extra `studies`")
+pytest.importorskip("distributed", reason="needs the extra `cluster`")
 
 from dask import config
 
 from orchestrator.machine.errors import InputError
-from orchestrator.studies import cluster
-from orchestrator.studies.cluster import FATAL, making
+from orchestrator.studies.blocks import making
 
 TESTS = Path(__file__).parents[3]
 
 #: Less than the minute for which a client waits that could not connect [s].
 PATIENCE = 45.0
-
-
-def numbers_and_squares(blocks):
-    return sorted((made.number, made.indices.get("square")) for block in blocks for made in block)
-
-
-def expected(runs):
-    return [(run.number, outcome(run).indices["square"]) for run in runs]
-
-
-def test_every_run_is_made_once_by_processes_that_stay_silent(capfd):
-    runs = [run(number, {"toy.talks": True}) for number in range(1000)]
-    with making(Toy(), iter(runs), workers=2) as blocks:
-        assert numbers_and_squares(blocks) == expected(runs)
-    assert capfd.readouterr() == ("", "")
-
-
-def test_runs_are_taken_as_they_are_needed():
-    """A study of any number of runs has a bounded number of them under way."""
-    taken = count()
-    with making(Toy(0.2), (run(next(taken)) for _ in count()), workers=2) as blocks:
-        next(blocks)
-        assert next(taken) < 20
-
-
-@pytest.mark.slow
-def test_runs_that_take_longer_than_those_before_come_in_smaller_blocks(monkeypatch):
-    monkeypatch.setattr(cluster, "_SECONDS", 0.2)
-    slow, longest = 0.05, 0.4
-    runs = [run(number, {"toy.seconds": slow * (number >= 300)}) for number in range(360)]
-    with making(Toy(), runs, workers=2) as blocks:
-        made = list(blocks)
-    assert numbers_and_squares(made) == expected(runs)
-    for block in made:
-        assert sum(outcome.number >= 300 for outcome in block) <= longest / slow + 1
-
-
-@pytest.mark.slow
-def test_a_worker_that_is_killed_costs_no_run():
-    runs = [run(number) for number in range(200)]
-    with making(Toy(0.02), runs, workers=2) as blocks:
-        first = next(blocks)
-        os.kill(int(first[0].indices["process"]), signal.SIGKILL)
-        assert numbers_and_squares([first, *blocks]) == expected(runs)
-
-
-@pytest.mark.slow
-def test_a_run_that_ends_every_process_is_the_only_one_that_fails():
-    runs = [run(number, {"toy.fatal": number == 17}) for number in range(40)]
-    with (
-        config.set({"distributed.scheduler.allowed-failures": 0}),
-        making(Toy(), runs, workers=2) as blocks,
-    ):
-        made = {made.number: made for block in blocks for made in block}
-    assert sorted(made) == [run.number for run in runs]
-    assert [n for n, made in made.items() if made.failure] == [17]
-    assert made[17].failure == FATAL and not made[17].indices
 
 
 def gives_up_after(seconds):
@@ -117,7 +57,7 @@ def scheduler(tmp_path):
     file = tmp_path / "scheduler.json"
     local = ("--host", "127.0.0.1", "--port", "0", "--dashboard-address", "127.0.0.1:0")
     with started("scheduler", *local, "--scheduler-file", file) as process:
-        while not file.exists():
+        while not (file.exists() and file.stat().st_size):
             assert process.poll() is None
             time.sleep(0.05)
         yield json.loads(file.read_text())["address"], process
@@ -163,7 +103,6 @@ def test_a_scheduler_that_goes_is_said(scheduler, tmp_path):
         ({"scheduler": "tcp://127.0.0.1:1"}, "no scheduler answers at tcp://127.0.0.1:1"),
         ({"scheduler": "nowhere"}, "no scheduler answers at nowhere"),
         ({"scheduler": "tcp://127.0.0.1:1", "workers": 2}, "--workers is for"),
-        ({"workers": 0}, "--workers 0: must be at least 1"),
     ],
 )
 def test_who_cannot_make_runs_is_said_in_a_line(means, text):
@@ -185,7 +124,7 @@ def test_no_address_leaves_anything_to_wait_for():
     ]  # fmt: skip
     code = (
         "from orchestrator.machine.errors import InputError\n"
-        "from orchestrator.studies.cluster import making\n"
+        "from orchestrator.studies.blocks import making\n"
         "from support.toy_engine import Toy\n"
         f"for address in {addresses}:\n"
         "    try:\n"
@@ -211,13 +150,3 @@ def test_who_answers_and_says_nothing_is_no_scheduler():
             making(Toy(), [], scheduler=address),
         ):
             pass
-
-
-@pytest.mark.parametrize("name", ["a:b [c] %41", *slow("x" * 150)])
-def test_temporary_folders_have_any_name(tmp_path, monkeypatch, name):
-    folder = tmp_path / name
-    folder.mkdir()
-    monkeypatch.setattr(cluster, "process_folder", lambda: folder)
-    runs = [run(number) for number in range(20)]
-    with making(Toy(), iter(runs), workers=1) as blocks:
-        assert numbers_and_squares(blocks) == expected(runs)

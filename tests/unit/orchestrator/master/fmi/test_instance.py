@@ -11,9 +11,10 @@ import pytest
 
 from orchestrator.machine.interrupts import held_interrupts
 from orchestrator.master.fmi.instance import ComponentFailed, Instance
-from orchestrator.master.fmi.isolated import Isolation, isolated
+from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.fmi.loaded import all_loaded
 from orchestrator.master.fmi.log import Log
+from orchestrator.master.fmi.placement import isolated
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import member, step
 from orchestrator.runs.wiring import closed_loop

@@ -1,4 +1,4 @@
-"""Tables written as they come, and read again to the last bit."""
+"""Tables written as they come: what is read again is the same to the last bit."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.machine.errors import InputError
+from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.files import FORMATS, read_columns, read_rows
+from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Ending, Header
 
 
@@ -45,60 +45,3 @@ def test_parquet_of_the_same_rows_is_the_same_file(tmp_path: Path):
         file.end(Ending())
         files.append(path.read_bytes())
     assert files[0] == files[1] == files[2]
-
-
-@pytest.mark.parametrize(
-    ("text", "why"),
-    [
-        ("", "it is empty"),
-        ("x,y\n1,2\n", "first column is 'x'"),
-        ("time,a\n1,2\n3\n", "columns changed"),
-        ("time,a\n1,2,3\n4,5,6\n", "rows of 3 values below 2 names"),
-        ("time,a\n1,much\n", "much"),
-        ("time,a\n\xff\n", "decode"),
-    ],
-)
-def test_what_is_no_table_is_refused(tmp_path: Path, text: str, why: str):
-    path = tmp_path / "odd.csv"
-    path.write_text(text, encoding="latin-1")
-    with pytest.raises(InputError, match=f"not a table of a run: .*{why}") as error:
-        assert read_columns(path) != list(read_rows(path))
-    assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "time,a.b\n0,1\n1,2",
-        '"time","a.b"\n0,1\n1,2\n',
-        "time,a.b\r\n0,1\r\n1,2\r\n",
-        "\ufefftime,a.b\n\n0,1\n1,2\n\n",
-    ],
-    ids=["no newline at the end", "quoted names", "Windows", "byte order mark, empty lines"],
-)
-def test_tables_of_other_tools_are_read(tmp_path: Path, text: str):
-    path = tmp_path / "other.csv"
-    path.write_text(text, encoding="utf-8", newline="")
-    assert read_columns(path) == ("a.b",)
-    np.testing.assert_array_equal(np.vstack(list(read_rows(path))), [[0, 1], [1, 2]])
-
-
-def test_parquet_of_other_tools_is_read_where_it_holds_numbers(tmp_path: Path):
-    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
-    path = tmp_path / "other.parquet"
-    parquet.write_table(arrow.table({"time": [0, 1], "a.b": [True, None]}), path)
-    np.testing.assert_array_equal(np.vstack(list(read_rows(path))), [[0, 1], [1, np.nan]])
-    parquet.write_table(arrow.table({"time": [0, 1], "a.b": ["x", "y"]}), path)
-    with pytest.raises(InputError, match=r"not a table of a run: .*'x'"):
-        list(read_rows(path))
-
-
-def test_a_table_without_rows_has_none(tmp_path: Path):
-    path = tmp_path / "empty.csv"
-    path.write_text("time,a.b\n\n")
-    assert list(read_rows(path)) == []
-
-
-def test_missing_file_is_refused(tmp_path: Path):
-    with pytest.raises(InputError, match="no such file"):
-        read_columns(tmp_path / "missing.csv")

@@ -1,0 +1,152 @@
+"""Tables that are read: of runs, in CSV or Parquet, and of users and other tools, in CSV."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from importlib.util import find_spec
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.machine.errors import InputError
+from orchestrator.machine.user_files import explained, lines_of
+
+#: Rows that are read at once, and that are written to Parquet at once.
+ROWS = 8192
+
+#: What separates the values of a row.
+SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
+
+#: What a file is not that cannot be read.
+_NO_RUN = "not a table of a run"
+
+#: The number of a line, and its values.
+Record = tuple[int, list[str]]
+
+
+def read_columns(path: Path) -> tuple[str, ...]:
+    """Return the names of the columns after the time.
+
+    Raises:
+        InputError: the file is no table of a run.
+
+    """
+    with explained(path, _NO_RUN):
+        if path.suffix == ".parquet":
+            with parquet().ParquetFile(path) as file:
+                return _after_time(file.schema_arrow.names)
+        with lines_of(path) as lines:
+            return _after_time(next(csv.reader(lines), ()))
+
+
+def read_rows(path: Path, strings: Collection[str] = ()) -> Iterator[np.ndarray]:
+    """Yield the rows of a file, time first, some thousand at a time.
+
+    Args:
+        path: of the file.
+        strings: columns that hold texts, and are left out.
+
+    Raises:
+        InputError: the file is no table of a run.
+
+    """
+    with explained(path, _NO_RUN):
+        if path.suffix == ".parquet":
+            with parquet().ParquetFile(path) as file:
+                names = [name for name in file.schema_arrow.names if name not in strings]
+                for batch in file.iter_batches(ROWS, columns=names):
+                    columns = [column.to_numpy(zero_copy_only=False) for column in batch.columns]
+                    yield np.column_stack(columns).astype(float, copy=False)
+            return
+        with lines_of(path) as lines:
+            header = ("time", *_after_time(next(csv.reader(lines), ())))
+            texts = [place for place, name in enumerate(header) if name in strings]
+            filled = (line for line in lines if line.strip())
+            for first in filled:
+                rows = np.loadtxt(
+                    chain([first], filled), delimiter=",", comments=None, quotechar='"', ndmin=2,
+                    max_rows=ROWS, converters=dict.fromkeys(texts, _no_number) or None,
+                )  # fmt: skip
+                if rows.shape[1] != len(header):
+                    raise ValueError(f"rows of {rows.shape[1]} values below {len(header)} names")
+                yield np.delete(rows, texts, axis=1) if texts else rows
+
+
+@contextmanager
+def records(
+    path: Path, what: str, are_names: Callable[[Sequence[str]], object]
+) -> Iterator[tuple[list[str], Iterator[Record]]]:
+    """Read a table of CSV that a user or another tool has written.
+
+    Args:
+        path: of the file.
+        what: it is if there is a mistake in it.
+        are_names: whether its first line, taken apart, holds the names that are looked for: this
+            tells its separator, one of :data:`SEPARATORS`.
+
+    Returns:
+        The values of its first line, and the records of the others. Empty lines are left out.
+
+    Raises:
+        InputError: there is no such file, a line is not as long as the first, or a ValueError was
+            raised while the table was read.
+
+    """
+    with explained(path, what), lines_of(path, newline="") as lines:
+        first = next(lines, "")
+        marks = [mark for mark in SEPARATORS if mark in first] or [","]
+        mark = next((m for m in marks if are_names(next(_reader([first], m)))), marks[0])
+        reader = _reader(chain([first], lines), mark, strict=True)
+        try:
+            names = next(reader)
+            yield names, _records(reader, len(names))
+        except csv.Error as error:
+            raise ValueError(f"line {reader.line_num}: {error}") from error
+
+
+def parquet() -> Any:
+    """Return the module that reads and writes Parquet.
+
+    Raises:
+        InputError: it is not installed.
+
+    """
+    if find_spec("pyarrow") is None:
+        raise InputError("Parquet needs pyarrow: pip install 'auv-fmu[parquet]'")
+    return import_module("pyarrow.parquet")
+
+
+def _reader(lines: Iterable[str], separator: str, strict: bool = False) -> Any:
+    return csv.reader(lines, delimiter=separator, skipinitialspace=True, strict=strict)
+
+
+def _records(reader: Any, width: int) -> Iterator[Record]:
+    line = reader.line_num
+    for values in reader:
+        line += 1
+        if reader.line_num != line:
+            # A lone quote, and the next one some rows later: what is between would be one value.
+            raise ValueError(f"line {line}: a value in quotes goes on in the next line")
+        if values and len(values) != width:
+            raise ValueError(f"line {line} has {len(values)} values below {width} names")
+        if values:
+            yield line, values
+
+
+def _after_time(names: Sequence[str]) -> tuple[str, ...]:
+    if not names:
+        raise ValueError("it is empty")
+    first, *others = names
+    if first != "time":
+        raise ValueError(f"its first column is {first!r}, not 'time'")
+    return tuple(others)
+
+
+def _no_number(text: str) -> float:
+    """Stand in for a text among numbers."""
+    return 0.0

@@ -1,0 +1,279 @@
+"""Runs in blocks: how many together, who makes them, and what comes back.
+
+The processes of this machine make them, or the workers of a Dask cluster (:mod:`.cluster`). A block
+whose process is lost is made again by another one.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from functools import partial
+from time import monotonic
+from typing import NamedTuple, Protocol
+
+from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.workers import Workers
+from orchestrator.machine.workers import workers as workers_of
+from orchestrator.studies.engine import Engine, Outcome, Point
+
+#: How long a block shall take [s]: long beside the millisecond that a task costs, short for who
+#: waits for the last one, or loses it. One that takes so many times as long, because its runs take
+#: longer than those before them, comes back with what is done.
+_SECONDS, _OVERTIME = 1.5, 2.0
+
+#: A scheduler shall not have to deal with more blocks a second than this: on large clusters they
+#: get longer.
+_RATE = 200.0
+
+#: The most runs of a block, however fast they are.
+_MOST_RUNS = 10_000
+
+#: How often a block may lose its process on this machine before it is put aside.
+_LOSSES = 1
+
+#: What is said of a run that no worker has survived.
+FATAL = "every process that made it died"
+
+#: What this process makes runs with, if it is a worker of this machine.
+_engine: list[Engine] = []
+
+
+#: How long a block has taken [s], and the outcomes of its runs, or of the first of them where all
+#: took too long.
+Answer = tuple[float, list[Outcome]]
+
+
+class Crew(Protocol):
+    """Who makes blocks of runs.
+
+    Attributes:
+        threads: how many runs are made at a time.
+        ahead: how many blocks may be under way for each of them.
+
+    """
+
+    ahead: int
+
+    @property
+    def threads(self) -> int: ...
+
+    def send(self, block: list[Point], limit: float) -> None:
+        """Have a block made, or what of it takes no longer than a limit [s]."""
+
+    def receive(self) -> tuple[list[Point], Answer | None]:
+        """Wait for a block that was sent, and what has come of it; None: nobody has survived it.
+
+        Raises:
+            InputError: nobody is left to make the runs, or the engine cannot.
+
+        """
+        ...
+
+
+@contextmanager
+def making(
+    engine: Engine,
+    runs: Iterable[Point],
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
+) -> Iterator[Iterator[list[Outcome]]]:
+    """The outcomes of runs, block by block as they are done, for the time of the context.
+
+    Runs are taken from their iterator as they are needed. Each has one outcome; those that end the
+    process which makes them have one as well, at the very end.
+
+    Args:
+        engine: what makes them.
+        runs: to be made.
+        scheduler: address of a Dask scheduler; None for processes of this machine.
+        workers: how many processes of this machine; None for one a core.
+
+    Raises:
+        InputError: there is no such scheduler, or nobody is left to make the runs.
+
+    """
+    if scheduler is not None:
+        # Dask takes a second to be imported, and need not be there.
+        from orchestrator.studies.cluster import cluster  # noqa: PLC0415
+
+        if workers is not None:
+            raise InputError(
+                "--workers is for processes of this machine: those of a scheduler are started with "
+                "it"
+            )
+        crew = cluster(scheduler, engine)
+    else:
+        if workers is not None and workers < 1:
+            raise InputError(f"--workers {workers}: must be at least 1")
+        crew = _local(workers, engine)
+    with crew as of:
+        yield _Making(of).outcomes(runs)
+
+
+@contextmanager
+def _local(n: int | None, engine: Engine) -> Iterator[Crew]:
+    with workers_of(n, partial(_set_up, engine)) as workers:
+        try:
+            workers.done([first := workers.submit(bool)])
+            first.result()
+        except BrokenProcessPool:
+            raise InputError(
+                "no process can be started (a script needs `if __name__ == '__main__':` around "
+                "what it does)"
+            ) from None
+        yield _Local(workers)
+
+
+class _Sent(NamedTuple):
+    """A block that was sent, and how many more processes it may lose."""
+
+    block: list[Point]
+    limit: float
+    left: int
+
+
+class _Local:
+    """Processes of this machine."""
+
+    ahead = 1
+
+    def __init__(self, workers: Workers) -> None:
+        self._workers, self.threads = workers, workers.n
+        self._under_way: dict[Future[Answer], _Sent] = {}
+        self._put_aside: list[list[Point]] = []
+
+    def send(self, block: list[Point], limit: float, left: int = _LOSSES) -> None:
+        future = self._workers.submit(_task, block, limit)
+        self._under_way[future] = _Sent(block, limit, left)
+
+    def receive(self) -> tuple[list[Point], Answer | None]:
+        while not self._put_aside:
+            future = next(iter(self._workers.done(self._under_way)))
+            try:
+                answer = future.result()
+                return self._under_way.pop(future).block, answer
+            except BrokenProcessPool:
+                self._renew()
+            except Exception as error:
+                raise cannot_make(self._under_way[future].block, error) from error
+        return self._put_aside.pop(), None
+
+    def _renew(self) -> None:
+        """Have what was under way made by other processes: all end with the one that has died."""
+        self._workers.renew()
+        lost = [future for future in self._under_way if future.exception() is not None]
+        for block, limit, left in [self._under_way.pop(future) for future in lost]:
+            if left:
+                self.send(block, limit, left - 1)
+            else:
+                self._put_aside.append(block)
+
+
+def _set_up(engine: Engine) -> None:
+    _engine.append(engine)
+    # Nothing of it belongs on the terminal of who waits for the study.
+    for stream in (1, 2):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+
+
+def _task(block: list[Point], limit: float) -> Answer:
+    return answer(_engine[0], block, limit)
+
+
+def answer(engine: Engine, runs: list[Point], limit: float) -> Answer:
+    """Make runs, or the first of them where all take longer than a limit [s]."""
+    start, seconds, outcomes = monotonic(), 0.0, []
+    for outcome in engine.outcomes(runs):
+        outcomes.append(outcome)
+        seconds = monotonic() - start
+        if seconds > limit:
+            break
+    return seconds, outcomes
+
+
+def cannot_make(block: list[Point], error: Exception) -> InputError:
+    """Return what is said of an engine that raises, or that lacks a package on the other side."""
+    if isinstance(error, InputError):
+        return error
+    numbers = f"{block[0].number} to {block[-1].number}"
+    return InputError(f"runs {numbers} cannot be made: {reason(error)}")
+
+
+class _Making:
+    """Blocks of runs on their way to workers and back."""
+
+    def __init__(self, crew: Crew) -> None:
+        self._crew = crew
+        self._pace = float("inf")  # seconds for a step
+
+    def outcomes(self, runs: Iterable[Point]) -> Iterator[list[Outcome]]:
+        """The outcomes of runs, block by block as they are done."""
+        lost: list[Point] = []
+        for block, outcomes in self._made(self._blocks(runs), self._room):
+            if outcomes is None:
+                lost.extend(block)
+            else:
+                yield outcomes
+        # Alone, so that none is held to blame for another that ends the process of both.
+        for (run,), outcomes in self._made(([run] for run in lost), lambda: 1):
+            yield outcomes or [Outcome(run.number, {}, FATAL)]
+
+    def _blocks(self, runs: Iterable[Point]) -> Iterator[list[Point]]:
+        """Runs in their order, as many together as make a task of a good length."""
+        block: list[Point] = []
+        steps = 0.0
+        for run in runs:
+            block.append(run)
+            steps += run.stop_time / run.step
+            if steps * self._pace >= self._seconds or len(block) == _MOST_RUNS:
+                yield block
+                block, steps = [], 0.0
+        if block:
+            yield block
+
+    def _made(
+        self, blocks: Iterator[list[Point]], room: Callable[[], int]
+    ) -> Iterator[tuple[list[Point], list[Outcome] | None]]:
+        """Blocks as they are done and their outcomes, or None where each worker has died.
+
+        Args:
+            blocks: of runs.
+            room: how many blocks may be under way.
+
+        """
+        under_way = 0
+        rests: deque[list[Point]] = deque()
+        done: list[tuple[list[Point], list[Outcome] | None]] = []
+        while True:
+            while under_way < room():
+                block = rests.popleft() if rests else next(blocks, None)
+                if block is None:
+                    break
+                self._crew.send(block, _OVERTIME * self._seconds)
+                under_way += 1
+            # Now, when there is work again for who has made them.
+            yield from done
+            if not under_way:
+                return
+            block, answer = self._crew.receive()
+            under_way -= 1
+            done = [(block, answer and answer[1])]
+            if answer:
+                seconds, outcomes = answer
+                n = len(outcomes)
+                rests.extend(block[i : i + n] for i in range(n, len(block), n))
+                self._pace = seconds / sum(run.stop_time / run.step for run in block[:n])
+
+    def _room(self) -> int:
+        return max(1, self._crew.ahead * self._crew.threads)
+
+    @property
+    def _seconds(self) -> float:
+        """How long a block shall take."""
+        return max(_SECONDS, self._crew.threads / _RATE)
