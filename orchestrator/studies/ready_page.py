@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from orchestrator.studies.figures.figure_entries import LABELS
+from orchestrator.studies.figure_entries import LABELS
 from orchestrator.studies.study import Study, read_study, ready_studies
 
 #: The pictures of the page, below the folder of the pages, small.

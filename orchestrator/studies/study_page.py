@@ -8,7 +8,7 @@ from string import Template
 from orchestrator.runs.entries import Entry
 from orchestrator.runs.scenario_page import table
 from orchestrator.studies.engine import REACHED
-from orchestrator.studies.figures import figure_entries as figures
+from orchestrator.studies import figure_entries as figures
 from orchestrator.studies.study import ENTRIES, read_study, ready_studies
 
 _FILES = (

@@ -25,7 +25,8 @@ from orchestrator.runs.preparation import Prepared, loaded
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Engine
-from orchestrator.studies.figures import draw_figures, figure_files, read_figures
+from orchestrator.figures.study_figures import draw_figures, figure_files
+from orchestrator.studies.figure_entries import read_figures
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import Store, StudyResult, read_record, store

@@ -11,7 +11,7 @@ import pytest
 from orchestrator import sweep
 from orchestrator.runs.preparation import loaded
 from orchestrator.studies.engine import INDICES
-from orchestrator.studies.figures import read_figures
+from orchestrator.studies.figure_entries import read_figures
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import ready_studies, study_of
 from orchestrator.studies.study_page import study_page

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestrator.studies.figures.figure_entries import FigureEntry
-from orchestrator.studies.figures.grid import paneled
-from orchestrator.studies.figures.study_data import Values
+from orchestrator.studies.figure_entries import FigureEntry
+from orchestrator.figures.grid import paneled
+from orchestrator.figures.study_values import Values
 
 #: Blue falls, red grows: apart for colour-blind eyes.
 _COLOURS = "RdBu_r"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.studies.engine import INDICES
-from orchestrator.studies.figures.study_data import Values, is_known
+from orchestrator.figures.study_values import Values, is_known
 
 N = 6
 

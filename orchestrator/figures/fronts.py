@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from orchestrator.figures.style import COLOURS, STYLES
-from orchestrator.studies.figures.bins import is_logarithmic
-from orchestrator.studies.figures.figure_entries import FigureEntry
-from orchestrator.studies.figures.grid import legend, paneled, spread
-from orchestrator.studies.figures.study_data import Values
+from orchestrator.figures.study_axes import is_logarithmic
+from orchestrator.studies.figure_entries import FigureEntry
+from orchestrator.figures.grid import legend, paneled, spread
+from orchestrator.figures.study_values import Values
 
 _HEIGHT = 4.0
 

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from orchestrator.studies.figures.bins import Bins, bins_of, grouped, is_logarithmic
-from orchestrator.studies.figures.figure_entries import FigureEntry
-from orchestrator.studies.figures.grid import paneled, spread
-from orchestrator.studies.figures.study_data import VERDICTS, Values
+from orchestrator.figures.study_axes import Bins, bins_of, grouped, is_logarithmic
+from orchestrator.studies.figure_entries import FigureEntry
+from orchestrator.figures.grid import paneled, spread
+from orchestrator.figures.study_values import VERDICTS, Values
 
 #: Cells along each axis of runs that are no grid.
 _CELLS = 24

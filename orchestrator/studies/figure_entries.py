@@ -18,7 +18,7 @@ from orchestrator.runs.entries import (
     is_text,
 )
 from orchestrator.studies.engine import INDICES
-from orchestrator.studies.figures.study_data import SCENARIO, is_known
+from orchestrator.figures.study_values import SCENARIO, is_known
 
 #: What a figure can be.
 BANDS, MAPS, FRONT, INFLUENCE = "bands", "maps", "front", "influence"

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from orchestrator.studies.engine import INDICES
-from orchestrator.studies.figures import draw_figures, read_figures
-from orchestrator.studies.figures.bands import bands
-from orchestrator.studies.figures.fronts import best
-from orchestrator.studies.figures.influence import influence
-from orchestrator.studies.figures.maps import maps
-from orchestrator.studies.figures.study_data import Values
+from orchestrator.figures.study_figures import draw_figures
+from orchestrator.studies.figure_entries import read_figures
+from orchestrator.figures.bands import bands
+from orchestrator.figures.fronts import best
+from orchestrator.figures.influence import influence
+from orchestrator.figures.maps import maps
+from orchestrator.figures.study_values import Values
 
 GRID = np.geomspace(1.0, 100.0, 5)
 VARIED = {"disturbance.A_f": float, "disturbance.A_d": float}

@@ -9,12 +9,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from orchestrator.figures.style import save, styled
-from orchestrator.studies.figures.bands import bands
-from orchestrator.studies.figures.figure_entries import BANDS, FRONT, INFLUENCE, MAPS, FigureEntry
-from orchestrator.studies.figures.fronts import front
-from orchestrator.studies.figures.influence import influence
-from orchestrator.studies.figures.maps import maps
-from orchestrator.studies.figures.study_data import Columns, Values
+from orchestrator.figures.bands import bands
+from orchestrator.studies.figure_entries import BANDS, FRONT, INFLUENCE, MAPS, FigureEntry
+from orchestrator.figures.fronts import front
+from orchestrator.figures.influence import influence
+from orchestrator.figures.maps import maps
+from orchestrator.figures.study_values import Columns, Values
 from orchestrator.system.names import file_name
 
 _DRAW: Mapping[str, Callable[[FigureEntry, str, Values], Figure]] = {
