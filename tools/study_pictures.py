@@ -13,9 +13,9 @@ from tempfile import TemporaryDirectory
 
 from PIL import Image
 
+from orchestrator.figures.study_figures import draw_figures
 from orchestrator.figures.style import SETTINGS
 from orchestrator.runs.preparation import loaded
-from orchestrator.figures.study_figures import draw_figures
 from orchestrator.studies.figure_entries import read_figures
 from orchestrator.studies.ready_page import PICTURES
 from orchestrator.studies.space import Space

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from orchestrator.commands.options import (
     status,
 )
 from orchestrator.commands.streams import say, show
-from orchestrator.figures import save
+from orchestrator.figures import Drawn, save
 from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
 from orchestrator.figures.plot import plot, wanted
 from orchestrator.figures.view import page
@@ -27,13 +27,12 @@ from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.observer import Observer
 from orchestrator.master.observers.progress import Progress
-from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.folder import VIEW, replaced
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.stored import changed_files, read_record, read_result, table_in
 from orchestrator.system.names import PortName
-from orchestrator.vehicle.signals import CONTROL_POINT
+from orchestrator.vehicle.signals import Loop, loops_of, suffixes
 
 #: Runs of one scenario are told apart by so many parameters.
 _FEW = 2
@@ -90,16 +89,17 @@ def _plot(options: argparse.Namespace) -> int:
     for path in paths:
         _warn(table_in(path))
     runs = [read_result(path, lambda columns: wanted(columns, patterns)) for path in paths]
-    figure = plot(list(zip(_labels(runs, paths), (run[1] for run in runs), strict=True)), patterns)
+    tables = (run.result for run in runs)
+    figure = plot(list(zip(_labels(runs, paths), tables, strict=True)), patterns)
     with _written(options.out, options.force) as file:
         save(figure, file)
     return OK
 
 
-def _labels(runs: Sequence[tuple[str, Table]], paths: Sequence[Path]) -> list[str]:
+def _labels(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[str]:
     """What tells runs apart: scenarios, or else a few parameters, or else the ends of paths."""
-    names = [name for name, _ in runs]
-    given = [table.header.parameters for _, table in runs]
+    names = [run.label for run in runs]
+    given = [run.result.header.parameters for run in runs]
     differing = [
         name
         for name in dict.fromkeys(name for values in given for name in values)
@@ -139,16 +139,22 @@ def _view(options: argparse.Namespace) -> int:
     if out.suffix != ".html":
         raise InputError(f"{out}: write a .html")
     _warn(file)
-    name, table = read_result(file)
-    record = read_record(file)
-    title = str(record.get("title") or name)
-    try:
-        text = page(title, table, bool(record.get("z_up")))
-    except InputError as error:
-        raise InputError(f"{options.result}: {error}") from error
-    with _written(out, options.force) as unfinished:
-        unfinished.write_text(text, encoding="utf-8")
+    run = read_result(file)
+    title = str(read_record(file).get("title") or run.label)
+    for one, path in _of_vehicles(run, out):
+        try:
+            text = page(title, one)
+        except InputError as error:
+            raise InputError(f"{options.result}: {error}") from error
+        with _written(path, options.force) as unfinished:
+            unfinished.write_text(text, encoding="utf-8")
     return OK
+
+
+def _of_vehicles(run: Drawn, path: Path) -> Iterator[tuple[Drawn, Path]]:
+    """A run once for each of its vehicles, and the file of each."""
+    for loop, vehicle in suffixes(run.loops).items():
+        yield run._replace(loops=[loop]), path.with_name(f"{path.stem}{vehicle}{path.suffix}")
 
 
 def _animate(options: argparse.Namespace) -> int:
@@ -156,10 +162,16 @@ def _animate(options: argparse.Namespace) -> int:
     out = options.out or Path("results", f"{scenario.stem}.gif")
     check_film(out, options.fps)
     prepared = prepare(scenario, system, request(options))
-    seen = VisibleRows()
+    loops = loops_of(prepared.system)
+    seen = VisibleRows({name for loop in loops for name in loop.drawn()})
     observers: list[Observer] = [seen, Progress(scenario.name)]
     title = scenario.title or scenario.name
-    with _written(out, options.force) as file:
+    with ExitStack() as stack:
+        run = Drawn(scenario.name, seen, scenario.z_up, loops)
+        films = [
+            (one, stack.enter_context(_written(path, options.force)))
+            for one, path in _of_vehicles(run, out)
+        ]
         ending = simulate(
             prepared.system,
             prepared.experiment,
@@ -167,9 +179,10 @@ def _animate(options: argparse.Namespace) -> int:
             loop=prepared.loop,
             hooks=prepared.hooks(),
         )
-        if missing := seen.missing(*CONTROL_POINT):
-            raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
-        animate(title, seen, file, options.fps, scenario.z_up)
+        for one, file in films:
+            if missing := one.lacks(Loop.for_control_point):
+                raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
+            animate(title, one, file, options.fps)
     return status(scenario.name, ending)
 
 

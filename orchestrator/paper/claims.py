@@ -33,7 +33,7 @@ from orchestrator.paper.measures import (
 )
 from orchestrator.paper.page import actuator_values, numbers
 from orchestrator.paper.variations import Variation
-from orchestrator.studies.engine import REACHED
+from orchestrator.vehicle.indices import REACHED
 
 #: The runs of the figures, and what the claims change in them.
 FIVE, FIVE_PD = Variation("fig5"), Variation("fig5-pd")

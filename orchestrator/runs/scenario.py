@@ -29,7 +29,7 @@ from orchestrator.runs.scenario_events import check_events
 from orchestrator.runs.waypoints import ENTRIES as PATH
 from orchestrator.runs.waypoints import path_parameters
 from orchestrator.system.names import PortName, file_name, port_name
-from orchestrator.vehicle.signals import PLANNER
+from orchestrator.vehicle.signals import STANDARD
 
 #: What a file is not that cannot be read.
 _WHAT = "not a scenario"
@@ -259,7 +259,7 @@ def _path_parameters(
 ) -> dict[PortName, Any]:
     """What a path comes to, in a scenario with other parameters."""
     _check_table(path, "path", said, PATH)
-    found = path_parameters(path.parent / said["file"], said.get("component", PLANNER))
+    found = path_parameters(path.parent / said["file"], said.get("component", STANDARD.planner))
     for name in found.keys() & others.keys():
         raise InputError(f"{path}: {name} is given by {said['file']} already")
     return found

@@ -17,7 +17,7 @@ from orchestrator.runs.entries import Entry, is_text
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import finite
-from orchestrator.vehicle.signals import ACTUATORS, PLANNER
+from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
 #: The name of its model.
 _MODEL = "PathPlanner"
@@ -35,7 +35,7 @@ ENTRIES: dict[str, Entry] = {
         "text",
         is_text,
         "The [PathPlanner](components/PathPlanner.md) whose parameters they become.",
-        f"`{PLANNER}`",
+        f"`{STANDARD.planner}`",
     ),
 }
 

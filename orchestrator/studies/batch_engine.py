@@ -36,8 +36,8 @@ from orchestrator.studies.batch.verdict import (
 from orchestrator.studies.engine import Outcome, Point
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.metrics import LAST_SECONDS
-from orchestrator.vehicle.signals import ACTUATORS, AXES, DY_HAT
+from orchestrator.vehicle.indices import LAST_SECONDS
+from orchestrator.vehicle.signals import ACTUATORS, AXES, STANDARD
 
 #: What makes every system.
 _OTHER = "use --engine fmu"
@@ -124,7 +124,11 @@ class BatchEngine:
         made, failure = _made(job, np.empty(0, tally.END), tally.new(0), rows)
         kept = [
             0,
-            *(i for i, name in enumerate(COLUMNS, 1) if job.has_estimate or name not in DY_HAT),
+            *(
+                i
+                for i, name in enumerate(COLUMNS, 1)
+                if job.has_estimate or name not in STANDARD.dy_hat
+            ),
         ]
         columns = tuple(COLUMNS[i - 1] for i in kept[1:])
         header = Header(columns, job.experiment, _parameters(job.system))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
+from orchestrator.figures.study_figures import KINDS, FigureEntry
+from orchestrator.figures.study_values import SCENARIO, is_known
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.runs.entries import (
     Entry,
@@ -17,11 +18,7 @@ from orchestrator.runs.entries import (
     is_table,
     is_text,
 )
-from orchestrator.studies.engine import INDICES
-from orchestrator.figures.study_values import SCENARIO, is_known
-
-#: What a figure can be.
-BANDS, MAPS, FRONT, INFLUENCE = "bands", "maps", "front", "influence"
+from orchestrator.vehicle.indices import index_columns
 
 #: What a figure may be called: its files are.
 _NAME = re.compile(r"[\w-]+")
@@ -29,44 +26,8 @@ _NAME = re.compile(r"[\w-]+")
 #: The table that is no figure.
 LABELS = "labels"
 
-#: What is shown of a study whose file does not say it.
-_USUAL = ("late_error", "peak_command", "lost")
-
-
-@dataclass(frozen=True)
-class FigureEntry:
-    """A figure that is to be drawn; :data:`ENTRIES` says what each entry means.
-
-    Attributes:
-        name: of its files.
-
-    """
-
-    name: str
-    kind: str
-    x: Sequence[str] = ()
-    y: str = ""
-    show: Sequence[str] = ()
-    by: Sequence[str] = ()
-    where: Mapping[str, Any] = field(default_factory=dict)
-    limits: Mapping[str, float] = field(default_factory=dict)
-    labels: Mapping[str, str] = field(default_factory=dict)
-
-
-class _Kind(NamedTuple):
-    """What a figure of a kind needs, and what it may have beside."""
-
-    needs: Sequence[str]
-    may: Sequence[str]
-
-
-#: The kinds of figures, by the names that study files have for them.
-KINDS: Mapping[str, _Kind] = {
-    BANDS: _Kind(("x", "show"), ("by", "where", "limits")),
-    MAPS: _Kind(("x", "y", "show"), ("by", "where", "limits")),
-    FRONT: _Kind(("x", "y"), ("by", "where")),
-    INFLUENCE: _Kind(("x", "show"), ("by", "where")),
-}
+#: What is shown of a study whose file does not say it: of each vehicle, and of all together.
+_USUAL, _ALL = ("late_error", "peak_command"), "lost"
 
 
 def _are_names(value: Any) -> bool:
@@ -105,7 +66,11 @@ ENTRIES: Mapping[str, Entry] = {
 
 
 def read_figures(
-    where: str, figures: Mapping[str, Any], varied: Mapping[str, type], is_compared: bool
+    where: str,
+    figures: Mapping[str, Any],
+    varied: Mapping[str, type],
+    is_compared: bool,
+    indices: Sequence[str] = index_columns(),
 ) -> tuple[FigureEntry, ...]:
     """The figures of a study.
 
@@ -114,6 +79,7 @@ def read_figures(
         figures: what the study file says of them; without a figure the usual one is drawn.
         varied: the types of what varies, by name.
         is_compared: whether there are several scenarios.
+        indices: the columns of what comes out of a run.
 
     Raises:
         InputError: an entry cannot be what it shall be.
@@ -123,13 +89,13 @@ def read_figures(
     labels = _labels(where, tables.pop(LABELS, {}))
     numbers = [name for name, kind in varied.items() if kind is not str]
     if not tables and numbers:
-        tables["influence"] = {"kind": INFLUENCE, "x": numbers, "show": list(_USUAL)}
+        tables["influence"] = {"kind": "influence", "x": numbers, "show": _usual(indices)}
     by = (SCENARIO,) if is_compared else ()
     plans = []
     for name, table in tables.items():
         if not _NAME.fullmatch(name):
             raise InputError(f"{where}: figures: {name!r} is no name of a file: letters, digits, -")
-        _check(f"{where}: figures: {name}", table, (*numbers, *INDICES), (*varied, *by))
+        _check(f"{where}: figures: {name}", table, (*numbers, *indices), (*varied, *by))
         plans.append(
             FigureEntry(
                 name,
@@ -144,6 +110,12 @@ def read_figures(
             )
         )
     return tuple(plans)
+
+
+def _usual(indices: Sequence[str]) -> list[str]:
+    """What is shown of a study whose file does not say it: of each vehicle, and of all."""
+    of = [name.removesuffix(_USUAL[0]) for name in indices if name.endswith(_USUAL[0])]
+    return [*(f"{vehicle}{name}" for name in _USUAL for vehicle in of), _ALL]
 
 
 def _labels(where: str, table: Any) -> dict[str, str]:
@@ -168,12 +140,12 @@ def _check(where: str, table: Any, numbers: Sequence[str], columns: Sequence[str
     kind = table.get("kind")
     if kind is None:
         raise InputError(f"{where}: lacks kind; there are {', '.join(KINDS)}")
-    needs, may = KINDS[kind]
+    _, needs, may = KINDS[kind]
     if missing := [key for key in needs if not table.get(key)]:
         raise InputError(f"{where}: lacks {' and '.join(missing)}")
     if more := [key for key in table if key not in ("kind", *needs, *may)]:
         raise InputError(f"{where}: a figure of kind {kind!r} has no {more[0]}")
-    if kind in (MAPS, FRONT) and not is_text(table["x"]):
+    if kind in ("maps", "front") and not is_text(table["x"]):
         raise InputError(f"{where}: x is a list; a figure of kind {kind!r} has one x")
     for key in ("x", "y", "show", "limits"):
         for value in _listed(table.get(key, ())):

@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from string import Template
 
+from orchestrator.figures.style import printed_unit
 from orchestrator.runs.entries import Entry
 from orchestrator.runs.scenario_page import table
-from orchestrator.studies.engine import REACHED
 from orchestrator.studies import figure_entries as figures
 from orchestrator.studies.study import ENTRIES, read_study, ready_studies
+from orchestrator.vehicle.indices import INDICES
 
 _FILES = (
     ("`runs.parquet`", "a row a run: what varied, the indices, why it failed"),
     ("`study.json`", "the study, the command, versions; how many runs there are, how many failed"),
     ("`FIGURE.png`, `.svg`", "the figures that the study asks for"),
 )
-
-_EFFORTS = ("rms_effort", "peak_command", "saturated_fraction", "total_variation")
 
 _COLUMNS = (
     (
@@ -27,24 +26,15 @@ _COLUMNS = (
     ),
     ("`scenario`", "which one, if there are several"),
     ("`component.parameter`, `step`", "what varied"),
-    (
-        f"`l2_effort.u` `.q` `.r`, {', '.join(f'`{name}`' for name in _EFFORTS)}, "
-        "`final_error.x` `.y` `.z`",
-        "as in `metrics.json` of a run",
+    *(
+        (
+            f"`{index.columns[0]}`"
+            + "".join(f" `{name.removeprefix(index.name)}`" for name in index.columns[1:]),
+            index.meaning.replace("|", r"\|")
+            + (f" [{printed_unit(index.unit)}]" * bool(index.unit)),
+        )
+        for index in INDICES
     ),
-    (
-        "`time_to_reach`",
-        f"first time at which \\|e\\| is at most {REACHED:g} m [s]; e is y - y_d with the true "
-        "control point",
-    ),
-    ("`late_error`", "largest \\|e\\| in the second half of the run [m]"),
-    ("`estimate_error`", "root mean square of \\|dy_hat - dy\\| in the second half [m/s]"),
-    (
-        "`theta_hat_half[1]` to `[4]`, `theta_hat_end[1]` to `[4]`",
-        "the estimate when half of the run is over, and at its end",
-    ),
-    ("`largest_speed`", "of the control point [m/s]"),
-    ("`largest_drift`", "of sway and heave, \\|(v, w)\\| [m/s]: Assumption 1"),
     ("`failure`", "why it ended early; empty if it did not"),
 )
 
@@ -144,7 +134,9 @@ in one line before the first run.
 
 $columns
 
-What a system has no ports for, and what is never reached, is empty.
+Here e is y - y_d with the true control point. What a system has no ports for, and what is never
+reached, is empty. Where a system has several vehicles, the columns of each begin with its name:
+`auv1.l2_effort.u`.
 
 From Python, with the same options:
 

@@ -8,9 +8,9 @@ from runpy import run_path
 import pytest
 from PIL import Image
 
-from orchestrator.studies.engine import INDICES
 from orchestrator.studies.ready_page import PICTURES, ready_page
 from orchestrator.studies.study import read_study, ready_studies
+from orchestrator.vehicle.indices import index_columns
 from support.markdown import DOCS
 
 PAGE = DOCS / "ready-studies.md"
@@ -36,7 +36,10 @@ def test_numbers_are_read_off_columns_that_runs_have(name):
     pytest.importorskip("scipy", reason="needs the extra `studies`")
     tool = run_path(str(DOCS.parent / "tools" / "study_numbers.py"))
     study = read_study(name)
-    row = dict.fromkeys((*study.varied, *INDICES), 1.0) | {"scenario": "fig5", "failure": ""}
+    row = dict.fromkeys((*study.varied, *index_columns()), 1.0) | {
+        "scenario": "fig5",
+        "failure": "",
+    }
     row |= {key: values[0] for key, values in study.vary.items()}
     runs = tool["prepared"](name, pandas.DataFrame([{"run": 0, **row}]))
     for statistic, columns, by, where in map(tool["parsed"], tool["lines_of"](name)):

@@ -13,7 +13,7 @@ from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.preparation import Prepared, Request, loaded, prepare
 from orchestrator.system.structure import System
-from orchestrator.vehicle.metrics import indices
+from orchestrator.vehicle.indices import metrics_of
 
 
 def run(
@@ -44,4 +44,4 @@ def write(table: Table, path: Path) -> None:
 
 def final_error(table: Table) -> np.ndarray:
     """e_f of section 4.2 [m]."""
-    return np.array(indices(table)["final_error"])
+    return np.array(metrics_of(table).found()["final_error"])

@@ -14,7 +14,7 @@ from orchestrator.master.fmi.instance import ComponentFailed
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.hook import Run
-from orchestrator.master.loop import PYTHON_LOOP, Loop, chosen
+from orchestrator.master.loop import PYTHON_LOOP, Stepping, chosen
 from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
 from orchestrator.master.stepper import made
@@ -40,7 +40,7 @@ def folder(tmp_path_factory):
 def run(
     system: System,
     experiment: Experiment,
-    loop: Loop = PYTHON_LOOP,
+    loop: Stepping = PYTHON_LOOP,
     isolation: Isolation | None = None,
 ) -> Table:
     table = Table()

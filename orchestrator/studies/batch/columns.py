@@ -2,34 +2,21 @@
 
 from __future__ import annotations
 
-from orchestrator.vehicle.signals import (
-    APPLIED,
-    AXES,
-    COMMANDED,
-    DIRECTIONS,
-    DY,
-    DY_D,
-    DY_HAT,
-    NU,
-    POSTURE,
-    TAU,
-    THETA_HAT,
-    Y_D,
-)
+from orchestrator.vehicle.signals import AXES, DIRECTIONS, STANDARD
 
 #: Behind the time.
 COLUMNS: tuple[str, ...] = (
-    *POSTURE,
-    *NU,
+    *STANDARD.posture,
+    *STANDARD.nu,
     *(f"plant.y.{axis}" for axis in AXES),
-    *DY,
-    *Y_D,
-    *DY_D,
+    *STANDARD.dy,
+    *STANDARD.y_d,
+    *STANDARD.dy_d,
     *(f"planner.ddy_d.{axis}" for axis in AXES),
-    *DY_HAT,
-    *THETA_HAT,
-    *TAU,
-    *COMMANDED,
-    *APPLIED,
+    *STANDARD.dy_hat,
+    *STANDARD.theta_hat,
+    *STANDARD.tau,
+    *STANDARD.commanded,
+    *STANDARD.applied,
     *(f"plant.tau_w.{direction}" for direction in DIRECTIONS),
 )

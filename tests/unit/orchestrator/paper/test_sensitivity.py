@@ -29,9 +29,7 @@ from orchestrator.runs.preparation import Request, loaded, prepare
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.system.names import port_name
-from orchestrator.vehicle.signals import APPLIED as APPLIED_PORTS
-from orchestrator.vehicle.signals import COMMANDED as COMMANDED_PORTS
-from orchestrator.vehicle.signals import ELL, POSTURE, Y_D, tracking_error
+from orchestrator.vehicle.signals import STANDARD, tracking_error
 from support.variants import (
     APPLIED,
     COMMANDED,
@@ -46,7 +44,7 @@ from support.variants import (
     spread,
 )
 
-COLUMNS = (*POSTURE, *Y_D, *APPLIED_PORTS, *COMMANDED_PORTS)
+COLUMNS = (*STANDARD.posture, *STANDARD.y_d, *STANDARD.applied, *STANDARD.commanded)
 
 
 def table_of(rows=10_001, **columns):
@@ -55,7 +53,7 @@ def table_of(rows=10_001, **columns):
     values[:, 0] = 0.02 * np.arange(rows)
     for name, column in columns.items():
         values[:, 1 + COLUMNS.index(name.replace("__", "."))] = column
-    header = Header(COLUMNS, Experiment(200.0, 0.02), {port_name(ELL): 0.35})
+    header = Header(COLUMNS, Experiment(200.0, 0.02), {port_name(STANDARD.ell): 0.35})
     return Table.of(header, values)
 
 
@@ -94,7 +92,7 @@ def test_a_run_that_ends_early_has_no_numbers():
 def test_formulas_are_those_that_someone_would_code():
     """By the rows themselves, at every end time."""
     tau = np.random.default_rng(2).uniform(-80.0, 80.0, (10_000, 3))
-    columns = zip(APPLIED_PORTS, np.vstack(([0.0] * 3, tau)).T, strict=True)
+    columns = zip(STANDARD.applied, np.vstack(([0.0] * 3, tau)).T, strict=True)
     numbers = numbers_of(table_of(**{name.replace(".", "__"): tau for name, tau in columns}))
     for time in (20.0, 82.0, 200.0):
         taken = tau[: round(time / 0.02)]

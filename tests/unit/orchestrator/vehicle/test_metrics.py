@@ -9,7 +9,7 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import PortName
-from orchestrator.vehicle.metrics import Metrics, indices
+from orchestrator.vehicle.indices import Metrics, metrics_of
 
 
 def table_of(**columns: np.ndarray) -> Table:
@@ -31,13 +31,13 @@ def test_effort_of_a_known_signal():
     command = 3.0 * np.sin(2 * pi * t)
     applied = np.clip(command, -2.0, 2.0)
     zeros = np.zeros_like(t)
-    found = indices(
+    found = metrics_of(
         table_of(
             plant__tau__u=command, plant__tau__q=zeros, plant__tau__r=command / 3,
             plant__tau_applied__u=applied, plant__tau_applied__q=zeros,
             plant__tau_applied__r=command / 3,
         )
-    )  # fmt: skip
+    ).found()  # fmt: skip
     a = np.arcsin(2 / 3)
     # Mean square of a clipped sine: 2/pi (9 (a/2 - sin(2a)/4) + 4 (pi/2 - a)).
     mean_square = 2 / pi * (9 * (a / 2 - np.sin(2 * a) / 4) + 4 * (pi / 2 - a))
@@ -54,13 +54,13 @@ def test_final_error_is_the_largest_of_the_last_5_seconds():
     t = np.arange(8001) * 0.001
     zeros, ones = np.zeros_like(t), np.ones_like(t)
     far = np.where(t < 2.9, 9.0, 0.0)
-    found = indices(
+    found = metrics_of(
         table_of(
             plant__eta__x=far, plant__eta__y=ones, plant__eta__z=-2 * t, plant__eta__phi=zeros,
             plant__eta__theta=zeros, plant__eta__psi=zeros, planner__y_d__x=0.35 * ones,
             planner__y_d__y=zeros, planner__y_d__z=zeros,
         )
-    )  # fmt: skip
+    ).found()  # fmt: skip
     assert found["final_error"] == pytest.approx([0.0, 1.0, 16.0])
 
 
@@ -81,4 +81,4 @@ def test_indices_do_not_depend_on_the_blocks_in_which_rows_come():
     for start, end in ((0, 1), (1, 2), (2, 700), (700, 6000), (6000, 7001)):
         found.take(table.rows[start:end])
     found.end(Ending())
-    assert found.indices() == indices(table)
+    assert found.found() == metrics_of(table).found()
