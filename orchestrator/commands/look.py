@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -91,8 +91,8 @@ def _plot(options: argparse.Namespace) -> int:
     runs = [read_result(path, lambda columns: wanted(columns, patterns)) for path in paths]
     tables = (run.result for run in runs)
     figure = plot(list(zip(_labels(runs, paths), tables, strict=True)), patterns)
-    with _written(options.out, options.force) as file:
-        save(figure, file)
+    with _written([options.out], options.force) as folder:
+        save(figure, folder / options.out.name)
     return OK
 
 
@@ -141,20 +141,22 @@ def _view(options: argparse.Namespace) -> int:
     _warn(file)
     run = read_result(file)
     title = str(read_record(file).get("title") or run.label)
-    for one, path in _of_vehicles(run, out):
-        try:
-            text = page(title, one)
-        except InputError as error:
-            raise InputError(f"{options.result}: {error}") from error
-        with _written(path, options.force) as unfinished:
-            unfinished.write_text(text, encoding="utf-8")
+    shown = list(_of_vehicles(run, out, title))
+    try:
+        pages = {file.name: page(heading, one) for one, file, heading in shown}
+    except InputError as error:
+        raise InputError(f"{options.result}: {error}") from error
+    with _written([file for _, file, _ in shown], options.force) as folder:
+        for name, text in pages.items():
+            (folder / name).write_text(text, encoding="utf-8")
     return OK
 
 
-def _of_vehicles(run: Drawn, path: Path) -> Iterator[tuple[Drawn, Path]]:
-    """A run once for each of its vehicles, and the file of each."""
+def _of_vehicles(run: Drawn, path: Path, title: str) -> Iterator[tuple[Drawn, Path, str]]:
+    """A run once for each of its vehicles, with the file and the heading of each."""
     for loop, vehicle in suffixes(run.loops).items():
-        yield run._replace(loops=[loop]), path.with_name(f"{path.stem}{vehicle}{path.suffix}")
+        file = path.with_name(f"{path.stem}{vehicle}{path.suffix}")
+        yield run._replace(loops=[loop]), file, f"{title}, {loop.vehicle}" if vehicle else title
 
 
 def _animate(options: argparse.Namespace) -> int:
@@ -165,13 +167,9 @@ def _animate(options: argparse.Namespace) -> int:
     loops = loops_of(prepared.system)
     seen = VisibleRows({name for loop in loops for name in loop.drawn()})
     observers: list[Observer] = [seen, Progress(scenario.name)]
-    title = scenario.title or scenario.name
-    with ExitStack() as stack:
-        run = Drawn(scenario.name, seen, scenario.z_up, loops)
-        films = [
-            (one, stack.enter_context(_written(path, options.force)))
-            for one, path in _of_vehicles(run, out)
-        ]
+    run = Drawn(scenario.name, seen, scenario.z_up, loops)
+    films = list(_of_vehicles(run, out, scenario.title or scenario.name))
+    with _written([file for _, file, _ in films], options.force) as folder:
         ending = simulate(
             prepared.system,
             prepared.experiment,
@@ -179,16 +177,18 @@ def _animate(options: argparse.Namespace) -> int:
             loop=prepared.loop,
             hooks=prepared.hooks(),
         )
-        for one, file in films:
+        for one, file, heading in films:
             if missing := one.lacks(Loop.for_control_point):
                 raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
-            animate(title, one, file, options.fps)
+            animate(heading, one, folder / file.name, options.fps)
     return status(scenario.name, ending)
 
 
 @contextmanager
-def _written(path: Path, force: bool) -> Iterator[Path]:
-    """A file to write instead of another, whole or not at all; says where that is."""
-    with replaced(path.parent, [path.name], force=force) as unfinished:
-        yield unfinished / path.name
-    show(path)
+def _written(files: Sequence[Path], force: bool) -> Iterator[Path]:
+    """A folder to write files into that then lie in theirs, whole or not at all; says where."""
+    names = [file.name for file in files]
+    with replaced(files[0].parent, names, force=force) as unfinished:
+        yield unfinished
+    for file in files:
+        show(file)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -87,81 +87,62 @@ class Rows:
         return size(self.errors())
 
 
-class Reducer(Protocol):
-    """Makes an index of rows."""
+class Fold:
+    """Makes an index of terms, a row for each instant or step that counts."""
+
+    def __init__(
+        self,
+        term: Callable[[Rows], np.ndarray],
+        fold: Callable[[np.ndarray], np.ndarray],
+        result: Callable[[np.ndarray, int, float], Any] = lambda found, n, end: found,
+    ) -> None:
+        """Start with nothing.
+
+        Args:
+            term: of some rows, in their order.
+            fold: many terms to one: :func:`total`, :func:`largest`, :func:`first` or :func:`last`.
+            result: of that one, the number of terms, and the time at which the run ends [s].
+
+        """
+        self._term, self._fold, self._result = term, fold, result
+        self._found, self._n = np.empty((0,)), 0
 
     def take(self, rows: Rows) -> None:
         """Take some rows into account."""
-
-    def value(self, end: float) -> np.ndarray | None:
-        """The index of a run that ends at a time [s], its members; None: there is none."""
-
-
-#: What of some rows an index is made of, a row for each instant or step that counts.
-Term = Callable[[Rows], np.ndarray]
-
-
-class Sum:
-    """A function of a sum, of the number of its terms, and of the time at which it ends."""
-
-    def __init__(
-        self, term: Term, result: Callable[[np.ndarray, int, float], Any] = lambda s, n, t: s
-    ) -> None:
-        """Start with nothing."""
-        self._term, self._result, self._n = term, result, 0
-        self._sum = np.zeros(0)
-
-    def take(self, rows: Rows) -> None:
-        """Add terms, in their order."""
-        terms = self._term(rows)
-        if len(terms):
-            before = self._sum if self._n else np.zeros_like(terms[0])
-            self._sum = np.vstack((before, terms)).sum(axis=0)
+        if self._n and self._fold is first:
+            return
+        if len(terms := self._term(rows)):
+            terms = terms.reshape(len(terms), -1)
+            self._found = self._fold(np.vstack((self._found, terms)) if self._n else terms)
             self._n += len(terms)
 
     def value(self, end: float) -> np.ndarray | None:
-        """The function; of no terms there is none."""
-        return np.atleast_1d(self._result(self._sum, self._n, end)) if self._n else None
+        """The members of the index of a run that ends at a time [s]; None: there is none."""
+        return np.atleast_1d(self._result(self._found, self._n, end)) if self._n else None
 
 
-class Chosen:
-    """The largest, the first or the last."""
-
-    def __init__(self, choose: Callable[[np.ndarray], np.ndarray], term: Term) -> None:
-        """Start with nothing."""
-        self._choose, self._term = choose, term
-        self._found: np.ndarray | None = None
-
-    def take(self, rows: Rows) -> None:
-        """Choose among what is there."""
-        if self._found is not None and self._choose is first:
-            return
-        values = self._term(rows)
-        if len(values):
-            found = () if self._found is None else (self._found,)
-            self._found = self._choose(np.vstack((*found, values.reshape(len(values), -1))))
-
-    def value(self, end: float) -> np.ndarray | None:
-        """What was chosen."""
-        return self._found
-
-
-def largest(values: np.ndarray) -> np.ndarray:
-    """The largest of each column."""
-    found: np.ndarray = values.max(axis=0)
+def total(terms: np.ndarray) -> np.ndarray:
+    """The sum, row by row: it does not depend on the blocks in which rows come."""
+    found: np.ndarray = terms.sum(axis=0)
     return found
 
 
-def first(values: np.ndarray) -> np.ndarray:
+def largest(terms: np.ndarray) -> np.ndarray:
+    """The largest of each column."""
+    found: np.ndarray = terms.max(axis=0)
+    return found
+
+
+def first(terms: np.ndarray) -> np.ndarray:
     """The first row."""
-    row: np.ndarray = values[0]
-    return row
+    found: np.ndarray = terms[0]
+    return found
 
 
-def last(values: np.ndarray) -> np.ndarray:
+def last(terms: np.ndarray) -> np.ndarray:
     """The last row."""
-    row: np.ndarray = values[-1]
-    return row
+    found: np.ndarray = terms[-1]
+    return found
 
 
 class LargestOfTheEnd:
@@ -207,7 +188,7 @@ class Index(NamedTuple):
     units: Members
     meaning: str
     needs: Callable[[Loop], Needs]
-    reducer: Callable[[], Reducer]
+    reducer: Callable[[], Fold | LargestOfTheEnd]
     symbol: str = ""
     is_metric: bool = False
 
@@ -293,7 +274,7 @@ INDICES: tuple[Index, ...] = (
         "root of the integral of the square of the applied signal, the size of what the paper "
         "prints (reading 6)",
         _actuation,
-        partial(Sum, _energy, lambda total, n, end: np.sqrt(total)),
+        partial(Fold, _energy, total, lambda found, n, end: np.sqrt(found)),
         is_metric=True,
     ),
     Index(
@@ -302,7 +283,7 @@ INDICES: tuple[Index, ...] = (
         TAU,
         "(59): the same over the time",
         _actuation,
-        partial(Sum, _energy, lambda total, n, end: np.sqrt(total / end)),
+        partial(Fold, _energy, total, lambda found, n, end: np.sqrt(found / end)),
         is_metric=True,
     ),
     Index(
@@ -311,7 +292,7 @@ INDICES: tuple[Index, ...] = (
         TAU,
         "largest absolute value of the commanded signal",
         _actuation,
-        partial(Chosen, largest, lambda rows: np.abs(rows.ends(*rows.loop.commanded))),
+        partial(Fold, lambda rows: np.abs(rows.ends(*rows.loop.commanded)), largest),
         is_metric=True,
     ),
     Index(
@@ -320,7 +301,7 @@ INDICES: tuple[Index, ...] = (
         dict.fromkeys(TAU, ""),
         "share of the steps whose command is outside the limits",
         _actuation,
-        partial(Sum, _outside, lambda total, n, end: total / n),
+        partial(Fold, _outside, total, lambda found, n, end: found / n),
         is_metric=True,
     ),
     Index(
@@ -329,7 +310,7 @@ INDICES: tuple[Index, ...] = (
         TAU,
         "sum of the absolute differences of the applied signal from step to step",
         _actuation,
-        partial(Sum, _change),
+        partial(Fold, _change, total),
         is_metric=True,
     ),
     Index(
@@ -347,7 +328,7 @@ INDICES: tuple[Index, ...] = (
         {"": "s"},
         f"first time at which |e| is at most {REACHED:g} m",
         Loop.for_tracking,
-        partial(Chosen, first, lambda rows: rows.time[rows.distance <= REACHED]),
+        partial(Fold, lambda rows: rows.time[rows.distance <= REACHED], first),
     ),
     Index(
         "late_error",
@@ -355,7 +336,7 @@ INDICES: tuple[Index, ...] = (
         {"": "m"},
         "largest |e| in the second half of the run",
         Loop.for_tracking,
-        partial(Chosen, largest, _late_distance),
+        partial(Fold, _late_distance, largest),
     ),
     Index(
         "estimate_error",
@@ -363,7 +344,7 @@ INDICES: tuple[Index, ...] = (
         {"": "m/s"},
         "root mean square of |dy_hat - dy| in the second half, both of the same instant",
         Loop.for_velocity_estimates,
-        partial(Sum, _miss, _root_mean),
+        partial(Fold, _miss, total, _root_mean),
     ),
     Index(
         "theta_hat_half",
@@ -371,7 +352,7 @@ INDICES: tuple[Index, ...] = (
         THETA,
         "theta_hat when half of the run is over",
         Loop.for_parameter_estimates,
-        partial(Chosen, first, lambda rows: rows.at(*rows.loop.theta_hat)[rows.late]),
+        partial(Fold, lambda rows: rows.at(*rows.loop.theta_hat)[rows.late], first),
         symbol=r"\hat{\theta}",
     ),
     Index(
@@ -380,7 +361,7 @@ INDICES: tuple[Index, ...] = (
         THETA,
         "theta_hat at its end",
         Loop.for_parameter_estimates,
-        partial(Chosen, last, lambda rows: rows.at(*rows.loop.theta_hat)),
+        partial(Fold, lambda rows: rows.at(*rows.loop.theta_hat), last),
         symbol=r"\hat{\theta}",
     ),
     Index(
@@ -389,7 +370,7 @@ INDICES: tuple[Index, ...] = (
         {"": "m/s"},
         "of the control point, |dy|",
         lambda loop: (loop.dy, ()),
-        partial(Chosen, largest, lambda rows: size(rows.at(*rows.loop.dy))),
+        partial(Fold, lambda rows: size(rows.at(*rows.loop.dy)), largest),
     ),
     Index(
         "largest_drift",
@@ -397,7 +378,7 @@ INDICES: tuple[Index, ...] = (
         {"": "m/s"},
         "of sway and heave, |(v, w)|: Assumption 1",
         lambda loop: (loop.drift, ()),
-        partial(Chosen, largest, lambda rows: size(rows.at(*rows.loop.drift))),
+        partial(Fold, lambda rows: size(rows.at(*rows.loop.drift)), largest),
     ),
 )
 

@@ -31,8 +31,16 @@ EULER, DIRECTIONS = tuple(map(str, quantities.EULER)), tuple(map(str, quantities
 Needs = tuple[Sequence[str], Sequence[str]]
 
 
-def _group(component: str, group: str, members: Iterable[str | int]) -> tuple[str, ...]:
-    return tuple(f"{component}.{member_name(group, member)}" for member in members)
+class _Group:
+    """The names of a group of ports or parameters at a component of a loop."""
+
+    def __init__(self, role: str, group: str, members: Iterable[str | int]) -> None:
+        self._role = role
+        self._names = tuple(member_name(group, m) if group else m for m in members)
+
+    def __get__(self, loop: Loop, owner: type[Loop] | None = None) -> tuple[str, ...]:
+        component = getattr(loop, self._role)
+        return tuple(f"{component}.{name}" for name in self._names)
 
 
 @dataclass(frozen=True)
@@ -44,105 +52,28 @@ class Loop:
     planner: str = "planner"
     disturbance: str = "disturbance"
 
-    @property
-    def position(self) -> tuple[str, ...]:
-        """Centre of mass, earth frame [m]: of eta."""
-        return _group(self.vehicle, "eta", AXES)
-
-    @property
-    def attitude(self) -> tuple[str, ...]:
-        """Euler angles [rad]: of eta."""
-        return _group(self.vehicle, "eta", EULER)
-
-    @property
-    def posture(self) -> tuple[str, ...]:
-        """Position and attitude: eta."""
-        return (*self.position, *self.attitude)
-
-    @property
-    def nu(self) -> tuple[str, ...]:
-        """Velocity in the body frame [m/s, rad/s]."""
-        return _group(self.vehicle, "nu", DIRECTIONS)
-
-    @property
-    def drift(self) -> tuple[str, ...]:
-        """Sway and heave, of which nothing is commanded [m/s]."""
-        return _group(self.vehicle, "nu", ("v", "w"))
-
-    @property
-    def dy(self) -> tuple[str, ...]:
-        """Velocity of the control point [m/s]."""
-        return _group(self.vehicle, "dy", AXES)
-
-    @property
-    def commanded(self) -> tuple[str, ...]:
-        """The control signals as they reach the vehicle [N, N.m]: tau."""
-        return _group(self.vehicle, "tau", ACTUATORS)
-
-    @property
-    def applied(self) -> tuple[str, ...]:
-        """The control signals as (3) lets them through [N, N.m]."""
-        return _group(self.vehicle, "tau_applied", ACTUATORS)
-
-    @property
-    def y_d(self) -> tuple[str, ...]:
-        """The reference [m]."""
-        return _group(self.planner, "y_d", AXES)
-
-    @property
-    def dy_d(self) -> tuple[str, ...]:
-        """Its velocity [m/s]."""
-        return _group(self.planner, "dy_d", AXES)
-
-    @property
-    def seen_y_d(self) -> tuple[str, ...]:
-        """The reference as the controller was given it [m]."""
-        return _group(self.controller, "y_d", AXES)
-
-    @property
-    def seen_dy_d(self) -> tuple[str, ...]:
-        """Its velocity as the controller was given it [m/s]."""
-        return _group(self.controller, "dy_d", AXES)
-
-    @property
-    def e(self) -> tuple[str, ...]:
-        """The tracking error as the controller measures it [m]."""
-        return _group(self.controller, "e", AXES)
-
-    @property
-    def y_hat(self) -> tuple[str, ...]:
-        """Estimate of the control point [m]."""
-        return _group(self.controller, "y_hat", AXES)
-
-    @property
-    def dy_hat(self) -> tuple[str, ...]:
-        """Estimate of its velocity [m/s]."""
-        return _group(self.controller, "dy_hat", AXES)
-
-    @property
-    def z(self) -> tuple[str, ...]:
-        """The error of the estimate as the controller measures it [m]."""
-        return _group(self.controller, "z", AXES)
-
-    @property
-    def tau(self) -> tuple[str, ...]:
-        """The control signals as the controller gives them [N, N.m]."""
-        return _group(self.controller, "tau", ACTUATORS)
-
-    @property
-    def theta_hat(self) -> tuple[str, ...]:
-        """Estimates of the coefficients of rho [N, kg/s, kg/m, kg]."""
-        return _group(self.controller, "theta_hat", quantities.THETA)
-
-    @property
-    def lower_limits(self) -> tuple[str, ...]:
-        """The parameters of (3) for one direction [N, N.m]."""
-        return _group(self.vehicle, "tau_min", ACTUATORS)
-
-    @property
-    def upper_limits(self) -> tuple[str, ...]:
-        """The parameters of (3) for the other direction [N, N.m]."""
-        return _group(self.vehicle, "tau_max", ACTUATORS)
+    #: eta: centre of mass [m] and Euler angles [rad], earth frame.
+    position, attitude = _Group("vehicle", "eta", AXES), _Group("vehicle", "eta", EULER)
+    posture = _Group("vehicle", "eta", (*AXES, *EULER))
+    #: nu [m/s, rad/s], body frame; sway and heave, of which nothing is commanded.
+    nu, drift = _Group("vehicle", "nu", DIRECTIONS), _Group("vehicle", "nu", ("v", "w"))
+    #: Velocity of the control point [m/s].
+    dy = _Group("vehicle", "dy", AXES)
+    #: tau as commanded, and as (3) lets it through [N, N.m].
+    commanded = _Group("vehicle", "tau", ACTUATORS)
+    applied = _Group("vehicle", "tau_applied", ACTUATORS)
+    #: y_d and its velocity, as they are planned and as the controller was given them.
+    y_d, dy_d = _Group("planner", "y_d", AXES), _Group("planner", "dy_d", AXES)
+    seen_y_d, seen_dy_d = _Group("controller", "y_d", AXES), _Group("controller", "dy_d", AXES)
+    #: What the controller has measured, estimated and computed.
+    e, z = _Group("controller", "e", AXES), _Group("controller", "z", AXES)
+    y_hat, dy_hat = _Group("controller", "y_hat", AXES), _Group("controller", "dy_hat", AXES)
+    theta_hat = _Group("controller", "theta_hat", quantities.THETA)
+    tau = _Group("controller", "tau", ACTUATORS)
+    #: The parameters of (3), and those of (2).
+    lower_limits = _Group("vehicle", "tau_min", ACTUATORS)
+    upper_limits = _Group("vehicle", "tau_max", ACTUATORS)
+    vehicle_parameters = _Group("vehicle", "", (name.replace("_", ".") for name in Vehicle._fields))
 
     @property
     def limits(self) -> tuple[str, ...]:
@@ -153,11 +84,6 @@ class Loop:
     def ell(self) -> str:
         """The parameter ell [m]: how far the control point lies ahead of the centre of mass."""
         return f"{self.vehicle}.ell"
-
-    @property
-    def vehicle_parameters(self) -> tuple[str, ...]:
-        """The parameters of (2)."""
-        return tuple(f"{self.vehicle}.{name.replace('_', '.')}" for name in Vehicle._fields)
 
     def drawn(self) -> tuple[str, ...]:
         """All signals that stand in figures."""
