@@ -11,7 +11,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from orchestrator.figures.style import heading, printed_unit
-from orchestrator.vehicle.indices import INDICES, REACHED
+from orchestrator.vehicle import indices
+from orchestrator.vehicle.indices import REACHED, Index
 
 #: Columns of runs.parquet, an array each; what a run does not have is nan or None.
 Columns: TypeAlias = Mapping[str, np.ndarray]
@@ -19,7 +20,6 @@ Columns: TypeAlias = Mapping[str, np.ndarray]
 #: Columns that are texts.
 SCENARIO, FAILURE = "scenario", "failure"
 
-_MEMBER = re.compile(r"\.(\w+)$|(\[\d\])$")
 _NORM = re.compile(r"\|(.+)\|")
 _UNIT = re.compile(r" \[([^\]]*)\]$")
 
@@ -28,9 +28,20 @@ def _failed(columns: Columns) -> np.ndarray:
     return np.array([isinstance(text, str) and text != "" for text in columns[FAILURE]])
 
 
+def _parts(value: str) -> tuple[Index, str, str] | None:
+    """The index that a column or group is of, its member and its vehicle; None: it is another."""
+    names = "|".join(index.name for index in indices.INDICES)
+    found = re.fullmatch(rf"(?:(.+)\.)?({names})(?:\.(\w+)|\[(\d+)\])?", value)
+    if found is None:
+        return None
+    vehicle, name, *member = found.groups()
+    [index] = (index for index in indices.INDICES if index.name == name)
+    return index, next(filter(None, member), ""), vehicle or ""
+
+
 def _largest(columns: Columns, index: str) -> np.ndarray:
     """The largest member of an index of each run, of all its vehicles."""
-    named = [name for name in columns if index in _MEMBER.sub("", name).split(".")]
+    named = [name for name in columns if (parts := _parts(name)) and parts[0].name == index]
     largest: np.ndarray = np.max([columns[name].astype(float) for name in named], axis=0)
     return largest
 
@@ -103,18 +114,15 @@ class Values:
             return VERDICTS[value][0]
         if len(factors := _factors(value)) > 1:
             return " · ".join(map(self.label, factors))
-        base = _MEMBER.sub("", value)
-        *vehicle, name = base.rsplit(".", 1)
-        index = next((one for one in INDICES if one.name == name), None)
-        if index is None:
+        if (parts := _parts(value)) is None:
             return value
-        member = value[len(base) :].strip(".[]")
+        index, member, vehicle = parts
         units = {str(m): printed_unit(unit) for m, unit in index.units.items()}
-        # Of a group that has one unit, this one.
+        # A group may have one unit.
         unit = units.get(member, next(iter(units.values())) if len({*units.values()}) == 1 else "")
         symbol = f"{index.symbol}_{member}" if member else index.symbol
         text = f"${symbol}$, {index.label}" if index.symbol else f"{index.label} {member}".rstrip()
-        return ", ".join([text, *vehicle]) + (f" [{unit}]" if unit else "")
+        return ", ".join(filter(None, (text, vehicle))) + (f" [{unit}]" if unit else "")
 
     def name(self, value: str) -> str:
         """What a value is called, without its unit."""

@@ -70,7 +70,7 @@ def read_figures(
     figures: Mapping[str, Any],
     varied: Mapping[str, type],
     is_compared: bool,
-    indices: Sequence[str] = index_columns(),
+    indices: Sequence[str] | None = None,
 ) -> tuple[FigureEntry, ...]:
     """The figures of a study.
 
@@ -79,13 +79,13 @@ def read_figures(
         figures: what the study file says of them; without a figure the usual one is drawn.
         varied: the types of what varies, by name.
         is_compared: whether there are several scenarios.
-        indices: the columns of what comes out of a run.
+        indices: the columns of what comes out of a run; None: of one vehicle.
 
     Raises:
         InputError: an entry cannot be what it shall be.
 
     """
-    tables = dict(figures)
+    tables, indices = dict(figures), indices or index_columns()
     labels = _labels(where, tables.pop(LABELS, {}))
     numbers = [name for name, kind in varied.items() if kind is not str]
     if not tables and numbers:

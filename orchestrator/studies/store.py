@@ -116,7 +116,7 @@ class Store:
         if len(self) != len(space):
             raise InputError(f"{self._path}: damaged: it holds {len(self)} of {len(space)} runs")
         rows = self._rows()
-        schema = _schema(arrow, space)
+        schema = _schema(arrow, space, self._indices)
         with (
             written(self._folder),
             self.ledger.changing() as unfinished,
@@ -267,14 +267,14 @@ def _check_same(ledger: Ledger, record: Mapping[str, Any]) -> None:
         )
 
 
-def _schema(arrow: Any, space: Space) -> Any:
+def _schema(arrow: Any, space: Space, indices: Sequence[str]) -> Any:
     types = {bool: arrow.bool_(), int: arrow.int64(), float: arrow.float64(), str: arrow.string()}
     return arrow.schema(
         [
             (RUN, arrow.int64()),
             *([(SCENARIO, arrow.string())] * space.has_scenarios),
             *((name, types[kind]) for name, kind in space.columns.items()),
-            *((name, arrow.float64()) for name in space.indices),
+            *((name, arrow.float64()) for name in indices),
             (FAILURE, arrow.string()),
         ]
     )
@@ -285,7 +285,7 @@ def _batch(
 ) -> Any:
     numbers, indices, failures = zip(*rows, strict=True)
     scenarios, points = zip(*map(space.point, numbers), strict=True)
-    values = np.frombuffer(b"".join(indices)).reshape(len(rows), len(space.indices))
+    values = np.frombuffer(b"".join(indices)).reshape(len(rows), -1)
     columns = [
         numbers,
         *([scenarios] * space.has_scenarios),

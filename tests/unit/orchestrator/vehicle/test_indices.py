@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import exp, log, pi, sqrt
 
 import numpy as np
 import pytest
 
+from orchestrator import simulate as run
+from orchestrator.figures.study_values import Values
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.preparation import loaded
+from orchestrator.studies.fmu_engine import FmuEngine
+from orchestrator.studies.space import Space
+from orchestrator.studies.store import StudyResult, store
+from orchestrator.studies.study import study_of
 from orchestrator.system.names import port_name
-from orchestrator.vehicle.indices import Indices, index_columns
-from orchestrator.vehicle.signals import AXES, EULER
+from orchestrator.vehicle import indices as table_of_indices
+from orchestrator.vehicle.indices import Fold, Index, Indices, index_columns, largest
+from orchestrator.vehicle.signals import AXES, EULER, Loop
 
 T, H, ELL = 10.0, 0.02, 0.35
 
@@ -104,3 +112,31 @@ def test_closed_loop_has_all_of_them():
     simulate(system, experiment, [observer], loop=chosen("auto", experiment))
     found = observer.values().keys()
     assert set(index_columns()) - {"time_to_reach"} <= found <= set(index_columns())
+
+
+def test_a_new_index_is_one_entry(monkeypatch, tmp_path):
+    """It is in metrics.json, in the table of a study, and in the labels of its figures."""
+    pytest.importorskip("pyarrow", reason="needs the extra studies")
+    depth = Index(
+        "largest_depth",
+        "largest depth",
+        {"": "m"},
+        "largest z of the centre of mass",
+        Loop.for_control_point,
+        partial(Fold, lambda rows: rows.at(rows.loop.position[2]), largest),
+        is_metric=True,
+    )
+    monkeypatch.setattr(table_of_indices, "INDICES", (*table_of_indices.INDICES, depth))
+    result = run("fig4", {"plant.nu0.w": 1.0}, stop_time=1.0, kind="native")
+    deepest = result["plant.eta.z"].max()
+    assert deepest > 0.1
+    assert result.metrics()["largest_depth"] == deepest
+
+    study = {"scenario": "fig4", "stop_time": 1.0, "vary": {"plant.nu0.w": [1.0]}}
+    space = Space(study_of("own", study), {"fig4": loaded("fig4", "native")})
+    with store(tmp_path, {"made_of": {}, "runs": 1}, space.indices) as kept:
+        kept.add(list(FmuEngine(space.prepared).outcomes([space[0]])))
+        kept.publish(space)
+    made = StudyResult(tmp_path)
+    assert made["largest_depth"].tolist() == [deepest]
+    assert Values(made).label("largest_depth") == "largest depth [m]"
