@@ -135,6 +135,29 @@ file = "survey.csv"
 planner.cruise = 0.4
 ```
 
+Two vehicles in one system. A vehicle is a component that takes `tau` and gives `eta`; its controller
+and planner are found by the wires. Each vehicle is measured and drawn as if it were alone:
+metrics.json has its indices under `vehicles` and its name, and the names of figures, pages, films
+and certificates end with that name.
+
+```toml
+[components]
+tow = "AuvPlant"
+pilot = "ObserverController"
+guide = "MotionPlanner"
+
+[wires]
+"tow.tau" = "pilot.tau"
+"pilot.y" = "tow.y"
+"pilot.eta" = "tow.eta"
+"pilot.y_d" = "guide.y_d"
+"pilot.dy_d" = "guide.dy_d"
+"pilot.ddy_d" = "guide.ddy_d"
+
+[parameters]
+tow.eta0.y = 2.0
+```
+
 A controller of one's own, from an FMU beside the file, is in [the guide](own-controller.md).
 """)
 
