@@ -179,7 +179,8 @@ def _indices(metrics: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
                 else ""
                 for values in metrics
             )
-            yield [f"{index.label} {index.members}".rstrip(), *cells]
+            members = f" ({index.members})" * (len(index.units) > 1)
+            yield [f"{index.label}{members}", *cells]
 
 
 def _ours(scenario: Scenario) -> Iterator[str]:

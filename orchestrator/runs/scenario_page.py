@@ -135,8 +135,8 @@ file = "survey.csv"
 planner.cruise = 0.4
 ```
 
-Two vehicles in one system. A vehicle is a component that takes `tau` and gives `eta`; its controller
-and planner are found by the wires. Each vehicle is measured and drawn as if it were alone:
+Two vehicles in one system. A vehicle is a component that takes `tau` and gives `eta`; its
+controller and planner are found by the wires. Each is measured and drawn as if it were alone:
 metrics.json has its indices under `vehicles` and its name, and the names of figures, pages, films
 and certificates end with that name.
 

@@ -1,4 +1,4 @@
-"""Indices of a run: each is declared once, in :data:`INDICES`, with all that is said of it.
+"""Indices of a run, (59) and others: each is declared once, in :data:`INDICES`.
 
 The table serves metrics.json, the terminal, the report, the columns of a study and the labels of
 its figures. What an index is of, it gets in blocks of rows while the run goes on; sums go on row by
@@ -91,34 +91,30 @@ class Fold:
     """Makes an index of terms, a row for each instant or step that counts."""
 
     def __init__(
-        self,
-        term: Callable[[Rows], np.ndarray],
-        fold: Callable[[np.ndarray], np.ndarray],
-        result: Callable[[np.ndarray, int, float], Any] = lambda found, n, end: found,
+        self, term: Callable[[Rows], np.ndarray], fold: Callable[[np.ndarray], np.ndarray]
     ) -> None:
         """Start with nothing.
 
         Args:
             term: of some rows, in their order.
             fold: many terms to one: :func:`total`, :func:`largest`, :func:`first` or :func:`last`.
-            result: of that one, the number of terms, and the time at which the run ends [s].
 
         """
-        self._term, self._fold, self._result = term, fold, result
-        self._found, self._n = np.empty((0,)), 0
+        self._term, self._fold = term, fold
+        self._found, self.n = np.empty(0), 0
 
     def take(self, rows: Rows) -> None:
         """Take some rows into account."""
-        if self._n and self._fold is first:
+        if self.n and self._fold is first:
             return
         if len(terms := self._term(rows)):
             terms = terms.reshape(len(terms), -1)
-            self._found = self._fold(np.vstack((self._found, terms)) if self._n else terms)
-            self._n += len(terms)
+            self._found = self._fold(np.vstack((self._found, terms)) if self.n else terms)
+            self.n += len(terms)
 
-    def value(self, end: float) -> np.ndarray | None:
-        """The members of the index of a run that ends at a time [s]; None: there is none."""
-        return np.atleast_1d(self._result(self._found, self._n, end)) if self._n else None
+    def found(self, end: float) -> np.ndarray:
+        """What the terms of a run come to that ends at a time [s]."""
+        return self._found
 
 
 def total(terms: np.ndarray) -> np.ndarray:
@@ -146,24 +142,27 @@ def last(terms: np.ndarray) -> np.ndarray:
 
 
 class LargestOfTheEnd:
-    """e_f of section 4.2: max |e| of each axis over the last T_L seconds."""
+    """e_f of section 4.2: max |e| of each axis over the last T_L seconds.
+
+    Attributes:
+        n: how many steps there were: before the first nothing has been followed.
+
+    """
 
     def __init__(self) -> None:
         """Start with nothing."""
         self._recent: deque[Rows] = deque()
-        self._has_steps = False
+        self.n = 0
 
     def take(self, rows: Rows) -> None:
         """Keep the last seconds."""
-        self._has_steps |= rows.number + len(rows.time) > 1
+        self.n = rows.number + len(rows.time) - 1
         self._recent.append(rows)
         while self._recent[0].time[-1] < rows.time[-1] - LAST_SECONDS:
             self._recent.popleft()
 
-    def value(self, end: float) -> np.ndarray | None:
-        """The largest errors; before the first step nothing has been followed."""
-        if not self._has_steps:
-            return None
+    def found(self, end: float) -> np.ndarray:
+        """The largest errors."""
         errors = [rows.errors(rows.time >= end - LAST_SECONDS) for rows in self._recent]
         return largest(np.abs(np.vstack(errors)))
 
@@ -177,7 +176,9 @@ class Index(NamedTuple):
         units: of its members; of a single number, that of the member without a name.
         meaning: what the reference page says.
         needs: what a run must have.
-        reducer: makes it.
+        reducer: takes rows in, for what it is a function of.
+        accumulated: where the batch engine has the same.
+        result: that function, also of the number of terms and of the time at the end [s].
         symbol: in formulas, with its members as indices, before the label.
         is_metric: whether metrics.json holds it, or a study only.
 
@@ -189,6 +190,8 @@ class Index(NamedTuple):
     meaning: str
     needs: Callable[[Loop], Needs]
     reducer: Callable[[], Fold | LargestOfTheEnd]
+    accumulated: str = ""
+    result: Callable[[np.ndarray, int, float], Any] = lambda found, n, end: found
     symbol: str = ""
     is_metric: bool = False
 
@@ -196,6 +199,11 @@ class Index(NamedTuple):
     def columns(self) -> tuple[str, ...]:
         """The names of its numbers in the table of a study."""
         return tuple(member_name(self.name, m) if m != "" else self.name for m in self.units)
+
+    def members_of(self, found: np.ndarray, n: int, end: float) -> list[float]:
+        """The values of its members, from what its terms come to."""
+        values: list[float] = np.atleast_1d(self.result(found, n, end)).tolist()
+        return values
 
     @property
     def members(self) -> str:
@@ -274,7 +282,9 @@ INDICES: tuple[Index, ...] = (
         "root of the integral of the square of the applied signal, the size of what the paper "
         "prints (reading 6)",
         _actuation,
-        partial(Fold, _energy, total, lambda found, n, end: np.sqrt(found)),
+        partial(Fold, _energy, total),
+        "square",
+        lambda found, n, end: np.sqrt(found),
         is_metric=True,
     ),
     Index(
@@ -283,7 +293,9 @@ INDICES: tuple[Index, ...] = (
         TAU,
         "(59): the same over the time",
         _actuation,
-        partial(Fold, _energy, total, lambda found, n, end: np.sqrt(found / end)),
+        partial(Fold, _energy, total),
+        "square",
+        lambda found, n, end: np.sqrt(found / end),
         is_metric=True,
     ),
     Index(
@@ -293,6 +305,7 @@ INDICES: tuple[Index, ...] = (
         "largest absolute value of the commanded signal",
         _actuation,
         partial(Fold, lambda rows: np.abs(rows.ends(*rows.loop.commanded)), largest),
+        "peak",
         is_metric=True,
     ),
     Index(
@@ -301,7 +314,9 @@ INDICES: tuple[Index, ...] = (
         dict.fromkeys(TAU, ""),
         "share of the steps whose command is outside the limits",
         _actuation,
-        partial(Fold, _outside, total, lambda found, n, end: found / n),
+        partial(Fold, _outside, total),
+        "outside",
+        lambda found, n, end: found / n,
         is_metric=True,
     ),
     Index(
@@ -311,6 +326,7 @@ INDICES: tuple[Index, ...] = (
         "sum of the absolute differences of the applied signal from step to step",
         _actuation,
         partial(Fold, _change, total),
+        "variation",
         is_metric=True,
     ),
     Index(
@@ -320,6 +336,7 @@ INDICES: tuple[Index, ...] = (
         f"e_f: largest absolute value of e in the last {LAST_SECONDS:g} s",
         Loop.for_tracking,
         LargestOfTheEnd,
+        "final",
         is_metric=True,
     ),
     Index(
@@ -329,6 +346,7 @@ INDICES: tuple[Index, ...] = (
         f"first time at which |e| is at most {REACHED:g} m",
         Loop.for_tracking,
         partial(Fold, lambda rows: rows.time[rows.distance <= REACHED], first),
+        "reached",
     ),
     Index(
         "late_error",
@@ -337,6 +355,7 @@ INDICES: tuple[Index, ...] = (
         "largest |e| in the second half of the run",
         Loop.for_tracking,
         partial(Fold, _late_distance, largest),
+        "late",
     ),
     Index(
         "estimate_error",
@@ -344,7 +363,9 @@ INDICES: tuple[Index, ...] = (
         {"": "m/s"},
         "root mean square of |dy_hat - dy| in the second half, both of the same instant",
         Loop.for_velocity_estimates,
-        partial(Fold, _miss, total, _root_mean),
+        partial(Fold, _miss, total),
+        "miss",
+        _root_mean,
     ),
     Index(
         "theta_hat_half",
@@ -353,6 +374,7 @@ INDICES: tuple[Index, ...] = (
         "theta_hat when half of the run is over",
         Loop.for_parameter_estimates,
         partial(Fold, lambda rows: rows.at(*rows.loop.theta_hat)[rows.late], first),
+        "half",
         symbol=r"\hat{\theta}",
     ),
     Index(
@@ -362,6 +384,7 @@ INDICES: tuple[Index, ...] = (
         "theta_hat at its end",
         Loop.for_parameter_estimates,
         partial(Fold, lambda rows: rows.at(*rows.loop.theta_hat), last),
+        "end",
         symbol=r"\hat{\theta}",
     ),
     Index(
@@ -371,6 +394,7 @@ INDICES: tuple[Index, ...] = (
         "of the control point, |dy|",
         lambda loop: (loop.dy, ()),
         partial(Fold, lambda rows: size(rows.at(*rows.loop.dy)), largest),
+        "speed",
     ),
     Index(
         "largest_drift",
@@ -379,6 +403,7 @@ INDICES: tuple[Index, ...] = (
         "of sway and heave, |(v, w)|: Assumption 1",
         lambda loop: (loop.drift, ()),
         partial(Fold, lambda rows: size(rows.at(*rows.loop.drift)), largest),
+        "drift",
     ),
 )
 
@@ -428,11 +453,11 @@ class Indices:
         self._last = np.empty((0, 1 + len(header.columns)))
         none = Table.of(header, self._last)
         self._reducers = {
-            loop: {
-                index.name: index.reducer()
+            loop: [
+                (index, index.reducer())
                 for index in self._chosen
                 if not none.missing(*index.needs(loop))
-            }
+            ]
             for loop in self._loops
         }
 
@@ -440,7 +465,7 @@ class Indices:
         """Take some rows into account."""
         for loop, reducers in self._reducers.items():
             seen = Rows(self._header, loop, self._n, self._last, rows)
-            for reducer in reducers.values():
+            for _, reducer in reducers:
                 reducer.take(seen)
         self._last, self._end = rows[-1:].copy(), float(rows[-1, 0])
         self._n += len(rows)
@@ -452,8 +477,11 @@ class Indices:
     @np.errstate(all="ignore")
     def found(self, loop: Loop = STANDARD) -> dict[str, list[float]]:
         """The members of the indices of a loop, by their names."""
-        values = {name: reducer.value(self._end) for name, reducer in self._reducers[loop].items()}
-        return {name: value.tolist() for name, value in values.items() if value is not None}
+        return {
+            index.name: index.members_of(reducer.found(self._end), reducer.n, self._end)
+            for index, reducer in self._reducers[loop]
+            if reducer.n
+        }
 
     def values(self) -> dict[str, float]:
         """The numbers of all loops, by their columns in a study."""
