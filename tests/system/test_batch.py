@@ -241,10 +241,10 @@ def test_another_process_finds_the_kernel_compiled():
         "from auv_fmu.output_feedback import Gains\n"
         "from orchestrator.studies.batch.library import compiled\n"
         "from orchestrator.studies.batch_engine import BatchEngine\n"
-        "from orchestrator.studies.engine import Run\n"
+        "from orchestrator.studies.engine import Point\n"
         "import pickle, sys\n"
         "engine = pickle.load(sys.stdin.buffer)\n"
-        "list(engine.outcomes([Run(0, 'fig4', {}, 0.1, 0.02)]))\n"
+        "list(engine.outcomes([Point(0, 'fig4', {}, 0.1, 0.02)]))\n"
         "stats = compiled(Gains).stats\n"
         "print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))\n"
     )
