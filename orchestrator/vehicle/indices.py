@@ -46,6 +46,7 @@ class Rows:
         self.half = 0.5 * header.experiment.stop_time
         self._header, self._rows = header, np.vstack((before, rows))
         self._table = Table.of(header, self._rows)
+        self._groups: dict[tuple[str, ...], np.ndarray] = {}
         self._new = len(before)
 
     @property
@@ -60,15 +61,20 @@ class Rows:
 
     def at(self, *columns: str) -> np.ndarray:
         """Values in the rows."""
-        return self._table.group(*columns)[self._new :]
+        return self._group(columns)[self._new :]
 
     def starts(self, *columns: str) -> np.ndarray:
         """Values at the beginning of each step that ends at one of the rows."""
-        return self._table.group(*columns)[:-1]
+        return self._group(columns)[:-1]
 
     def ends(self, *columns: str) -> np.ndarray:
         """Values at the end of each of these steps."""
-        return self._table.group(*columns)[1:]
+        return self._group(columns)[1:]
+
+    def _group(self, columns: tuple[str, ...]) -> np.ndarray:
+        if columns not in self._groups:
+            self._groups[columns] = self._table.group(*columns)
+        return self._groups[columns]
 
     @property
     def limits(self) -> tuple[np.ndarray, np.ndarray]:
@@ -268,7 +274,10 @@ def _actuation(loop: Loop) -> Needs:
     return (*loop.commanded, *loop.applied), loop.limits
 
 
-#: Units of the integral's root.
+#: Two indices are made of it.
+_ENERGY = partial(Fold, _energy, total)
+
+#: Units of its root.
 _EFFORT = {member: f"{unit}.s^1/2" for member, unit in TAU.items()}
 
 #: All indices, in the order of the columns of a study; e is y - y_d with the true control point,
@@ -282,7 +291,7 @@ INDICES: tuple[Index, ...] = (
         "root of the integral of the square of the applied signal, the size of what the paper "
         "prints (reading 6)",
         _actuation,
-        partial(Fold, _energy, total),
+        _ENERGY,
         "square",
         lambda found, n, end: np.sqrt(found),
         is_metric=True,
@@ -293,7 +302,7 @@ INDICES: tuple[Index, ...] = (
         TAU,
         "(59): the same over the time",
         _actuation,
-        partial(Fold, _energy, total),
+        _ENERGY,
         "square",
         lambda found, n, end: np.sqrt(found / end),
         is_metric=True,
@@ -452,20 +461,21 @@ class Indices:
         self._failure: str | None = None
         self._last = np.empty((0, 1 + len(header.columns)))
         none = Table.of(header, self._last)
-        self._reducers = {
-            loop: [
-                (index, index.reducer())
-                for index in self._chosen
-                if not none.missing(*index.needs(loop))
-            ]
+        self._measured = {
+            loop: [index for index in self._chosen if not none.missing(*index.needs(loop))]
             for loop in self._loops
+        }
+        # Those that are made of the same share it.
+        self._reducers = {
+            loop: {index.reducer: index.reducer() for index in found}
+            for loop, found in self._measured.items()
         }
 
     def take(self, rows: np.ndarray) -> None:
         """Take some rows into account."""
         for loop, reducers in self._reducers.items():
             seen = Rows(self._header, loop, self._n, self._last, rows)
-            for _, reducer in reducers:
+            for reducer in reducers.values():
                 reducer.take(seen)
         self._last, self._end = rows[-1:].copy(), float(rows[-1, 0])
         self._n += len(rows)
@@ -479,8 +489,8 @@ class Indices:
         """The members of the indices of a loop, by their names."""
         return {
             index.name: index.members_of(reducer.found(self._end), reducer.n, self._end)
-            for index, reducer in self._reducers[loop]
-            if reducer.n
+            for index in self._measured[loop]
+            if (reducer := self._reducers[loop][index.reducer]).n
         }
 
     def values(self) -> dict[str, float]:
