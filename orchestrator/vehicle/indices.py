@@ -28,7 +28,7 @@ LAST_SECONDS = 5.0
 REACHED = 1.0
 
 
-class Rows:
+class LoopRows:
     """Some rows of a run, and what indices of one loop take from them.
 
     Attributes:
@@ -97,7 +97,7 @@ class Fold:
     """Makes an index of terms, a row for each instant or step that counts."""
 
     def __init__(
-        self, term: Callable[[Rows], np.ndarray], fold: Callable[[np.ndarray], np.ndarray]
+        self, term: Callable[[LoopRows], np.ndarray], fold: Callable[[np.ndarray], np.ndarray]
     ) -> None:
         """Start with nothing.
 
@@ -109,7 +109,7 @@ class Fold:
         self._term, self._fold = term, fold
         self._found, self.n = np.empty(0), 0
 
-    def take(self, rows: Rows) -> None:
+    def take(self, rows: LoopRows) -> None:
         """Take some rows into account."""
         if self.n and self._fold is first:
             return
@@ -157,10 +157,10 @@ class LargestOfTheEnd:
 
     def __init__(self) -> None:
         """Start with nothing."""
-        self._recent: deque[Rows] = deque()
+        self._recent: deque[LoopRows] = deque()
         self.n = 0
 
-    def take(self, rows: Rows) -> None:
+    def take(self, rows: LoopRows) -> None:
         """Keep the last seconds."""
         self.n = rows.number + len(rows.time) - 1
         self._recent.append(rows)
@@ -231,20 +231,20 @@ def size(vectors: np.ndarray) -> np.ndarray:
     return norm
 
 
-def _energy(rows: Rows) -> np.ndarray:
+def _energy(rows: LoopRows) -> np.ndarray:
     """Integral of the square of the applied signal, over each step."""
     h: np.ndarray = rows.ends("time") - rows.starts("time")
     energy: np.ndarray = rows.ends(*rows.loop.applied) ** 2 * h
     return energy
 
 
-def _outside(rows: Rows) -> np.ndarray:
+def _outside(rows: LoopRows) -> np.ndarray:
     commanded, (lower, upper) = rows.ends(*rows.loop.commanded), rows.limits
     outside: np.ndarray = ((commanded < lower) | (commanded > upper)).astype(float)
     return outside
 
 
-def _change(rows: Rows) -> np.ndarray:
+def _change(rows: LoopRows) -> np.ndarray:
     change: np.ndarray = np.abs(rows.ends(*rows.loop.applied) - rows.starts(*rows.loop.applied))
     if rows.number <= 1:
         # Before the first step nothing was applied.
@@ -252,7 +252,7 @@ def _change(rows: Rows) -> np.ndarray:
     return change
 
 
-def _miss(rows: Rows) -> np.ndarray:
+def _miss(rows: LoopRows) -> np.ndarray:
     """Squares of dy_hat - dy: a row holds the estimate of the instant at which its step began."""
     late = rows.starts("time")[:, 0] >= rows.half
     miss: np.ndarray = (rows.ends(*rows.loop.dy_hat) - rows.starts(*rows.loop.dy))[late] ** 2
@@ -266,7 +266,7 @@ def _root_mean(squares: np.ndarray, n: int, end: float) -> np.ndarray:
     return mean
 
 
-def _late_distance(rows: Rows) -> np.ndarray:
+def _late_distance(rows: LoopRows) -> np.ndarray:
     return rows.distance[rows.late] if rows.late.any() else np.empty(0)
 
 
@@ -474,7 +474,7 @@ class Indices:
     def take(self, rows: np.ndarray) -> None:
         """Take some rows into account."""
         for loop, reducers in self._reducers.items():
-            seen = Rows(self._header, loop, self._n, self._last, rows)
+            seen = LoopRows(self._header, loop, self._n, self._last, rows)
             for reducer in reducers.values():
                 reducer.take(seen)
         self._last, self._end = rows[-1:].copy(), float(rows[-1, 0])

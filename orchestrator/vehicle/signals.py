@@ -146,7 +146,12 @@ def loops_of(system: System) -> tuple[Loop, ...]:
 
 def suffixes(loops: Sequence[Loop]) -> dict[Loop, str]:
     """What the names of files end with that hold one of these loops: of several, the vehicle."""
-    return {loop: f"-{file_name(loop.vehicle)}" if len(loops) > 1 else "" for loop in loops}
+    if len(loops) == 1:
+        return {loops[0]: ""}
+    found: dict[Loop, str] = {}
+    for loop in loops:
+        found[loop] = f"-{file_name(loop.vehicle, [name[1:] for name in found.values()])}"
+    return found
 
 
 def _has(system: System, component: str, causality: str, port: str) -> bool:

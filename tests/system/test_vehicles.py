@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ import pytest
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.runs.wiring import read_wiring
+from orchestrator.system.names import PortName
+from orchestrator.vehicle.certificates import certificates
 from orchestrator.vehicle.gains import check
 from orchestrator.vehicle.indices import INDICES, VEHICLES, index_columns
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
@@ -87,6 +90,31 @@ def test_each_vehicle_has_the_numbers_that_it_has_alone(results, alone, name):
     certificates = "certificates.csv", f"certificates-{name}.csv"
     apart = (results / alone / certificates[0]).read_bytes()
     assert apart == (results / "two" / certificates[1]).read_bytes()
+
+
+def test_names_of_components_may_have_dots():
+    """As those of nested systems have, of which several may have a plant."""
+    system = load("fig4", "native")
+
+    def nested(port: PortName) -> PortName:
+        return PortName(f"auv1.{port.component}", port.port)
+
+    components = {
+        f"auv1.{name}": replace(part, name=f"auv1.{name}")
+        for name, part in system.components.items()
+    }
+    connections = tuple(
+        replace(wire, source=nested(wire.source), target=nested(wire.target))
+        for wire in system.connections
+    )
+    values = {nested(port): value for port, value in system.parameters.items()}
+    inner = replace(system, components=components, connections=connections, parameters=values)
+    [loop] = loops_of(inner)
+    assert vars(loop) == {role: f"auv1.{name}" for role, name in vars(STANDARD).items()}
+    found, flat = (simulate(one, stop_time=1.0) for one in (inner, system))
+    for key in ("l2_effort", "peak_command", "final_error", "velocities_reaching_controller"):
+        assert found.metrics()[key] == flat.metrics()[key]
+    assert (certificates(found, loop) == certificates(flat)).all()
 
 
 def test_each_vehicle_is_drawn(results, capsys):
