@@ -34,6 +34,7 @@ from orchestrator.master.fmi.instance import Instance
 from orchestrator.master.fmi.loaded import LoadedInstance
 from orchestrator.master.loop import PYTHON_LOOP, Stepping, chosen
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.schedule import Member
 from orchestrator.master.simulation import simulate
 from orchestrator.runs import bundle
@@ -55,7 +56,9 @@ def loop_time(system: System, steps: int, loop: Stepping = PYTHON_LOOP) -> float
     """Seconds of the steps of a run whose rows are kept in memory, without its set-up."""
 
     def run(n: int) -> float:
-        return timed(lambda: simulate(system, Experiment(n * STEP, STEP), [Table()], loop=loop))
+        return timed(
+            lambda: simulate(planned(system, Experiment(n * STEP, STEP)), [Table()], loop=loop)
+        )
 
     return run(steps) - run(1)
 

@@ -20,6 +20,7 @@ import numpy as np
 from orchestrator.master.experiment import COUPLINGS, Experiment
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.master.stepper import made
 from orchestrator.system.structure import System
@@ -42,7 +43,7 @@ def _time(system: System, step: float, coupling: str) -> float:
     def run(n: int) -> float:
         experiment = Experiment(n * step, step, coupling=coupling)
         begin = perf_counter()
-        simulate(system, experiment, loop=chosen("compiled", experiment))
+        simulate(planned(system, experiment), loop=chosen("compiled", experiment))
         return perf_counter() - begin
 
     return 1e6 * (run(_STEPS) - run(1)) / (_STEPS - 1)
@@ -88,7 +89,7 @@ def main() -> None:
                 errors = []
                 for h in steps:
                     table = Table()
-                    simulate(system, Experiment(5.0, h, coupling=coupling), [table])
+                    simulate(planned(system, Experiment(5.0, h, coupling=coupling)), [table])
                     right = np.sin(table.time) / (1.0 - gain)
                     errors.append(float(np.abs(table["a.y1"] - right).max()))
                 stable = max(errors) < 1.0

@@ -29,6 +29,7 @@ from typing import Any
 
 import fmpy
 
+from fmus.kinds import NATIVE
 from orchestrator.formats.osp import write_osp
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import write_ssp
@@ -37,8 +38,8 @@ from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
 from orchestrator.runs import bundle
-from orchestrator.runs.bundle import NATIVE
-from orchestrator.runs.preparation import Request, prepare
+from orchestrator.runs.preparation import prepare
+from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.component import read_component
 from orchestrator.system.structure import System
@@ -69,7 +70,7 @@ def ours(system: System, order: str) -> tuple[Run, float]:
         prepared, table = prepare(Scenario(system.name), system, request), Table()
         loop = chosen("auto", prepared.experiment)
         start = perf_counter()
-        ending = simulate(prepared.system, prepared.experiment, [table], loop=loop)
+        ending = simulate(prepared.plan, [table], loop=loop)
         seconds = perf_counter() - start
         if ending.failure is not None or len(table) != steps + 1:
             raise InputError(f"{ending.failure or ending.remark}")

@@ -19,6 +19,7 @@ from auv_fmu.euler import STEP
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs import bundle
 from orchestrator.runs.wiring import closed_loop
@@ -28,7 +29,7 @@ from orchestrator.system.structure import System
 def run_time(system: System, steps: int, order: str, isolation: Isolation | None) -> float:
     """Wall-clock seconds of a run whose rows are kept in memory."""
     start = perf_counter()
-    simulate(system, Experiment(steps * STEP, STEP, order), [Table()], isolation)
+    simulate(planned(system, Experiment(steps * STEP, STEP, order)), [Table()], isolation)
     return perf_counter() - start
 
 

@@ -35,6 +35,7 @@ from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs import bundle
 from orchestrator.runs.wiring import closed_loop as wired
@@ -91,7 +92,7 @@ def in_our_master(system: System, loop: str, order: str, steps: int) -> float:
     def run(n: int) -> float:
         experiment = Experiment(n * STEP, STEP, order)
         steps_of = chosen(loop, experiment)
-        return timed(lambda: simulate(system, experiment, [Table()], loop=steps_of))
+        return timed(lambda: simulate(planned(system, experiment), [Table()], loop=steps_of))
 
     # A set-up takes as long as thousands of compiled steps, and a larger table has other costs.
     times = MORE_COMPILED if loop == "compiled" else 1

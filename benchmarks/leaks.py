@@ -24,7 +24,7 @@ import fmpy
 from fmpy.fmi2 import FMU2Slave
 from pythonfmu import FmuBuilder
 
-from fmus.packaging.loader import compiler
+from fmus.python.loader import compiler
 from orchestrator.runs import bundle
 
 _PAGE = os.sysconf("SC_PAGE_SIZE")

@@ -21,6 +21,7 @@ from typing import Any
 from memory import resident
 
 from auv_fmu.euler import STEP
+from fmus.kinds import KINDS, NATIVE
 from orchestrator import load
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.master.experiment import Experiment
@@ -30,8 +31,8 @@ from orchestrator.master.loop import LOOPS, chosen
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.observer import Observer
 from orchestrator.master.observers.selection import Selection
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.bundle import KINDS, NATIVE
 from orchestrator.vehicle.certificates import CertificatesFile
 from orchestrator.vehicle.indices import Metrics
 
@@ -100,8 +101,7 @@ def main() -> None:
             observers.append(checkpoints)
             hooks.insert(0, checkpoints)
         simulate(
-            load("fig4", options.kind),
-            experiment,
+            planned(load("fig4", options.kind), experiment),
             observers,
             None,
             chosen(options.loop, experiment),

@@ -32,8 +32,8 @@ from orchestrator.formats.osp import write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
-from orchestrator.master.simulation import simulate
-from orchestrator.runs.preparation import Request, load, prepare
+from orchestrator.runs.preparation import load, prepare
+from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
@@ -175,7 +175,7 @@ def ours(folder: Path) -> tuple[float, float, float]:
     read = perf_counter()
     prepared = prepare(Scenario(system.name), system, Request(stop_time=STEPS * STEP, loop="auto"))
     table = _First()
-    ending: Ending = simulate(prepared.system, prepared.experiment, [table], loop=prepared.loop)
+    ending: Ending = prepared.run([table])
     end = perf_counter()
     if ending.failure is not None:
         raise SystemExit(ending.failure)

@@ -1,19 +1,18 @@
 """The FMU components, and what turns them into FMUs.
 
-============================== ==============================================================
-package                        what it is
-============================== ==============================================================
-:mod:`.auv_plant`              the simulated vehicle
-:mod:`.observer_controller`    the proposed controller
-:mod:`.pd_controller`          the baseline
-:mod:`.disturbance_generator`  friction, waves and ocean currents
-:mod:`.motion_planner`         the reference trajectory
-:mod:`.path_planner`           a reference through waypoints, in its place
-:mod:`.ports`                  what a port is, and the groups that ports come in
-:mod:`.slave`                  the Python kind of component, on PythonFMU
-:mod:`.packaging`              from component folders to FMU files
-============================== ==============================================================
+====================== ======================================================================
+module                 what it states
+====================== ======================================================================
+:mod:`.ports`          what a port is, the groups that ports come in, a behaviour's hooks
+:mod:`.kinds`          kinds of FMU, versions of FMI, platforms that there can be libraries for
+:mod:`.discovery`      which components there are, and what FMUs are made from
+:mod:`.archive`        FMU files: reproducible archives, and the licences in them
+:mod:`.documentation`  the page of each component
+:mod:`.compilers`      what makes libraries
+:mod:`.python`         the Python kind of FMU, on PythonFMU
+:mod:`.native`         the C kind of FMU, translated from the same text
+:mod:`.build`          the command that brings a folder of FMUs up to date
+====================== ======================================================================
 
-A component is a folder with its ports, its slave and its page. Imports run one way: `ports`, then
-`slave`, then the components and `packaging`.
+Every other folder is a component: its ports, its behaviour and its page.
 """

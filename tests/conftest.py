@@ -4,25 +4,32 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import signal
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
 import pytest
 from hypothesis import Phase, settings
 from platformdirs import user_cache_path
 
+from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
+from orchestrator.machine.locks import claimed
 from orchestrator.runs import bundle
 
 # A slow machine is no error, and the same tree gives the same result every time.
-settings.register_profile("patient", deadline=None, derandomize=True)
+settings.register_profile("patient", deadline=None, derandomize=True, max_examples=40)
 settings.load_profile("patient")
+# The same and more of them, beside the slow tests.
+settings.register_profile("thorough", settings.get_profile("patient"), max_examples=200)
 # New examples every time, and many.
 settings.register_profile("search", deadline=None, max_examples=2000)
 # For mutmut: no smaller examples once a mutant is dead.
 settings.register_profile(
     "mutants",
     settings.get_profile("patient"),
+    max_examples=100,
     phases=[Phase.explicit, Phase.generate],
 )
 # For tests/fuzz/test_keeping.py: thousands of folders, and of files with a changed bit.
@@ -38,6 +45,10 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 _MISSING = re.compile(r"^(there is |there are )?no | (is|are) not installed$")
 
 
+#: Where pytest's cache keeps what was skipped.
+_SKIPPED = "auv-fmu/skipped"
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Note what a test would be skipped without."""
     for mark in item.iter_markers("skipif"):
@@ -45,9 +56,30 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         item.user_properties += [("needs", needed)] * found
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--skipped", action="store_true", help="only what the last run skipped: after an install"
+    )
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what the last run has not skipped, where that is asked for."""
+    if config.getoption("skipped"):
+        assert config.cache is not None
+        skipped = {*config.cache.get(_SKIPPED, [])}
+        groups: dict[bool, list[pytest.Item]] = {True: [], False: []}
+        for item in items:
+            groups[not skipped.isdisjoint((item.nodeid, item.location[0]))].append(item)
+        config.hook.pytest_deselected(items=groups[False])
+        items[:] = groups[True]
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Say what not every machine has, and how many tests ran with it or were skipped, and why."""
     passed, skipped = (terminalreporter.stats.get(name, []) for name in ("passed", "skipped"))
+    if cache := getattr(terminalreporter.config, "cache", None):
+        nodes = sorted({report.nodeid for report in skipped})
+        cache.set(_SKIPPED, nodes)
     needs = Counter(need for report in passed for _, need in report.user_properties)
     reasons = Counter(report.longrepr[2].removeprefix("Skipped: ") for report in skipped)
     for what, counter in (("ran with", needs), (f"skipped {len(skipped)}", reasons)):
@@ -56,28 +88,55 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
             terminalreporter.write_line(f"{what}: {counts}")
 
 
+@pytest.fixture(scope="session")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of this run of the tests, the same one for all workers of pytest-xdist."""
+    root = tmp_path_factory.getbasetemp()
+    folder = (root.parent if "PYTEST_XDIST_WORKER" in os.environ else root) / "shared"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    return folder
+
+
 @pytest.fixture(scope="session", autouse=True)
-def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+def _own_cache(shared: Path) -> None:
     """Keep FMUs that the tests build out of the user's cache."""
     # What that compiler has made of the C libraries takes minutes to make again.
     os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", str(user_cache_path("zig", appauthor=False)))
-    os.environ["XDG_CACHE_HOME"] = str(tmp_path_factory.mktemp("cache"))
+    os.environ["XDG_CACHE_HOME"] = str(shared / "cache")
 
 
-@pytest.fixture(scope="session")
-def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the built bundle."""
-    folder = tmp_path_factory.mktemp("dist")
-    bundle.build(folder)
+def _copy(fmus: Path, module: str, folder: Path, *options: str) -> None:
+    """Take the place of what would build them once more."""
+    shutil.copytree(fmus, folder, dirs_exist_ok=True)
+
+
+def _built(shared: Path, kind: str, fmi: str = FMI_VERSIONS[0]) -> Path:
+    """Make a bundle of the FMUs that runs take, unless another worker has done so."""
+    folder = shared / f"{kind}{fmi}"
+    with claimed(shared, wait=True), pytest.MonkeyPatch.context() as patch:
+        if not folder.exists():
+            fmus = bundle.current_fmus(kind, fmi)
+            patch.setattr(bundle, "run_fmus", partial(_copy, fmus))
+            bundle.build(folder, kind=kind, fmi=fmi)
     return folder
 
 
 @pytest.fixture(scope="session")
-def native(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the FMUs in C."""
-    folder = tmp_path_factory.mktemp("native")
-    bundle.build(folder, kind="native")
-    return folder
+def dist(shared: Path) -> Path:
+    """A folder with the built bundle, to be read only."""
+    return _built(shared, PYTHON)
+
+
+@pytest.fixture(scope="session")
+def native(shared: Path) -> Path:
+    """A folder with the FMUs in C, to be read only."""
+    return _built(shared, NATIVE)
+
+
+@pytest.fixture(scope="session")
+def dist3(shared: Path) -> Path:
+    """A folder with the FMUs in C of FMI 3.0, to be read only."""
+    return _built(shared, NATIVE, "3")
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from orchestrator import load, simulate
 from orchestrator.master.observers.table import Table
 from orchestrator.paper.measures import total_variation_until
 from orchestrator.paper.page import table
-from orchestrator.studies.batch.flat import flat
+from orchestrator.studies.batch.numbers import flat
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.vehicle.signals import STANDARD, true_control_point
@@ -194,10 +194,8 @@ def continuous(setting: Setting, stop: float) -> np.ndarray:
     Planner and controller go on by Euler's scheme, whose step over its length is the rate.
     """
     law, h = LAWS[type(setting.controller)], 2.0**-10
-    begun = closed_loop.begin(setting)
-    seen = closed_loop.scene(setting, begun, 0.0, (0.0, 0.0, 0.0))
-    control = law.start(setting.controller, law.measurement(seen))
-    start = begun.plant, begun.planner, control
+    begun = closed_loop.begin(setting, law, (0.0, 0.0, 0.0))
+    start = begun.vehicles.plant, begun.vehicles.planner, begun.controller_state
 
     def unpacked(t: float, x: np.ndarray) -> tuple[Vehicles, Any, Scene]:
         state, planner, control = like(start, iter(x.tolist()))
@@ -210,7 +208,7 @@ def continuous(setting: Setting, stop: float) -> np.ndarray:
     def rates(t: float, x: np.ndarray) -> np.ndarray:
         vehicles, control, seen = unpacked(t, x)
         measured = law.measurement(seen)
-        control, signals = law.command(setting.controller, control, measured)
+        control, signals = law.command(setting.controller, control, measured, 0.0)
         tau = plant.applied(setting.plant, signals.tau)
         vehicle, roll, state, rotation = *setting.plant[:2], vehicles.plant, vehicles.rotation
         moving = plant.rates(vehicle, roll, state, rotation, tau, seen.tau_w)

@@ -20,7 +20,6 @@ It needs pandas: the extra `docs`.
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 from collections.abc import Callable, Mapping
@@ -28,6 +27,8 @@ from pathlib import Path
 
 import pandas as pd
 from scipy.stats import binomtest, spearmanr
+
+from orchestrator.studies.store import StudyResult
 
 #: Columns that are made of others, by study, in the language of pandas.
 _MADE = {
@@ -306,8 +307,9 @@ def _short(value: object) -> str:
 def main() -> None:
     """Print the numbers of the studies in some folders."""
     for folder in map(Path, sys.argv[1:]):
-        study = json.loads((folder / "study.json").read_text(encoding="utf-8"))["study"]
-        runs = prepared(study, pd.read_parquet(folder / "runs.parquet"))
+        result = StudyResult(folder)
+        study = result.record["study"]
+        runs = prepared(study, result.to_dataframe().reset_index())
         print(f"\n{study}")
         for line in lines_of(study):
             print(f"  {line}: {said(line, runs)}")

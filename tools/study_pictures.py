@@ -6,7 +6,6 @@ their colours: a palette would take colours out of their scales.
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,12 +16,10 @@ from orchestrator.figures.study_figures import draw_figures
 from orchestrator.figures.style import SETTINGS
 from orchestrator.runs.preparation import loaded
 from orchestrator.studies.figure_entries import read_figures
-from orchestrator.studies.ready_page import PICTURES
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import StudyResult
 from orchestrator.studies.study import read_study
-
-_DOCS = Path(__file__).parents[1] / "docs"
+from pages import DOCS, PICTURES
 
 #: Pictures are 1,000 pixels wide.
 _DPI = 140
@@ -32,14 +29,14 @@ def main() -> None:
     """Write the pictures of the studies in some folders."""
     SETTINGS["savefig.dpi"] = _DPI
     for folder in map(Path, sys.argv[1:]):
-        name = json.loads((folder / "study.json").read_text(encoding="utf-8"))["study"]
-        study = read_study(name)
+        result = StudyResult(folder)
+        study = read_study(result.record["study"])
         space = Space(study, {scenario: loaded(scenario) for scenario in study.scenario})
-        plans = read_figures(name, study.figures, space.columns, space.has_scenarios)
+        plans = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
         with TemporaryDirectory() as drawn:
-            list(draw_figures(plans, study.title, StudyResult(folder), Path(drawn)))
+            list(draw_figures(plans, study.title, result, Path(drawn)))
             for picture in sorted(Path(drawn).glob("*.png")):
-                file = _DOCS / PICTURES / f"{name}-{picture.name}"
+                file = DOCS / PICTURES / f"{study.name}-{picture.name}"
                 Image.open(picture).convert("RGB").save(file, optimize=True)
                 print(f"{file.name}: {file.stat().st_size / 1000:.0f} kB")
 

@@ -30,6 +30,7 @@ from orchestrator.machine.cache import users_folder
 from orchestrator.machine.errors import InputError, did_you_mean, last_line, reason
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import completed
 from orchestrator.runs import bundle
 from orchestrator.runs.wiring import closed_loop
@@ -219,7 +220,7 @@ class Loop:
     def ours(self, order: str) -> np.ndarray:
         """The positions by our own master."""
         table = Table()
-        completed(self.system, Experiment(self.steps * STEP, STEP, order), [table])
+        completed(planned(self.system, Experiment(self.steps * STEP, STEP, order)), [table])
         return table.group(*(".".join(port) for port in POSITIONS))[1:]
 
     def driven(self, python: Path, driver: str, kind: str) -> tuple[np.ndarray, float]:

@@ -1,10 +1,1 @@
-"""The simulated vehicle, its actuators and its localisation system.
-
-============== ================== ==============================================================
-module             what it states
-================== ==============================================================
-:mod:`.ports`      its ports, and what its parameters mean to the equations
-:mod:`.behaviour`  how the equations run in it, in either kind of FMU
-:mod:`.slave`      the Python kind
-================== ==============================================================
-"""
+"""The simulated vehicle, its actuators and its localisation system."""

@@ -1,4 +1,4 @@
-"""How the equations run in AuvPlant, in either kind of it."""
+"""How AuvPlant runs in both kinds of FMU: the hooks of `fmus/ports/behaviour.py`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the equations run in DisturbanceGenerator, in either kind of it."""
+"""How DisturbanceGenerator runs in both kinds of FMU: the hooks of `fmus/ports/behaviour.py`."""
 
 from __future__ import annotations
 

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fmus.kinds import FMI_VERSIONS
 from fmus.native.tables import tables
 from fmus.native.translator import translated
 from fmus.ports import description_fmi2, description_fmi3
@@ -28,18 +29,18 @@ from fmus.ports import description_fmi2, description_fmi3
 RUNTIME = Path(__file__).parent / "runtime"
 
 #: The file to compile, by the version of FMI: it includes all others.
-VERSIONS = {2: description_fmi2.SOURCE, 3: description_fmi3.SOURCE}
+MAIN = dict(zip(FMI_VERSIONS, (description_fmi2.SOURCE, description_fmi3.SOURCE)))
 
 
-def sources(package: str, fmi: int = 2) -> dict[str, str]:
+def sources(package: str, fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:
     """The C sources of a component by their names, all but identity.h.
 
     Args:
         package: of the component, for example `fmus.auv_plant`.
-        fmi: version of FMI, 2 or 3.
+        fmi: version of FMI.
 
     """
-    others = {name for version, name in VERSIONS.items() if version != fmi}
+    others = {name for version, name in MAIN.items() if version != fmi}
     return {
         **{
             path.name: path.read_text(encoding="utf-8")

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 
+from auv_fmu import euler
 from fmus.ports.port import FAULT, H_MAX, Port, Value
 
-_HEAD = """\
+_HEAD = f"""\
 /* The ports: a value reference is a place in the first table.
  *
  * Made from the declaration of the ports. The columns are name, type, causality, variability,
@@ -15,6 +16,11 @@ _HEAD = """\
  */
 #include <float.h>
 #include <stddef.h>
+
+/* From auv_fmu/euler.py. */
+static const double ROUNDING = {euler.ROUNDING!r};
+static const double LARGEST_STATE = {euler.LARGEST_STATE!r};
+static const double MOST_INTERNAL_STEPS = {float(euler.MOST_INTERNAL_STEPS)!r};
 
 #define PARAMETER_AT(member) offsetof(parameter_values, member)
 """

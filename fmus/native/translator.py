@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import import_module
-from types import FunctionType, ModuleType
-from typing import get_type_hints
 
 from fmus.native.functions import function_in_c
 from fmus.native.layout import laid_out
 from fmus.native.program import Function, Program
 from fmus.native.shapes import Structure, numbers
-from fmus.ports.groups import Nothing
+from fmus.ports.behaviour import Behaviour, read_behaviour
 
 _HEAD = """\
 /* {title}
@@ -40,6 +39,7 @@ _P, _S, _I = (
 _O, _E = "model_outputs *outputs", "Error *error"
 
 
+@cache
 def translated(package: str) -> str:
     """The equations of a component, and the functions that the component calls.
 
@@ -50,7 +50,7 @@ def translated(package: str) -> str:
         Untranslatable: its text is outside the language of equations.
 
     """
-    behaviour = import_module(f"{package}.behaviour")
+    behaviour = read_behaviour(import_module(f"{package}.behaviour"))
     program = Program(function_in_c)
     glue = _Glue(program, behaviour).text()
     title = import_module(f"{package}.ports").DESCRIPTION
@@ -67,13 +67,8 @@ def translated(package: str) -> str:
 class _Glue:
     """The functions `model_...`, in which the component finds those of a behaviour."""
 
-    def __init__(self, program: Program, behaviour: ModuleType) -> None:
+    def __init__(self, program: Program, behaviour: Behaviour) -> None:
         self._program, self._behaviour = program, behaviour
-        self._hints = {
-            name: kind
-            for function in (behaviour.begin, behaviour.advance)
-            for name, kind in get_type_hints(function).items()
-        }
 
     def text(self) -> str:
         """All of them, also those for what this component has not."""
@@ -81,19 +76,17 @@ class _Glue:
         return "\n\n".join(["/* What the component calls. */", self._types(), *parts])
 
     def _function(self, name: str) -> Function | None:
-        function = getattr(self._behaviour, name, None)
-        return self._program.function(function) if isinstance(function, FunctionType) else None
+        hook = self._behaviour.hooks[name]
+        return None if hook is None else self._program.function(hook)
 
     def _called(self, function: Function) -> str:
         return function.call([_GIVEN.get(name, name) for name in function.arguments])
 
     def _types(self) -> str:
-        shape = self._program.shape
-        state = shape(self._hints["state"])
-        inputs = shape(self._hints.get("inputs", Nothing))
-        parameters = shape(self._hints["parameters"])
-        outputs = shape(self._behaviour.Outputs)
-        derived = f"    {shape(self._hints['derived']).name} derived;\n" if self._derives else ""
+        shape, said = self._program.shape, self._behaviour
+        state, inputs = shape(said.state), shape(said.inputs)
+        parameters, outputs = shape(said.parameters), shape(said.outputs)
+        derived = f"    {shape(said.derived).name} derived;\n" if self._derives else ""
         return (
             f"typedef {parameters.name} model_parameters;\n"
             f"typedef {inputs.name} model_inputs;\n"
@@ -105,7 +98,7 @@ class _Glue:
 
     @property
     def _derives(self) -> bool:
-        return "derived" in self._hints
+        return self._behaviour.derived is not None
 
     def _begin(self) -> str:
         return self._moved("begin", f"{_P}, {_I}, double t, {_S}, {_O}, {_E}")
@@ -128,8 +121,8 @@ class _Glue:
         derive, expected = self._function("derive"), self._function("expected")
         credible, restarted = self._function("credible"), self._function("restarted")
         check, seed, measured = map(self._function, ("check", "seed", "measured"))
-        draws = len(measured.arguments["n"].parts) if measured else 0  # type: ignore[union-attr]
-        said = getattr(self._behaviour, "RESTARTED", "").replace("{t:g}", "%g")
+        draws = self._behaviour.draws
+        said = self._behaviour.restarted.replace("{t:g}", "%g")
         restart = [f"state->state = {self._called(restarted)};"] if restarted else []
         if restart and derive:
             restart.append(f"state->derived = {self._called(derive)};")
@@ -167,11 +160,12 @@ class _Glue:
         arguments = f"{_P}, const double draws[], {_O}"
         if measured is None:
             return _defined("void", "model_measure", arguments, [])
-        [group] = [name for name in measured.arguments if name not in ("parameters", "n")]
-        n = measured.arguments["n"].name
-        numbers_drawn = ", ".join(f"draws[{i}]" for i in range(draws))
-        call = measured.call(["*parameters", f"outputs->{group}", f"({n}){{{{{numbers_drawn}}}}}"])
-        return _defined("void", "model_measure", arguments, [f"outputs->{group} = {call};"])
+        group = f"outputs->{self._behaviour.noisy}"
+        drawn = ", ".join(f"draws[{i}]" for i in range(draws))
+        n = f"({measured.arguments['n'].name}){{{{{drawn}}}}}"
+        given = {**_GIVEN, "n": n, self._behaviour.noisy: group}
+        call = measured.call([given[name] for name in measured.arguments])
+        return _defined("void", "model_measure", arguments, [f"{group} = {call};"])
 
 
 def _defined(returns: str, name: str, arguments: str, body: list[str]) -> str:

@@ -1,4 +1,4 @@
-"""How the equations run in ObserverController, in either kind of it.
+"""How ObserverController runs in both kinds of FMU: the hooks of `fmus/ports/behaviour.py`.
 
 A sampled controller: its outputs are those of the beginning of the step, when the measurements
 were taken.
@@ -32,7 +32,7 @@ class Outputs(TypedDict):
 def begin(parameters: Gains, inputs: Measurement) -> tuple[ControllerState, Outputs]:
     """State and outputs at the start, where z = 0 and no gain of the observer matters."""
     state = output_feedback.initial_state(parameters, inputs.y)
-    return state, _seen(state, output_feedback.evaluate(parameters, state, inputs))
+    return state, _seen(state, output_feedback.evaluate(parameters, state, inputs, 0.0))
 
 
 def credible(parameters: Gains, state: ControllerState, inputs: Measurement) -> bool:
@@ -49,9 +49,8 @@ def advance(
     parameters: Gains, state: ControllerState, inputs: Measurement, h: float, n: int
 ) -> tuple[ControllerState, Outputs]:
     """State after n steps of h seconds, and outputs at the beginning of the first."""
-    gains = output_feedback.sampled(parameters, h)
-    signals = output_feedback.evaluate(gains, state, inputs)
-    after = output_feedback.steps(gains, state, signals, inputs, h, n)
+    signals = output_feedback.evaluate(parameters, state, inputs, h)
+    after = output_feedback.steps(parameters, state, signals, inputs, h, n)
     return after, _seen(state, signals)
 
 

@@ -9,6 +9,7 @@ from fmus.ports.controllers import (
     EPS_T,
     GAMMA,
     INPUTS,
+    MEASURED_ANGLES,
     PRINTED_JACOBIAN,
     SIGMA,
     THETA_0,
@@ -67,6 +68,9 @@ PARAMETERS = ParameterSet(
     ),
     form=_OBSERVER,
 )
+
+#: Fields of its inputs that bear another name than their group of ports.
+GROUP_OF = MEASURED_ANGLES
 
 PORTS: tuple[Port, ...] = (
     *INPUTS,

@@ -1,4 +1,4 @@
-"""How the equations run in PathPlanner, in either kind of it."""
+"""How PathPlanner runs in both kinds of FMU: the hooks of `fmus/ports/behaviour.py`."""
 
 from __future__ import annotations
 

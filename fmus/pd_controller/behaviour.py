@@ -1,4 +1,4 @@
-"""How the equations run in PdController, in either kind of it.
+"""How PdController runs in both kinds of FMU: the hooks of `fmus/ports/behaviour.py`.
 
 A sampled controller: its outputs are those of the beginning of the step, when the measurements
 were taken.

@@ -7,6 +7,7 @@ from fmus.ports.controllers import (
     EPS_T,
     GAMMA,
     INPUTS,
+    MEASURED_ANGLES,
     PRINTED_JACOBIAN,
     SIGMA,
     THETA_0,
@@ -35,6 +36,9 @@ PARAMETERS = ParameterSet(
     ell=CONTROL_POINT,
     printed_jacobian=PRINTED_JACOBIAN,
 )
+
+#: Fields of its inputs that bear another name than their group of ports.
+GROUP_OF = MEASURED_ANGLES
 
 PORTS: tuple[Port, ...] = (
     *_INPUTS,

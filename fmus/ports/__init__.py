@@ -7,6 +7,7 @@ module                   what it states
 :mod:`.quantities`       what passes through groups of ports: members and their units
 :mod:`.port`             one port: its declaration and what values it takes
 :mod:`.groups`           flat values of ports from groups, and groups from flat values
+:mod:`.behaviour`        what a component's behaviour may say: the hooks of both kinds
 :mod:`.vehicle`          parameters of (2)
 :mod:`.controllers`      what the controllers have in common
 :mod:`.planners`         what the planners have in common
@@ -15,4 +16,17 @@ module                   what it states
 :mod:`.description_fmi3` modelDescription.xml and buildDescription.xml of FMI 3.0
 :mod:`.terminals`        terminalsAndIcons.xml of FMI 3.0
 ======================== =================================================================
+
+`ports.py` of a component declares
+
+- `DESCRIPTION`, one line;
+- `PARAMETERS`, a :class:`~.groups.ParameterSet`: which parameters make the NamedTuple that the
+  equations take;
+- `PORTS`, all inputs, outputs and parameters in the order of their value references, which hosts
+  keep: what comes later stands at the end (`PARAMETERS.before`). :data:`~.port.H_MAX` is among them
+  if the component has internal steps;
+- `GROUP_OF`, if fields of its inputs bear other names than their groups of ports.
+
+Which inputs, outputs and state it has is said by the types in its `behaviour.py`
+(:mod:`.behaviour`); both are held against each other when an FMU is built.
 """

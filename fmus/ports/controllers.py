@@ -22,7 +22,7 @@ INPUTS: tuple[Port, ...] = (
 )
 
 #: The equations call the measured angles by another name than the ports, whose eta is the posture.
-GROUP_OF: Mapping[str, str] = {"euler": "eta"}
+MEASURED_ANGLES: Mapping[str, str] = {"euler": "eta"}
 
 THETA_HAT: tuple[Port, ...] = tuple(
     Port(

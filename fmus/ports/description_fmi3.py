@@ -23,7 +23,7 @@ from fmus.ports.port import FAULT, TIME, Port
 from fmus.ports.units import UNITS
 
 #: What FMI 3.0 calls the types of variables.
-KINDS = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String"}
+TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String"}
 
 _VERSION = "3.0"
 
@@ -102,7 +102,7 @@ def _type_definitions(units: Sequence[str]) -> Element:
 def _variables(ports: Sequence[Port]) -> Element:
     variables = Element("ModelVariables")
     for place, port in enumerate(ports, start=1):
-        variable = SubElement(variables, KINDS[port.kind], variable_attributes(place, port))
+        variable = SubElement(variables, TYPES[port.kind], variable_attributes(place, port))
         if port.unit is not None:
             variable.set("declaredType", UNITS[port.unit].type_name)
             variable.set("unit", port.unit)

@@ -6,41 +6,38 @@ import argparse
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
+from fmus.kinds import NATIVE, PYTHON
 from orchestrator.commands.options import (
-    OK,
     add_fmi,
-    add_force,
-    add_kind,
+    add_options,
     add_out,
     add_set,
     assignments,
 )
-from orchestrator.commands.streams import show
+from orchestrator.commands.streams import OK, show
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
-from orchestrator.runs.bundle import DEFAULT_FOLDERS, NATIVE, PYTHON
+from orchestrator.runs.bundle import DEFAULT_FOLDERS
 from orchestrator.runs.own_controller import BASES, build_own, new_controller
+from orchestrator.runs.request import Request
+from orchestrator.runs.run import Files
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle import gains
 
 
-def add_to(commands: Any) -> None:
-    """Add these commands to the parser."""
-    build = commands.add_parser(
-        "build", help="build every FMU and the bundle auv.ssp, or a component of your own"
-    )
-    add_kind(build)
-    add_fmi(build)
-    build.add_argument(
+def add_build(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu build`."""
+    add_options(parser, Request, "kind")
+    add_fmi(parser)
+    parser.add_argument(
         "--platforms",
         metavar="NAME,...|all",
         help=f"that --kind {NATIVE} has libraries for, by the names of FMI; all but this machine's "
         "own need auv-fmu[native]; default: this machine",
     )
-    build.add_argument(
+    parser.add_argument(
         "script",
         nargs="?",
         type=Path,
@@ -48,23 +45,26 @@ def add_to(commands: Any) -> None:
         help="a slave of PythonFMU, whose FMU is built beside it; default: the bundle",
     )
     folders = f"{DEFAULT_FOLDERS[PYTHON]} or {DEFAULT_FOLDERS[NATIVE]}"
-    add_out(build, None, f"{folders}, or the folder of SCRIPT.py")
-    add_force(build)
-    build.add_argument(
+    add_out(parser, None, f"{folders}, or the folder of SCRIPT.py")
+    add_options(parser, Files, "force")
+    parser.add_argument(
         "--loader",
         choices=("native", "plain"),
         help=f"of --kind {PYTHON}; native: the FMUs also run in hosts that are no Python programs; "
         "needs a C compiler and is the default where there is one",
     )
-    build.set_defaults(action=_build)
+    parser.set_defaults(action=_build)
 
-    listing = commands.add_parser("list", help="list the scenarios")
-    listing.set_defaults(action=_list)
 
-    check = commands.add_parser("gains", help="check the conditions of Theorems 1 and 2")
-    add_set(check)
-    check.set_defaults(action=_gains)
-    _add_new(commands)
+def add_list(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu list`."""
+    parser.set_defaults(action=_list)
+
+
+def add_gains(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu gains`."""
+    add_set(parser)
+    parser.set_defaults(action=_gains)
 
 
 def _build(options: argparse.Namespace) -> int:
@@ -108,9 +108,9 @@ def _gains(options: argparse.Namespace) -> int:
     return OK
 
 
-def _add_new(commands: Any) -> None:
-    new = commands.add_parser("new", help="begin something of your own")
-    kinds = new.add_subparsers(required=True, metavar="KIND")
+def add_new(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu new`."""
+    kinds = parser.add_subparsers(required=True, metavar="KIND")
     controller = kinds.add_parser("controller", help="a folder with a controller that runs")
     controller.add_argument("name", metavar="NAME", help="of the controller, MyLaw or my_law")
     controller.add_argument(

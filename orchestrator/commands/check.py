@@ -4,32 +4,32 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
-from orchestrator.commands.options import BAD_INPUT, OK, add_variant
-from orchestrator.commands.streams import show
+from orchestrator.commands.options import add_variant
+from orchestrator.commands.streams import BAD_INPUT, OK, show
 from orchestrator.formats.examination import examine, surprises
 from orchestrator.machine.errors import Findings
 from orchestrator.master.fmi.binary import binary_of, check_binary
-from orchestrator.runs.preparation import SOME_TIME, Request, loaded, prepare
+from orchestrator.runs.preparation import SOME_TIME, loaded, prepare
+from orchestrator.runs.request import Request
 from orchestrator.runs.waypoints import impossible_paths
+from orchestrator.studies.study import is_study, read_study
 from orchestrator.system.component import Component
 from orchestrator.system.graph import rings
 
 
-def add_to(commands: Any) -> None:
-    """Add this command to the parser."""
-    check = commands.add_parser(
-        "check", help="say all that is wrong with an FMU, an SSP or a scenario"
-    )
-    check.add_argument("file", metavar="FILE|DIR|SCENARIO", help="what is looked at, not run")
-    add_variant(check)
-    check.set_defaults(action=_check)
+def add_check(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu check`."""
+    parser.add_argument("file", metavar="FILE|DIR|SCENARIO", help="what is looked at, not run")
+    add_variant(parser)
+    parser.set_defaults(action=_check)
 
 
 def _check(options: argparse.Namespace) -> int:
     findings = Findings()
     look = _fmu if options.file.endswith(".fmu") else _system
+    if is_study(options.file):
+        look = _study
     to_know = look(options, findings)
     for kind, texts in (
         ("problem", findings.problems),
@@ -42,6 +42,13 @@ def _check(options: argparse.Namespace) -> int:
         return BAD_INPUT
     show(f"{options.file}: nothing is wrong with it")
     return OK
+
+
+def _study(options: argparse.Namespace, findings: Findings) -> list[str]:
+    """Look at the file of a study, and not at what it runs; there is nothing more to be known."""
+    with findings.collecting():
+        read_study(options.file)
+    return []
 
 
 def _fmu(options: argparse.Namespace, findings: Findings) -> list[str]:

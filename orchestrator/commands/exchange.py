@@ -7,39 +7,35 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
+from fmus.kinds import PYTHON
 from orchestrator.commands.options import (
-    FAILED,
-    OK,
     add_fmi,
-    add_force,
-    add_kind,
-    add_order,
+    add_options,
     add_out,
     add_set,
     add_system,
     assignments,
     read,
 )
-from orchestrator.commands.streams import say, show
+from orchestrator.commands.streams import FAILED, OK, say, show
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.exchange.verify import verify
 from orchestrator.formats.container import write_container
 from orchestrator.formats.osp import write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS
-from orchestrator.runs.bundle import PYTHON
+from orchestrator.master.experiment import ORDERS, order_of
 from orchestrator.runs.folder import replaced
 from orchestrator.runs.preparation import (
     DEFAULT_STEP,
     SOME_TIME,
-    Request,
     left_behind,
     load,
     prepare,
 )
+from orchestrator.runs.request import Request
+from orchestrator.runs.run import Files
 from orchestrator.system.structure import System
 
 #: Writers by the names of their formats.
@@ -53,59 +49,68 @@ FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
 _INITIAL = ("full", "none")
 
 
-def add_to(commands: Any) -> None:
-    """Add these commands to the parser."""
-    export = commands.add_parser("export", help="write a scenario for other tools")
-    add_system(export)
-    export.add_argument(
+def add_export(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu export`."""
+    add_system(parser)
+    parser.add_argument(
         "--format",
         choices=tuple(FORMATS),
         default="ssp",
         help="an SSP, libcosim's own folder, or one FMU (needs auv-fmu[hosts]); default: ssp",
     )
-    export.add_argument(
+    parser.add_argument(
         "--step", type=float, metavar="S", help="communication step [s]; default: the scenario's"
     )
-    add_kind(export)
-    add_fmi(export)
-    add_set(export)
-    add_out(export, None, "exports/SCENARIO/")
-    add_force(export)
-    export.set_defaults(action=_export)
+    add_options(parser, Request, "strict", "kind")
+    add_fmi(parser)
+    add_set(parser)
+    add_out(parser, None, "exports/SCENARIO/")
+    add_options(parser, Files, "force")
+    parser.set_defaults(action=_export)
 
-    others = commands.add_parser("hosts", help="run a scenario in other co-simulation tools")
-    others.add_argument(
+
+def add_hosts(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu hosts`."""
+    parser.add_argument(
         "host", nargs="*", metavar="HOST", help=f"of {', '.join(HOSTS)}; default: all"
     )
-    _add_scenario(others)
-    add_kind(others)
-    others.add_argument(
+    _add_scenario(parser)
+    add_options(parser, Request, "kind")
+    parser.add_argument(
         "--steps", type=int, default=5000, metavar="N", help="how many; default: 5000"
     )
-    others.set_defaults(action=_hosts)
+    parser.set_defaults(action=_hosts)
 
-    check = commands.add_parser("verify", help="compare a table from another tool with ours")
-    check.add_argument("table", type=Path, metavar="RESULT.csv", help="with a column `time`")
-    _add_scenario(check)
-    check.add_argument(
+
+def add_verify(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu verify`."""
+    parser.add_argument("table", type=Path, metavar="RESULT.csv", help="with a column `time`")
+    _add_scenario(parser)
+    parser.add_argument(
         "--tolerance",
         type=float,
         default=1e-6,
         help="relative to the larger of one and the port's largest value; default: 1e-6",
     )
-    add_order(check, f"{' and '.join(ORDERS)}, the one that fits")
-    check.add_argument(
+    parser.add_argument(
+        "--order",
+        type=order_of,
+        metavar=f"{'|'.join(ORDERS)}|NAME,...",
+        help="in which the tool steps the components, or the names of all of them; default: "
+        f"{' and '.join(ORDERS)}, the one that fits",
+    )
+    parser.add_argument(
         "--initial",
         choices=_INITIAL,
         default=_INITIAL[0],
         help="whether the tool exchanges values in initialisation mode, or not before the first "
         f"step; default: {_INITIAL[0]}",
     )
-    check.add_argument(
+    parser.add_argument(
         "--verbose", action="store_true", help="name every column that was not compared"
     )
-    add_set(check)
-    check.set_defaults(action=_verify)
+    add_set(parser)
+    parser.set_defaults(action=_verify)
 
 
 def _add_scenario(parser: argparse.ArgumentParser) -> None:

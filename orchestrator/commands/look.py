@@ -9,16 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.commands.options import (
-    OK,
-    add_experiment,
-    add_force,
+    add_options,
     add_set,
     add_system,
     read,
     request,
     status,
 )
-from orchestrator.commands.streams import say, show
+from orchestrator.commands.streams import OK, say, show
 from orchestrator.figures import Drawn, save
 from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
 from orchestrator.figures.plot import plot, wanted
@@ -27,9 +25,10 @@ from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.observer import Observer
 from orchestrator.master.observers.progress import Progress
-from orchestrator.master.simulation import simulate
 from orchestrator.runs.folder import VIEW, replaced
 from orchestrator.runs.preparation import prepare
+from orchestrator.runs.request import Request
+from orchestrator.runs.run import Files
 from orchestrator.runs.stored import changed_files, read_record, read_result, table_in
 from orchestrator.system.names import PortName
 from orchestrator.vehicle.signals import Loop, loops_of, suffixes
@@ -41,42 +40,45 @@ _FEW = 2
 _PLOTS = (".png", ".svg", ".pdf")
 
 
-def add_to(commands: Any) -> None:
-    """Add these commands to the parser."""
-    signals = commands.add_parser("plot", help="draw any signals of stored results")
-    signals.add_argument(
+def add_plot(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu plot`."""
+    parser.add_argument(
         "what",
         nargs="+",
         metavar="RESULT|PATTERN",
         help="folders or tables of runs, drawn over each other, and patterns such as plant.y.*; "
         "default: errors, commands and estimates",
     )
-    _add_file(signals, "a .png, .svg or .pdf; default: plot.png", Path("plot.png"))
-    signals.set_defaults(action=_plot)
+    _add_file(parser, "a .png, .svg or .pdf; default: plot.png", Path("plot.png"))
+    parser.set_defaults(action=_plot)
 
-    view = commands.add_parser("view", help="write a page to turn a stored result and play it")
-    view.add_argument("result", type=Path, metavar="RESULT", help="folder or table of a run")
-    _add_file(view, "a .html; default: view.html beside the table")
-    view.set_defaults(action=_view)
 
-    film = commands.add_parser("animate", help="write a film of a scenario")
-    add_system(film)
-    add_experiment(film)
-    add_set(film)
-    film.add_argument(
+def add_view(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu view`."""
+    parser.add_argument("result", type=Path, metavar="RESULT", help="folder or table of a run")
+    _add_file(parser, "a .html; default: parser.html beside the table")
+    parser.set_defaults(action=_view)
+
+
+def add_animate(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu animate`."""
+    add_system(parser)
+    add_options(parser, Request, "strict", "stop_time", "step", "order", "kind")
+    add_set(parser)
+    parser.add_argument(
         "--fps",
         type=int,
         default=FRAMES_PER_SECOND,
         metavar="N",
         help=f"frames per second; default: {FRAMES_PER_SECOND}",
     )
-    _add_file(film, "a .gif or .mp4; default: results/SCENARIO.gif")
-    film.set_defaults(action=_animate)
+    _add_file(parser, "a .gif or .mp4; default: results/SCENARIO.gif")
+    parser.set_defaults(action=_animate)
 
 
 def _add_file(parser: argparse.ArgumentParser, text: str, default: Path | None = None) -> None:
     parser.add_argument("--out", type=Path, metavar="FILE", default=default, help=text)
-    add_force(parser)
+    add_options(parser, Files, "force")
 
 
 def _plot(options: argparse.Namespace) -> int:
@@ -170,13 +172,7 @@ def _animate(options: argparse.Namespace) -> int:
     run = Drawn(scenario.name, seen, scenario.z_up, loops)
     films = list(_of_vehicles(run, out, scenario.title or scenario.name))
     with _written([file for _, file, _ in films], options.force) as folder:
-        ending = simulate(
-            prepared.system,
-            prepared.experiment,
-            observers,
-            loop=prepared.loop,
-            hooks=prepared.hooks(),
-        )
+        ending = prepared.run(observers)
         for one, file, heading in films:
             if missing := one.lacks(Loop.for_control_point):
                 raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, TypeVar
 
-from orchestrator.commands.streams import say
+from fmus.kinds import FMI_VERSIONS, NATIVE
+from orchestrator.commands.streams import FAILED, OK, say
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.master.experiment import ORDERS, order_of
-from orchestrator.master.loop import LOOPS
 from orchestrator.master.observers.observer import Ending
-from orchestrator.runs.bundle import FMI, KINDS, NATIVE, PYTHON
-from orchestrator.runs.preparation import Request, loaded
+from orchestrator.runs.preparation import loaded
+from orchestrator.runs.request import Request, flag, options_of
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 
-#: Exit status: done, a simulation failed, bad usage or input, ended by the user.
-OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+T = TypeVar("T")
 
 
 def add_system(parser: argparse.ArgumentParser) -> None:
@@ -29,11 +29,6 @@ def add_system(parser: argparse.ArgumentParser) -> None:
         "unpacked, an FMU, or libcosim's OspSystemStructure.xml",
     )
     add_variant(parser)
-    parser.add_argument(
-        "--strict",
-        action="store_true",
-        help="refuse what otherwise is a warning",
-    )
 
 
 def add_variant(parser: argparse.ArgumentParser) -> None:
@@ -45,61 +40,33 @@ def add_variant(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_experiment(parser: argparse.ArgumentParser) -> None:
-    """How long it is run, and how."""
-    parser.add_argument(
-        "--stop-time", type=float, metavar="S", help="end of the run [s]; default: the scenario's"
-    )
-    parser.add_argument(
-        "--step",
-        type=float,
-        metavar="S",
-        help="communication step [s]; default: the scenario's, else 0.02",
-    )
-    add_order(parser, f"the scenario's, else {ORDERS[0]}")
-    add_kind(parser)
+def add_options(parser: argparse.ArgumentParser, declared: type[Any], *names: str) -> None:
+    """Add the fields of a dataclass that are options: those of some names, or all."""
+    defaults = declared()
+    for name, one in options_of(declared).items():
+        if not names or name in names:
+            default = getattr(defaults, name)
+            parser.add_argument(flag(name), default=default, help=one.help, **one.how)
 
 
-def add_order(parser: argparse.ArgumentParser, default: str) -> None:
-    """Who is stepped when."""
-    parser.add_argument(
-        "--order",
-        type=order_of,
-        metavar=f"{'|'.join(ORDERS)}|NAME,...",
-        help="order in which the components are stepped, or the names of all of them; default: "
-        + default,
-    )
+def taken(declared: type[T], options: argparse.Namespace) -> T:
+    """A dataclass from the options that are its fields; what has none keeps its default."""
+    given = vars(options)
+    return declared(**{name: given[name] for name in options_of(declared) if name in given})
 
 
-def add_kind(parser: argparse.ArgumentParser) -> None:
-    """Which FMUs of the bundle."""
-    parser.add_argument(
-        "--kind",
-        choices=KINDS,
-        default=PYTHON,
-        help="of the bundle's FMUs: Python sources, or their translation to C, with the same "
-        f"numbers; default: {PYTHON}",
-    )
-
-
-def add_loop(parser: argparse.ArgumentParser) -> None:
-    """What makes the steps."""
-    parser.add_argument(
-        "--loop",
-        choices=LOOPS,
-        default=LOOPS[0],
-        help="what makes the steps: Python, or a loop in C; the rows are the same; default: auto, "
-        "the compiled one where it is to be had",
-    )
+def request(options: argparse.Namespace) -> Request:
+    """What the user asks for."""
+    return replace(taken(Request, options), parameters=assignments(options))
 
 
 def add_fmi(parser: argparse.ArgumentParser) -> None:
     """Which version of FMI."""
     parser.add_argument(
         "--fmi",
-        choices=FMI,
-        default=FMI[0],
-        help=f"version of the FMUs; 3 needs --kind {NATIVE}; default: {FMI[0]}",
+        choices=FMI_VERSIONS,
+        default=FMI_VERSIONS[0],
+        help=f"version of the FMUs; 3 needs --kind {NATIVE}; default: {FMI_VERSIONS[0]}",
     )
 
 
@@ -125,35 +92,13 @@ def add_out(parser: argparse.ArgumentParser, default: Path | None, otherwise: st
     )
 
 
-def add_force(parser: argparse.ArgumentParser) -> None:
-    """What becomes of files of the user's that are in the way."""
-    parser.add_argument(
-        "--force",
-        action="store_true",
-        help="move files of yours aside that have names of files that are written, to NAME.~1~; "
-        "otherwise they stay, and nothing is written",
-    )
-
-
-def read(options: argparse.Namespace, fmi: str = FMI[0]) -> tuple[Scenario, System]:
+def read(options: argparse.Namespace, fmi: str = FMI_VERSIONS[0]) -> tuple[Scenario, System]:
     """What is run; what is not as it should be, and does no harm, becomes a warning."""
     findings = Findings(options.strict)
     found = loaded(options.scenario, options.kind, fmi, options.variant, findings)
     for note in findings.notes:
         say(f"warning: {note}")
     return found
-
-
-def request(options: argparse.Namespace) -> Request:
-    """What the user asks for beyond the scenario."""
-    return Request(
-        options.stop_time,
-        options.step,
-        options.order,
-        assignments(options),
-        kind=options.kind,
-        strict=options.strict,
-    )
 
 
 def status(name: str, ending: Ending) -> int:

@@ -4,42 +4,42 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
-from orchestrator.commands.options import OK, add_force, add_kind, add_out
-from orchestrator.commands.streams import show
+from orchestrator.commands.options import add_options, add_out
+from orchestrator.commands.streams import OK, show
 from orchestrator.paper.printed_table import write_table
 from orchestrator.paper.report import write_report
+from orchestrator.runs.request import Request
+from orchestrator.runs.run import Files
 from orchestrator.runs.scenario import names
 from orchestrator.studies.study import ready_studies
 
 
-def add_to(commands: Any) -> None:
-    """Add these commands to the parser."""
-    report = commands.add_parser("report", help="run all scenarios and compare with the paper")
-    report.add_argument(
+def add_report(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu report`."""
+    parser.add_argument(
         "scenarios",
         nargs="*",
         metavar="FILE.toml",
         help="a scenario file to be in the report beside those of `auv-fmu list`",
     )
-    report.add_argument(
+    parser.add_argument(
         "--studies",
         action="store_true",
         help="hold the printed table against every reading as well, and make the ready studies, "
         "or what is missing of them",
     )
-    add_kind(report)
-    add_out(report, Path("results", "report"))
-    add_force(report)
-    report.set_defaults(action=_report)
+    add_options(parser, Request, "kind")
+    add_out(parser, Path("results", "report"))
+    add_options(parser, Files, "force")
+    parser.set_defaults(action=_report)
 
-    table = commands.add_parser(
-        "table", help="hold the printed table of section 4.2 against all that the paper leaves open"
-    )
-    add_out(table, Path("results", "table"))
-    add_force(table)
-    table.set_defaults(action=_table)
+
+def add_table(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu table`."""
+    add_out(parser, Path("results", "table"))
+    add_options(parser, Files, "force")
+    parser.set_defaults(action=_table)
 
 
 def _report(options: argparse.Namespace) -> int:

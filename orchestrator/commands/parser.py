@@ -5,21 +5,41 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from importlib import import_module
 from importlib.metadata import version
 from itertools import pairwise
 
-from orchestrator.commands import build, check, exchange, look, paper, run_and_sweep, upkeep
-from orchestrator.commands.options import BAD_INPUT, FAILED, INTERRUPTED
-from orchestrator.commands.streams import Unheard, say
+from orchestrator.commands.streams import BAD_INPUT, FAILED, INTERRUPTED, Unheard, say
 from orchestrator.machine.errors import InputError, StartError
+
+#: The commands: the module that has `add_COMMAND`, and what they are for.
+COMMANDS = {
+    "build": ("build", "build every FMU and the bundle auv.ssp, or a component of your own"),
+    "list": ("build", "list the scenarios"),
+    "gains": ("build", "check the conditions of Theorems 1 and 2"),
+    "run": ("run_and_sweep", "run a scenario, a scenario file or an SSP"),
+    "check": ("check", "say all that is wrong with an FMU, an SSP, a scenario or a study"),
+    "sweep": ("run_and_sweep", "make the runs of a study, or those that are missing"),
+    "plot": ("look", "draw any signals of stored results"),
+    "view": ("look", "write a page to turn a stored result and play it"),
+    "animate": ("look", "write a film of a scenario"),
+    "new": ("build", "begin something of your own"),
+    "report": ("paper", "run all scenarios and compare with the paper"),
+    "table": (
+        "paper", "hold the printed table of section 4.2 against all that the paper leaves open"
+    ),
+    "export": ("exchange", "write a scenario for other tools"),
+    "hosts": ("exchange", "run a scenario in other co-simulation tools"),
+    "verify": ("exchange", "compare a table from another tool with ours"),
+}  # fmt: skip
 
 
 def dispatch(arguments: Sequence[str] | None) -> int:
     """Run what the arguments say; returns the exit status."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        options = parser().parse_args(given)
+        options = parser(given).parse_args(given)
         _check_no_empty(given)
         options.command = ["auv-fmu", *given]
         return int(options.action(options))
@@ -47,8 +67,14 @@ def _check_no_empty(arguments: Sequence[str]) -> None:
             raise InputError(f"{argument} says nothing")
 
 
-def parser() -> argparse.ArgumentParser:
-    """The parser of all commands."""
+def parser(given: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
+    """The parser of the command line.
+
+    Args:
+        given: arguments; of commands that are not among them only the help is there, as to import
+            what a command needs takes up to a second.
+
+    """
     parser = argparse.ArgumentParser(
         prog="auv-fmu",
         description="Co-simulate an autonomous underwater vehicle with limited torque and "
@@ -58,6 +84,9 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=version("auv-fmu"))
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for group in (build, run_and_sweep, check, look, paper, exchange, upkeep):
-        group.add_to(commands)
+    named = set(given)
+    for name, (module, text) in COMMANDS.items():
+        command = commands.add_parser(name, help=text)
+        if name in named:
+            getattr(import_module(f"orchestrator.commands.{module}"), f"add_{name}")(command)
     return parser

@@ -1,4 +1,4 @@
-"""Standard streams, which may be closed, full, or without a reader; and what is written to them."""
+"""What the command line says: lines, and its exit status; streams may be closed or full."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from contextlib import suppress
 from typing import TextIO
 
 from orchestrator.machine.errors import plain, shortened
+
+#: Exit status: done, a simulation failed, bad usage or input, ended by the user.
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 #: Letters of a line for the user: a name or a value in it may be a whole file.
 _LONGEST = 4000

@@ -1,1 +1,1 @@
-"""Other tools: hosts that run the bundle, reference results, verification of their tables."""
+"""Other tools: hosts that run the bundle, verification of their tables."""

@@ -12,7 +12,7 @@ import numpy as np
 from orchestrator.machine.compiler import COMPILERS, LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.schedule import gathered, stages
+from orchestrator.master.plan import gathered, stages
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System

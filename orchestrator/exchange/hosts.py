@@ -32,6 +32,7 @@ from orchestrator.machine.errors import InputError, last_line
 from orchestrator.machine.locks import process_folder
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import completed
 from orchestrator.system.structure import System
 
@@ -239,7 +240,7 @@ def compare(system: System, hosts: Sequence[str], steps: int, step: float) -> li
     """
     expected = Table()
     start = system.start_time or 0.0
-    completed(system, Experiment(start + steps * step, step, "jacobi", start), [expected])
+    completed(planned(system, Experiment(start + steps * step, step, "jacobi", start)), [expected])
     names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
     table = expected.group(*names)[1:]
     return [_verdict(system, host, steps, step, names, table) for host in hosts]

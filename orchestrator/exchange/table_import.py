@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.machine.reading import explained, lines_of
+from orchestrator.machine.user_files import explained, lines_of
 from orchestrator.master.experiment import ROUNDING
 from orchestrator.system.values import BOOLEANS, finite
 
@@ -25,7 +25,7 @@ _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 _TIME = ("time", "t")
 
 #: What ecos puts behind a name.
-_KIND = re.compile(r"\[[A-Z]+\]$")
+_TYPE = re.compile(r"\[[A-Z]+\]$")
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ def _port_of(name: str, known: Collection[str], longest: int) -> str | None:
 
     """
     name = name.strip()
-    plain = _KIND.sub("", name).replace("::", ".")
+    plain = _TYPE.sub("", name).replace("::", ".")
     end = plain[-longest - 1 :]
     ends = (end[i + 1 :] for i, character in enumerate(end) if character == ".")
     return next((ours for ours in (name, plain, *ends) if ours in known), None)

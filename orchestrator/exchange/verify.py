@@ -18,9 +18,9 @@ from orchestrator.master.experiment import (
     Order,
     written_order,
 )
-from orchestrator.master.fmi.transfer import KINDS
+from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.observers.observer import Ending, Header
-from orchestrator.master.schedule import stages
+from orchestrator.master.plan import planned, stages
 from orchestrator.master.simulation import completed
 from orchestrator.runs.preparation import DEFAULT_STEP
 from orchestrator.system.graph import rings
@@ -87,7 +87,7 @@ def verify(
         str(PortName(component.name, variable.name)): variable.type
         for component in system.components.values()
         for variable in component.having("output")
-        if variable.type in KINDS
+        if variable.type in FMI_TYPES
     }
     known = {
         str(PortName(component.name, variable.name))
@@ -134,7 +134,7 @@ def _complaint(table: ForeignTable, system: System, way: Algorithm, tolerance: f
     try:
         step, start_time = system.step or DEFAULT_STEP, system.start_time or 0.0
         experiment = Experiment(stop_time, step, way.order, start_time, way.coupling)
-        completed(system, experiment, [ours], way.exchange)
+        completed(planned(system, experiment), [ours], way.exchange)
     except InputError as error:
         return f"our own run fails: {error}"
     return _first_difference(table.time, table.columns, ours.values, tolerance)

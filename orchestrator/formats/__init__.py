@@ -1,1 +1,1 @@
-"""How a system is written down: SSP, libcosim's configuration, a container FMU."""
+"""How a system is written down: SSP, libcosim's files, a container FMU; schemas of TOML files."""

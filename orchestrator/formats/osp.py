@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 from orchestrator.formats.ssp.archive import Archive
 from orchestrator.machine.errors import Findings, InputError, reason
-from orchestrator.machine.reading import check_file, is_folder
+from orchestrator.machine.user_files import check_file, is_folder
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
@@ -76,8 +76,8 @@ def write_osp(system: System, folder: Path) -> list[Path]:
             values = ElementTree.SubElement(simulator, "InitialValues")
             for name, value in parameters.items():
                 element = ElementTree.SubElement(values, "InitialValue", variable=name)
-                kind = component.variable(name).type
-                ElementTree.SubElement(element, kind, value=literal(value))
+                fmi_type = component.variable(name).type
+                ElementTree.SubElement(element, fmi_type, value=literal(value))
     connections = ElementTree.SubElement(root, "Connections")
     for connection in system.connections:
         element = ElementTree.SubElement(connections, "VariableConnection")

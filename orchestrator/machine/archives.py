@@ -22,7 +22,7 @@ from zipfile import ZipFile, ZipInfo
 
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.locks import process_folder
-from orchestrator.machine.reading import check_file
+from orchestrator.machine.user_files import check_file
 
 #: An archive that holds more than this is not unpacked, nor one that does so with those in it.
 _MOST_FILES, _MOST_BYTES = 100_000, 2**30

@@ -24,7 +24,7 @@ from platformdirs import user_cache_path
 from orchestrator.machine.atomic import to_disk
 from orchestrator.machine.locks import process_folder
 
-#: The folder of the digests, beside one for each kind of what is kept.
+#: The folder of the digests, beside one for each category of what is kept.
 _DIGESTS = "digests"
 
 #: That others than its owner can write a file or folder.
@@ -39,18 +39,18 @@ def users_folder() -> Path:
     return user_cache_path("auv-fmu", appauthor=False)
 
 
-def kept(kind: str, key: str) -> dict[Path, bytes]:
+def kept(category: str, key: str) -> dict[Path, bytes]:
     """The files that were kept under a key, and what is in them; empty if they are not as then.
 
     Args:
-        kind: of what is kept, a name of a folder.
+        category: of what is kept, a name of a folder.
         key: of all that it was made of.
 
     """
-    root = _root(kind)
+    root = _root(category)
     with suppress(OSError):
-        for record in sorted((root / _DIGESTS).glob(f"{kind}-{key}-*.json")):
-            if found := _files(root / kind, record):
+        for record in sorted((root / _DIGESTS).glob(f"{category}-{key}-*.json")):
+            if found := _files(root / category, record):
                 return found
     return {}
 
@@ -61,21 +61,21 @@ def environment() -> dict[str, str]:
     return {} if root == users_folder() else {"XDG_CACHE_HOME": str(root.parent)}
 
 
-def folder_of(kind: str) -> Path:
-    """The folder of a kind, made if it is not there.
+def folder_of(category: str) -> Path:
+    """The folder of a category, made if it is not there.
 
     Raises:
         OSError: it cannot be made.
 
     """
-    return _made(kind) / kind
+    return _made(category) / category
 
 
-def keep(kind: str, key: str, files: Mapping[str, bytes]) -> list[Path]:
+def keep(category: str, key: str, files: Mapping[str, bytes]) -> list[Path]:
     """Keep files, and say where they are.
 
     Args:
-        kind: of what is kept, a name of a folder.
+        category: of what is kept, a name of a folder.
         key: of all that it was made of.
         files: by their names.
 
@@ -83,15 +83,15 @@ def keep(kind: str, key: str, files: Mapping[str, bytes]) -> list[Path]:
         OSError: they cannot be written.
 
     """
-    root = _made(kind)
-    made = Path(mkdtemp(prefix=f"{key}-", dir=root / kind))
+    root = _made(category)
+    made = Path(mkdtemp(prefix=f"{key}-", dir=root / category))
     try:
         made.chmod(0o700)
         for name, content in files.items():
             _write(os.open(made / name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), content)
         to_disk(made)
         digests = {name: sha256(content).hexdigest() for name, content in files.items()}
-        descriptor, record = mkstemp(".json", f"{kind}-{key}-", root / _DIGESTS)
+        descriptor, record = mkstemp(".json", f"{category}-{key}-", root / _DIGESTS)
         try:
             _write(descriptor, json.dumps({"folder": made.name, "sha256": digests}).encode())
         except BaseException:
@@ -143,14 +143,14 @@ def _write(descriptor: int, content: bytes) -> None:
         os.fsync(descriptor)
 
 
-def _made(kind: str) -> Path:
+def _made(category: str) -> Path:
     """The cache folder, with the folders that are needed in it."""
     while True:
-        root = _root(kind)
-        for folder in (root / kind, root / _DIGESTS):
+        root = _root(category)
+        for folder in (root / category, root / _DIGESTS):
             _make(folder)
         # Another user may have been first.
-        if _root(kind) == root:
+        if _root(category) == root:
             return root
 
 
@@ -163,12 +163,12 @@ def _make(folder: Path) -> None:
             folder.chmod(0o700)
 
 
-def _root(kind: str) -> Path:
+def _root(category: str) -> Path:
     """The cache folder: the user's, or one of this process where others could write into that."""
     path = users_folder()
     if not path.is_absolute():
         why = f"{path} is below the current folder: set XDG_CACHE_HOME to an absolute path"
-    elif culprit := _open_to_others(path / kind) or _open_to_others(path / _DIGESTS):
+    elif culprit := _open_to_others(path / category) or _open_to_others(path / _DIGESTS):
         why = (
             f"{culprit} must be a folder that only you can write: `chmod -R go-w` it, or set "
             "XDG_CACHE_HOME to another"

@@ -15,21 +15,19 @@ from orchestrator.master.experiment import (
     OURS,
     SOLVE,
     Exchange,
-    Experiment,
-    decimations,
 )
 from orchestrator.master.fmi.instance import Instance
 from orchestrator.master.fmi.log import Log
 from orchestrator.master.gathering import Gathering
 from orchestrator.master.linear import LinearSteps
 from orchestrator.master.observers.observer import Ending, Header
+from orchestrator.master.plan import Plan, delays, stages
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import Stage, StageCall, delays, schedule, stages
+from orchestrator.master.schedule import Stage, StageCall, schedule
 from orchestrator.master.settling import Settling
 from orchestrator.system.graph import has_feedthrough, rings
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
 
 #: A value grows without bound if it doubles at least so often in each of so many intervals, one
 #: after the other, and so often in all of them together. What grows with a power of time does not.
@@ -88,14 +86,13 @@ class Coupling:
     """The rings of direct feedthroughs of a system, and what follows from them.
 
     Attributes:
-        plan: all components in stages, once they are initialised.
+        sequence: all components in stages, once they are initialised.
 
     """
 
     def __init__(
         self,
-        system: System,
-        experiment: Experiment,
+        plan: Plan,
         instances: Mapping[str, Instance],
         row: Row,
         log: Log,
@@ -104,19 +101,19 @@ class Coupling:
         """Find the rings.
 
         Args:
-            system: that is run.
-            experiment: says how rings are closed.
+            plan: what is run, and how rings are closed.
             instances: of its components.
             row: that they are tied to.
             log: takes where a ring is delayed.
             exchange: of values.
 
         """
-        self._system, self._experiment, self._exchange = system, experiment, exchange
+        self._plan, self._exchange = plan, exchange
+        self._system, self._experiment = plan.system, plan.experiment
         self._instances, self._row, self._log = instances, row, log
-        self._rings = [self._ring(names) for names in rings(system)]
+        self._rings = [self._ring(names) for names in rings(plan.system)]
         self._solved: list[Ring] = []
-        self.plan: list[list[str]] = []
+        self.sequence: list[list[str]] = []
 
     def initialise(self) -> None:
         """Set parameters, exchange values in initialisation mode until they rest, leave that mode.
@@ -139,7 +136,7 @@ class Coupling:
         for instance in instances.values():
             instance.exit_initialization()
         self._solved = self._solvable()
-        self.plan = self._plan(self._experiment.order, self._solved)
+        self.sequence = self._in_stages(self._experiment.order, self._solved)
         if self._rings:
             settling = self._settling(self._solved)
         if self._exchange.at_start:
@@ -159,9 +156,8 @@ class Coupling:
             stage = Stage(Gathering.along(row, ()), [StageCall(steps.step).member])
             return [stage], settling.gatherings
         found = schedule(
-            system,
-            self._experiment,
-            self.plan,
+            self._plan,
+            self.sequence,
             instances,
             row,
             self._solved,
@@ -195,7 +191,7 @@ class Coupling:
         else:
             for ring in self._rings:
                 reasons |= ring.unsolved()
-            for name, n in decimations(system, self._experiment.step).items():
+            for name, n in self._plan.decimations.items():
                 if n > 1:
                     reasons[name] = f"{name} takes longer steps"
         solved = rings(system, system.components.keys() - reasons.keys())
@@ -209,14 +205,14 @@ class Coupling:
     def _ring(self, names: Sequence[str]) -> Ring:
         return Ring(names, self._system, self._instances, self._row)
 
-    def _plan(self, order: str | Sequence[str], solved: Sequence[Ring]) -> list[list[str]]:
+    def _in_stages(self, order: str | Sequence[str], solved: Sequence[Ring]) -> list[list[str]]:
         if self._exchange.latest and not isinstance(order, str):
             return [[name] for name in order]
         return stages(self._system, order, [ring.names for ring in solved])
 
     def _settling(self, solved: Sequence[Ring]) -> Settling:
-        plan = self._plan(GAUSS_SEIDEL, solved)
-        return Settling(self._system, self._instances, self._row, plan, solved)
+        sequence = self._in_stages(GAUSS_SEIDEL, solved)
+        return Settling(self._system, self._instances, self._row, sequence, solved)
 
     def _read_outputs(self) -> None:
         """Enter what components show whose inputs have not been set."""

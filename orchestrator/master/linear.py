@@ -10,33 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from orchestrator.machine.errors import InputError
 from orchestrator.master.fmi.instance import Instance
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import member, step
 from orchestrator.master.settling import Settling
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-
-
-def check_linear(system: System) -> None:
-    """Check that the components of a system can be stepped in that way.
-
-    Raises:
-        InputError: one that others feed cannot go back, or its inputs cannot change in a step; or
-            one takes longer steps.
-
-    """
-    for name, component in system.components.items():
-        if system.feeding[name] and not component.takes_linear_inputs:
-            raise InputError(
-                f"coupling linear: {name} cannot go back to the beginning of a step and let its "
-                "inputs change in it (canGetAndSetFMUstate, canInterpolateInputs)"
-            )
-    if system.steps:
-        raise InputError(
-            f"coupling linear: {', '.join(system.steps)}: takes steps of its own; leave them out"
-        )
 
 
 class LinearSteps:

@@ -9,7 +9,7 @@ import numpy as np
 from fmpy.model_description import ModelVariable
 
 from orchestrator.master.fmi.instance import Instance, Part
-from orchestrator.master.fmi.transfer import KINDS, are_integers
+from orchestrator.master.fmi.transfer import FMI_TYPES, are_integers
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
@@ -22,7 +22,7 @@ _ROUNDING = 1e-12
 class Row:
     """All inputs and outputs of a system side by side, as floats.
 
-    The ports of a component that have the same causality and kind are neighbours, in the order
+    The ports of a component that have the same causality and type are neighbours, in the order
     of its description, so that one FMI call moves them all.
 
     Outputs of some components have a hidden place behind all columns, into which their instance
@@ -48,11 +48,11 @@ class Row:
 
         """
         groups = [
-            (name, causality, kind, ports)
+            (name, causality, fmi_type, ports)
             for name in instances
             for causality in ("input", "output")
-            for kind in KINDS
-            if (ports := _ports(system.components[name], causality, kind))
+            for fmi_type in FMI_TYPES
+            if (ports := _ports(system.components[name], causality, fmi_type))
         ]
         n = sum(len(ports) for *_, ports in groups)
         more = sum(
@@ -68,7 +68,7 @@ class Row:
         self._integers: list[int] = []
         firsts: dict[str, int] = {}
         parts: dict[str, list[Part]] = {name: [] for name in instances}
-        for component, causality, kind, ports in groups:
+        for component, causality, fmi_type, ports in groups:
             column = len(self.columns)
             where = column
             if _hides(component, causality, hidden):
@@ -78,14 +78,14 @@ class Row:
             first = where - firsts.setdefault(component, column)
             references = [port.valueReference for port in ports]
             place = slice(first, first + len(ports))
-            parts[component].append(Part(causality, kind, references, place))
+            parts[component].append(Part(causality, fmi_type, references, place))
             for i, port in enumerate(ports, start=column):
                 name = PortName(component, port.name)
                 self.columns[name] = i
-                self._ports[component].append((name, causality, kind))
-                if causality == "input" and kind != "Real":
+                self._ports[component].append((name, causality, fmi_type))
+                if causality == "input" and fmi_type != "Real":
                     self._integers.append(i)
-                if kind == "String":
+                if fmi_type == "String":
                     self.text_ports.add(name)
                 self.values[i] = self.number(system.components[component].starts.get(port.name, 0))
         for component, instance in instances.items():
@@ -121,12 +121,12 @@ class Row:
             return None
         ports = [port for component in components for port in self._ports[component]]
         passed_on = None
-        for port, causality, kind in ports:
+        for port, causality, fmi_type in ports:
             value = self.values[self.columns[port]]
             if not isfinite(value):
                 text = f"{port} is {value:g}"
-            elif causality == "input" and kind != "Real" and not are_integers(value):
-                text = f"{port} is {value:.16g}, which no {kind} of FMI can be"
+            elif causality == "input" and fmi_type != "Real" and not are_integers(value):
+                text = f"{port} is {value:.16g}, which no {fmi_type} of FMI can be"
             else:
                 continue
             if causality == "output":
@@ -169,5 +169,5 @@ def _hides(component: str, causality: str, hidden: Collection[str]) -> bool:
     return causality == "output" and component in hidden
 
 
-def _ports(component: Component, causality: str, kind: str) -> list[ModelVariable]:
-    return [variable for variable in component.having(causality) if variable.type == kind]
+def _ports(component: Component, causality: str, fmi_type: str) -> list[ModelVariable]:
+    return [variable for variable in component.having(causality) if variable.type == fmi_type]

@@ -1,19 +1,8 @@
-"""Which components are stepped when, and on whose outputs.
-
-Every communication step has stages. Before a stage is stepped its inputs are gathered; the
-outputs of a component are read as soon as it was stepped.
-
-- `jacobi`: one stage. All inputs are outputs of t_k.
-- `gauss-seidel`: a component whose output has direct feedthrough is stepped in an earlier
-  stage than those it feeds, so they receive without delay what follows from t_k. Outputs
-  without feedthrough are states: everybody takes them at t_k.
-- the names of all components: the same in the order that they stand in.
+"""The stages of a communication step, as the loops make them.
 
 Rings of feedthroughs that are solved have stages of their own. Each is closed before its components
 are stepped, with their states of t_k, after that, with those of t_k+1 and the latest of what feeds
-it, and again when all have been stepped: every row shows its solution. One that is not solved is
-opened before the one of its components that stands first in the system, which takes what feeds it
-at t_k.
+it, and again when all have been stepped: every row shows its solution.
 
 A component may take n communication steps in one of its own. It is stepped at every n-th t_k, with
 the inputs of that time, which it holds. What it computes waits in hidden columns of the row: from
@@ -30,18 +19,17 @@ from typing import NamedTuple, Protocol
 
 from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
 
-from orchestrator.machine.errors import InputError, shortened
-from orchestrator.master.experiment import JACOBI, ORDERS, Experiment, Order, decimations
+from orchestrator.master.experiment import JACOBI, Order
 from orchestrator.master.fmi.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
 from orchestrator.master.fmi.surroundings import PRODUCT, A, B, C, put_back
 from orchestrator.master.gathering import Gathering
+from orchestrator.master.plan import Plan, gathered
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Row
 from orchestrator.master.stepper_types import CMember, CMove
 from orchestrator.system.component import Component
-from orchestrator.system.graph import delayed, derived_order, has_feedthrough, in_stages
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import Connection
 
 #: FMI's doStep, as the compiled loop calls it.
 _CALLBACK = CFUNCTYPE(c_int, c_void_p, c_double, c_double, c_int)
@@ -154,107 +142,9 @@ class Stage(NamedTuple):
     decimation: Decimation | None = None
 
 
-def stages(system: System, order: Order, solved: Sequence[Sequence[str]] = ()) -> list[list[str]]:
-    """Components in the order in which they are stepped; those of one stage are independent.
-
-    Args:
-        system: that is stepped.
-        order: of its components.
-        solved: rings of them that are stepped as one, in stages of their own.
-
-    Raises:
-        InputError: an order that does not name each component once.
-
-    """
-    if order == JACOBI:
-        ringed = {name for ring in solved for name in ring}
-        others = [name for name in system.components if name not in ringed]
-        return [others, *map(list, solved)] if others else list(map(list, solved))
-    if isinstance(order, str):
-        return in_stages(system, derived_order(system, solved), solved)
-    _check_names(system, order)
-    return in_stages(system, order, solved)
-
-
-def _check_names(system: System, order: Sequence[str]) -> None:
-    for name in order:
-        system.component(name)
-    twice = [name for i, name in enumerate(order) if name in order[:i]]
-    missing = [name for name in system.components if name not in order]
-    for names, what in ((twice, "twice"), (missing, "not at all")):
-        if names:
-            raise InputError(
-                f"order {','.join(order)}: names {', '.join(names)} {what}; it takes every "
-                "component once"
-            )
-
-
-def delays(
-    system: System,
-    order: Order,
-    solved: Sequence[Sequence[str]] = (),
-    reasons: Mapping[str, str] | None = None,
-) -> list[str]:
-    """Where an order that follows from the feedthroughs opens a ring of them, in words.
-
-    Args:
-        system: that is stepped.
-        order: of its components.
-        solved: rings that are solved.
-        reasons: why components are in none of these.
-
-    """
-    if not isinstance(order, str) or order == JACOBI:
-        return []
-    late: dict[str, list[PortName]] = {}
-    for connection in delayed(system, derived_order(system, solved), solved):
-        late.setdefault(connection.target.component, []).append(connection.source)
-    found = []
-    for name, sources in late.items():
-        text = f"{name} takes {shortened(', '.join(map(str, sources)))} one step late: "
-        concerned = (name, *(source.component for source in sources))
-        why = next((reasons[one] for one in concerned if one in reasons), "") if reasons else ""
-        found.append(f"{text}direct feedthroughs form a ring{why and f'; {why}'}")
-    return found
-
-
-def gathered(
-    system: System,
-    plan: Sequence[Sequence[str]],
-    solved: Sequence[Sequence[str]] = (),
-    order: Order = ORDERS[0],
-    *,
-    latest: bool = False,
-) -> list[list[Connection]]:
-    """The connections along which values are gathered before each stage.
-
-    Args:
-        system: whose connections say what feeds what.
-        plan: its components in :func:`stages`.
-        solved: rings among them, which gather by themselves what they feed themselves.
-        order: of the stages.
-        latest: whether stages take all that those before them have computed.
-
-    """
-    stage_of = {name: i for i, names in enumerate(plan) for name in names}
-    ring_of = {name: i for i, ring in enumerate(solved) for name in ring}
-    found: list[list[Connection]] = [[] for _ in plan]
-    for connection in system.connections:
-        start, end = connection.source.component, connection.target.component
-        if start in ring_of and ring_of[start] == ring_of.get(end):
-            continue
-        source, target = stage_of[start], stage_of[end]
-        # What is no feedthrough is a state, and must be taken before anybody advances.
-        at_once = latest or (order != JACOBI and has_feedthrough(system, connection))
-        late = at_once and source < target
-        found[target if late else 0].append(connection)
-    return found
-
-
 def schedule(
-    system: System,
-    experiment: Experiment,
-    plan: Sequence[Sequence[str]],
+    plan: Plan,
+    sequence: Sequence[Sequence[str]],
     instances: Mapping[str, Instance],
     row: Row,
     rings: Sequence[Ring] = (),
@@ -264,24 +154,23 @@ def schedule(
     """The stages of every step.
 
     Args:
-        system: whose connections say what feeds what, and whose steps which components are slow.
-        experiment: whose step is the communication step.
-        plan: its components in :func:`stages`.
+        plan: what is run.
+        sequence: its components in :func:`.plan.stages`.
         instances: of all components.
         row: that they are tied to.
         rings: that are solved, in stages of their own.
         latest: whether stages take all that those before them have computed.
 
     """
-    decimation = decimations(system, experiment.step)
+    system, order, decimation = plan.system, plan.experiment.order, plan.decimations
     ring_of = {ring.names[0]: ring for ring in rings}
     renewed = [Stage(Gathering.along(row, ()), [_action(ring.renew)]) for ring in rings]
     found: list[Stage] = []
     shown: list[Stage] = []
     nothing = Gathering.along(row, ())
     solved = [ring.names for ring in rings]
-    gathers = gathered(system, plan, solved, experiment.order, latest=latest)
-    for names, connections in zip(plan, gathers, strict=True):
+    gathers = gathered(system, sequence, solved, order, latest=latest)
+    for names, connections in zip(sequence, gathers, strict=True):
         taken: dict[int, list[Connection]] = {1: []}
         for connection in connections:
             taken.setdefault(decimation[connection.target.component], []).append(connection)
@@ -296,7 +185,7 @@ def schedule(
             # All are stepped before one takes what another has come to.
             checked = Stage(fast.gather, [_action(ring.check) for ring in here])
             found += [checked, Stage(nothing, fast.members)]
-            if experiment.order != JACOBI:
+            if order != JACOBI:
                 found.append(Stage(nothing, [_action(partial(ring.renew, True)) for ring in here]))
         else:
             found.append(fast)
@@ -304,7 +193,7 @@ def schedule(
             if (n := decimation[name]) > 1:
                 early, later = (
                     Gathering(*row.hidden(ports))
-                    for ports in _shown(system.components[name], experiment.order)
+                    for ports in _shown(system.components[name], order)
                 )
                 found += [
                     Stage(nothing, [member(instances[name])], Decimation(n)),

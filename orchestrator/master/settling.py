@@ -44,7 +44,7 @@ class Settling:
         system: System,
         instances: Mapping[str, Instance],
         row: Row,
-        plan: Sequence[Sequence[str]],
+        sequence: Sequence[Sequence[str]],
         rings: Iterable[Ring] = (),
     ) -> None:
         """Tie it to the row of all values.
@@ -53,14 +53,14 @@ class Settling:
             system: whose connections say what feeds what.
             instances: of its components.
             row: that they are tied to.
-            plan: its components in the order of their feedthroughs.
+            sequence: its components in the order of their feedthroughs.
             rings: of them that are solved, in stages of their own.
 
         """
         self._system, self._instances, self._row = system, instances, row
         ring_of = {ring.names[0]: ring for ring in rings}
         self._units: list[Ring | _Single] = []
-        for stage in plan:
+        for stage in sequence:
             ringed = [ring_of[name] for name in stage if name in ring_of]
             self._units += ringed or [_Single(one, system, instances[one], row) for one in stage]
 

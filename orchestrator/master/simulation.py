@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import replace
-from math import lcm
 from time import monotonic
 
 import numpy as np
@@ -13,8 +11,7 @@ import numpy as np
 from orchestrator.machine.errors import InputError, StartError, reason, unforeseen
 from orchestrator.machine.interrupts import held_interrupts
 from orchestrator.master.coupling import Coupling, Growth
-from orchestrator.master.ends import to_its_end
-from orchestrator.master.experiment import LINEAR, OURS, Exchange, Experiment, decimations
+from orchestrator.master.experiment import OURS, Exchange
 from orchestrator.master.fmi.instance import ComponentFailed, Ended, Instance
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.fmi.log import Log
@@ -22,11 +19,10 @@ from orchestrator.master.fmi.placement import placed
 from orchestrator.master.fmi.surroundings import Surroundings, default_mode
 from orchestrator.master.gathering import Overrides
 from orchestrator.master.hooks.hook import Hook, Hooks, Run
-from orchestrator.master.linear import check_linear
-from orchestrator.master.loop import PYTHON_LOOP, Stepping
+from orchestrator.master.loop import PYTHON_LOOP, Stepping, to_its_end
 from orchestrator.master.observers.observer import Blocks, Ending, Header, NotKept, Observer
+from orchestrator.master.plan import Plan
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import stages
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import literal, same, unit_of
@@ -36,8 +32,7 @@ from orchestrator.system.values import literal, same, unit_of
 @np.errstate(all="ignore")
 @default_mode()
 def simulate(
-    system: System,
-    experiment: Experiment,
+    plan: Plan,
     observers: Sequence[Observer] = (),
     isolation: Isolation | None = None,
     loop: Stepping = PYTHON_LOOP,
@@ -47,8 +42,7 @@ def simulate(
     """Run a system.
 
     Args:
-        system: what to run.
-        experiment: until when, in which steps and which order.
+        plan: what to run, as :func:`.plan.planned` gives it.
         observers: take the rows.
         isolation: run each FMU in a process of its own; None: all in this one.
         loop: makes the steps.
@@ -59,17 +53,15 @@ def simulate(
         How the run has ended: after a failure the observers have the rows before it.
 
     Raises:
-        InputError: system or parameters are not usable; nothing was stepped.
+        InputError: an FMU or a parameter is not usable; nothing was stepped.
         KeyboardInterrupt: somebody wants it to stop, and an FMU does not come to its first step.
 
     """
-    system.check()
-    stages(system, experiment.order)
-    if experiment.coupling == LINEAR:
-        check_linear(system)
-    slow = {name for name, n in decimations(system, experiment.step).items() if n > 1}
+    system, experiment = plan.system, plan.experiment
+    slow = {name for name, n in plan.decimations.items() if n > 1}
     log = Log()
-    experiment = _whole_steps(system, experiment, log)
+    for line in plan.remarks:
+        log.remark(line)
     with held_interrupts() as interrupts, Surroundings() as surroundings, ExitStack() as stack:
         with _explained():
             instances = stack.enter_context(placed(system.components, log, isolation, interrupts))
@@ -77,7 +69,7 @@ def simulate(
             stack.enter_context(surroundings)
             loop = _possible_loop(loop, instances, log)
             row = Row(system, instances, slow)
-            coupling = Coupling(system, experiment, instances, row, log, exchange)
+            coupling = Coupling(plan, instances, row, log, exchange)
             coupling.initialise()
             names = tuple(map(str, row.columns))
             parameters = _parameters(system, instances, log)
@@ -105,7 +97,7 @@ def simulate(
                 interrupts,
                 hooks,
             )
-            order = [name for names in coupling.plan for name in names]
+            order = [name for names in coupling.sequence for name in names]
             remark = None
             try:
                 failure = _advance(run, loop, Hooks(run), order, surroundings)
@@ -123,12 +115,7 @@ def simulate(
         return ending
 
 
-def completed(
-    system: System,
-    experiment: Experiment,
-    observers: Sequence[Observer] = (),
-    exchange: Exchange = OURS,
-) -> None:
+def completed(plan: Plan, observers: Sequence[Observer] = (), exchange: Exchange = OURS) -> None:
     """Run a system of which nothing less than all rows will do.
 
     Raises:
@@ -136,33 +123,11 @@ def completed(
         KeyboardInterrupt: somebody wants it to stop.
 
     """
-    ending = simulate(system, experiment, observers, exchange=exchange)
+    ending = simulate(plan, observers, exchange=exchange)
     if ending.signals:
         raise KeyboardInterrupt
     if ending.failure is not None:
-        raise InputError(f"{system.name} {ending.failure}")
-
-
-def _whole_steps(system: System, experiment: Experiment, log: Log) -> Experiment:
-    """An experiment without its last, shorter step where an FMU takes none of another length.
-
-    Raises:
-        InputError: no step is left.
-
-    """
-    rigid = [name for name, component in system.components.items() if not component.takes_any_step]
-    decimation = decimations(system, experiment.step)
-    period = lcm(*(decimation[name] for name in rigid))
-    whole = experiment.full_steps // period * period
-    if not rigid or whole == experiment.rows - 1:
-        return experiment
-    why = f"{', '.join(rigid)}: takes steps of one length alone, so"
-    if whole == 0:
-        shortest = period * experiment.step
-        raise InputError(f"{why} the run must last at least one step, {shortest:g} s")
-    end = experiment.time(whole)
-    log.remark(f"{why} the run ends with the last whole step, at t = {end:.12g} s")
-    return replace(experiment, stop_time=end)
+        raise InputError(f"{plan.system.name} {ending.failure}")
 
 
 def _possible_loop(loop: Stepping, instances: Mapping[str, Instance], log: Log) -> Stepping:

@@ -29,7 +29,7 @@ enum { LANES = 4 };
 
 typedef unsigned reference;
 
-/* FMI's function that moves values of one kind, to an FMU or from it. */
+/* FMI's function that moves values of one type, to an FMU or from it. */
 typedef union {
     int (*set_reals)(void *component, const reference[], size_t n, const double[]);
     int (*set_integers)(void *component, const reference[], size_t n, const int[]);
@@ -37,7 +37,7 @@ typedef union {
     int (*get_integers)(void *component, const reference[], size_t n, int[]);
 } mover;
 
-/* Values of one kind that are neighbours in the row. */
+/* Values of one type that are neighbours in the row. */
 typedef struct {
     mover call;
     const reference *references;

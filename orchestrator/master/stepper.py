@@ -36,7 +36,7 @@ _SOURCE = Path(__file__).with_name("stepper.c")
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC")
 
 #: What it is in the user's cache folder.
-_KIND = "loop"
+_CATEGORY = "loop"
 
 #: Libraries that this process has loaded, by cache folders.
 _in_use: dict[Path, CDLL] = {}
@@ -106,7 +106,7 @@ def kept() -> CDLL | None:
     if folder not in _in_use:
         # What is loaded needs no second look: short runs would take longer for it.
         with suppress(OSError):
-            _in_use.update((folder, _loaded(path)) for path in user_cache.kept(_KIND, _key()))
+            _in_use.update((folder, _loaded(path)) for path in user_cache.kept(_CATEGORY, _key()))
     return _in_use.get(folder)
 
 
@@ -138,7 +138,7 @@ def _made(compiler: Compiler) -> CDLL:
         OSError: it cannot be compiled, kept or loaded.
 
     """
-    with claimed(user_cache.folder_of(_KIND), wait=True):
+    with claimed(user_cache.folder_of(_CATEGORY), wait=True):
         if library := kept():
             # Another process was first.
             return library
@@ -147,7 +147,7 @@ def _made(compiler: Compiler) -> CDLL:
             process = compiler(*_FLAGS, str(_SOURCE), "-o", str(path))
             if process.returncode != 0:
                 raise OSError(last_line(process.stderr))
-            [place] = user_cache.keep(_KIND, _key(), {path.name: path.read_bytes()})
+            [place] = user_cache.keep(_CATEGORY, _key(), {path.name: path.read_bytes()})
     return _loaded(place)
 
 

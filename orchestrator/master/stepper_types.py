@@ -6,7 +6,7 @@ from ctypes import POINTER, Structure, c_double, c_int, c_size_t, c_void_p
 
 
 class CMove(Structure):
-    """Values of one kind that are neighbours in the row, and FMI's function that moves them."""
+    """Values of one type that are neighbours in the row, and FMI's function that moves them."""
 
     _fields_ = (
         ("call", c_void_p),

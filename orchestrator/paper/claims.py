@@ -32,16 +32,16 @@ from orchestrator.paper.measures import (
     turning_radius,
 )
 from orchestrator.paper.page import actuator_values, numbers
-from orchestrator.paper.variations import Variation
+from orchestrator.runs.request import Request
 from orchestrator.vehicle.indices import REACHED
 
 #: The runs of the figures, and what the claims change in them.
-FIVE, FIVE_PD = Variation("fig5"), Variation("fig5-pd")
-SIX, SIX_PD = Variation("fig6"), Variation("fig6-pd")
-SEVEN = (Variation("fig7a"), Variation("fig7b"), Variation("fig7c"))
-QUIET = Variation("fig4", {"plant.noise.std": 0.0})
-SHARP = Variation("fig5", {"controller.eps_t": 1.0})
-TURNING = Variation("fig3b", {"plant.tau.u": 80.0, "plant.tau.q": 0.0, "plant.tau.r": 80.0})
+FIVE, FIVE_PD = Request("fig5"), Request("fig5-pd")
+SIX, SIX_PD = Request("fig6"), Request("fig6-pd")
+SEVEN = (Request("fig7a"), Request("fig7b"), Request("fig7c"))
+QUIET = Request("fig4", {"plant.noise.std": 0.0})
+SHARP = Request("fig5", {"controller.eps_t": 1.0})
+TURNING = Request("fig3b", {"plant.tau.u": 80.0, "plant.tau.q": 0.0, "plant.tau.r": 80.0})
 
 #: A signal that is squared and integrated.
 _SQUARED = "·√s"
@@ -74,7 +74,7 @@ class Claim:
 
     title: str
     published: str
-    runs: tuple[Variation, ...]
+    runs: tuple[Request, ...]
     judge: Callable[..., Finding]
 
     def finding(self, kept_runs: Sequence[KeptRun]) -> Finding:
@@ -90,7 +90,7 @@ CLAIMS: list[Claim] = []
 
 
 def claim(
-    title: str, published: str, *runs: Variation
+    title: str, published: str, *runs: Request
 ) -> Callable[[Callable[..., Finding]], Callable[..., Finding]]:
     """Register a function of the outcomes of some runs as the judge of a claim."""
 

@@ -26,7 +26,7 @@ from orchestrator.paper.claims import FIVE, FIVE_PD, QUIET, SEVEN
 from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.measures import EFFORT_PD, EFFORT_PROPOSED
 from orchestrator.paper.page import actuator_values, numbers, picture, plain
-from orchestrator.paper.variations import Variation
+from orchestrator.runs.request import Request
 from orchestrator.vehicle.certificates import COLUMNS, certificates
 from orchestrator.vehicle.signals import ACTUATORS, AXES, limits
 
@@ -41,7 +41,7 @@ LAMBDAS = (0.5, 1.0, 1.5, 2.1, 3.0, 4.0)
 
 _PRINTED = replace(FIVE, parameters={"controller.printed_jacobian": True})
 _JACOBI, _JACOBI_PD = (replace(run, order="jacobi") for run in (FIVE, FIVE_PD))
-_NOISY = tuple(Variation("fig4", {"plant.noise.std": level}) for level in NOISE_LEVELS)
+_NOISY = tuple(Request("fig4", {"plant.noise.std": level}) for level in NOISE_LEVELS)
 _QUICK = tuple(
     QUIET
     if value == Gains().lambda_
@@ -80,7 +80,7 @@ class Effect:
 
     name: str
     title: str
-    runs: tuple[Variation, ...]
+    runs: tuple[Request, ...]
     show: Callable[..., Shown]
 
 
@@ -89,7 +89,7 @@ EFFECTS: list[Effect] = []
 
 
 def effect(
-    name: str, title: str, *runs: Variation
+    name: str, title: str, *runs: Request
 ) -> Callable[[Callable[..., Shown]], Callable[..., Shown]]:
     """Register a function of the outcomes of some runs as an effect."""
 

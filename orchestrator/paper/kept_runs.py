@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from fmus.kinds import PYTHON
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.ledger import Ledger
@@ -19,11 +20,9 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.identity import code_of, digest_of
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.master.observers.table import Table
-from orchestrator.master.simulation import simulate
-from orchestrator.paper.variations import Variation
-from orchestrator.runs.bundle import PYTHON
 from orchestrator.runs.folder import opened
-from orchestrator.runs.preparation import Prepared
+from orchestrator.runs.preparation import Prepared, prepared_of
+from orchestrator.runs.request import Request
 from orchestrator.system.names import port_name
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
@@ -71,15 +70,15 @@ class KeptRuns:
         """
         self._folder, self._stop_time, self._kind = folder, stop_time, kind
         self._force = force
-        self._keys: dict[Variation, str] = {}
+        self._keys: dict[Request, str] = {}
         self._labels: dict[str, str] = {}
         self._kept_runs: dict[str, KeptRun] = {}
 
-    def __getitem__(self, run: Variation) -> KeptRun:
+    def __getitem__(self, run: Request) -> KeptRun:
         """The outcome of a run that was made."""
         return self._kept_runs[self._keys[run]]
 
-    def label(self, run: Variation) -> str:
+    def label(self, run: Request) -> str:
         """The shortest of the labels that equal runs have."""
         return self._labels[self._keys[run]]
 
@@ -88,7 +87,7 @@ class KeptRuns:
         """Of all runs."""
         return list(self._labels.values())
 
-    def make(self, runs: Iterable[Variation], workers: Workers) -> None:
+    def make(self, runs: Iterable[Request], workers: Workers) -> None:
         """Make what is not kept in the folder, the longest first.
 
         Raises:
@@ -99,18 +98,18 @@ class KeptRuns:
         with opened(self._folder, self._force) as ledger:
             self._make(runs, workers, ledger)
 
-    def _make(self, runs: Iterable[Variation], workers: Workers, ledger: Ledger) -> None:
-        missing: dict[str, tuple[int, Variation]] = {}
+    def _make(self, runs: Iterable[Request], workers: Workers, ledger: Ledger) -> None:
+        missing: dict[str, tuple[int, Request]] = {}
         for run in runs:
             wanted = replace(run, stop_time=self._stop_time or run.stop_time, kind=self._kind)
             try:
-                prepared = wanted.prepared()
+                prepared = prepared_of(wanted)
             except InputError as error:
-                self._keys[run] = self._labels[run.label] = key = run.label
+                self._keys[run] = self._labels[run.command_line] = key = run.command_line
                 self._kept_runs[key] = KeptRun({"failure": str(error)}, Table())
                 continue
             self._keys[run] = key = key_of(prepared)
-            label = wanted.label
+            label = wanted.command_line
             self._labels[key] = min(label, self._labels.get(key, label), key=len)
             ledger.check([_file(key)])
             if ledger.owns(_file(key)):
@@ -144,22 +143,16 @@ def key_of(prepared: Prepared) -> str:
     return digest_of(prepared.identity, kept)[:32]
 
 
-def _make(run: Variation, key: str) -> KeptRun:
+def _make(run: Request, key: str) -> KeptRun:
     """Make a run; a task for a worker."""
     try:
-        prepared = run.prepared()
+        prepared = prepared_of(run)
         if key_of(prepared) != key:
             raise InputError("FMUs have changed while the report was made; make it anew")
         loops = loops_of(prepared.system)
         metrics = Metrics(loops)
         seen = VisibleRows({name for loop in loops for name in loop.drawn()})
-        simulate(
-            prepared.system,
-            prepared.experiment,
-            [metrics, seen],
-            loop=prepared.loop,
-            hooks=prepared.hooks(),
-        )
+        prepared.run([metrics, seen])
     except InputError as error:
         return KeptRun({"failure": str(error)}, Table())
     values = metrics.content(prepared.scenario.name, prepared.system)

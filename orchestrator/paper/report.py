@@ -10,9 +10,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from fmus.kinds import PYTHON
 from orchestrator.machine.ledger import RECORD
 from orchestrator.machine.workers import Workers, workers
-from orchestrator.paper import errata, printed_table, readings
+from orchestrator.paper import printed_table, prose
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS, show_effect
 from orchestrator.paper.kept_runs import KeptRuns
@@ -26,7 +27,7 @@ from orchestrator.paper.sections import (
     written,
 )
 from orchestrator.paper.variants import all_variants
-from orchestrator.runs.bundle import PYTHON, current_fmus
+from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.folder import inner, replaced
 from orchestrator.runs.record import PACKAGES, Stopwatch, write_files
 from orchestrator.runs.wiring import closed_loop
@@ -112,8 +113,8 @@ def write_report(
         shown = list(study_sections(made, folder / _STUDIES, unfinished))
         parts = _text(chapters, kept_runs, notes, effects, command, unfinished, fmus, shown, held)
         body = "\n\n".join(parts)
-        body = readings.linked(body)
-        text = f"{_TITLE}\n\n{readings.linked(_INTRODUCTION)}\n\n{contents(body)}\n\n{body}\n"
+        body = prose.linked(body)
+        text = f"{_TITLE}\n\n{prose.linked(_INTRODUCTION)}\n\n{contents(body)}\n\n{body}\n"
         (unfinished / _MARKDOWN).write_text(text, encoding="utf-8")
         (unfinished / _PAGE).write_text(html(text, unfinished), encoding="utf-8")
         write_files(unfinished, _record(command, clock, kept_runs))
@@ -170,9 +171,9 @@ def _text(
     yield "## Gain conditions"
     yield f"`auv-fmu gains`:\n\n```\n{gains.check(closed_loop(fmus))}\n```"
     yield "## What is wrong in the paper"
-    yield errata.section()
+    yield prose.errata()
     yield "## Readings"
-    yield readings.section()
+    yield prose.readings()
     yield "## Versions and commands"
     versions = ", ".join(f"{package} {version(package)}" for package in PACKAGES)
     yield f"Python {platform.python_version()}, {versions}. Written by `{shlex.join(command)}`."

@@ -12,14 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from fmus.kinds import PYTHON
 from orchestrator.figures import FIGURES, Drawn, draw
 from orchestrator.figures.style import printed_unit
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.paper.kept_runs import KeptRun, KeptRuns
 from orchestrator.paper.page import picture, plain, table, values_with_units
-from orchestrator.paper.variations import Variation
-from orchestrator.runs.bundle import PYTHON
 from orchestrator.runs.folder import inner
+from orchestrator.runs.preparation import Prepared, prepared_of, with_companion
+from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario, read_scenario
 from orchestrator.studies.study import Study, read_study, ready_studies
 from orchestrator.studies.sweep import Means, swept
@@ -44,7 +45,7 @@ class Section:
 
     name: str
     scenario: Scenario
-    runs: Mapping[str, Variation]
+    runs: Mapping[str, Request]
 
     @property
     def title(self) -> str:
@@ -80,23 +81,64 @@ def _numbered(name: str) -> Iterator[str]:
         n += 1
 
 
-def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Variation]:
+def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Request]:
     """The run of a scenario and what it is drawn with: its companion, or its twin without noise."""
-    run = Variation(reference, kind=kind)
+    request = Request(reference, kind=kind)
     try:
-        system = run.prepared().system
+        system = prepared_of(request).system
     except InputError:
-        # Whoever makes the run says why it cannot be made.
-        return {scenario.legend: run}
+        # The report says why it cannot be made.
+        return {scenario.legend: request}
     if scenario.compare:
-        [companion] = run.companions()
+        [companion] = companions(request)
         label = read_scenario(scenario.compare).legend
-        return {scenario.legend: run, label + " (2)" * (label == scenario.legend): companion}
+        return {scenario.legend: request, label + " (2)" * (label == scenario.legend): companion}
     noise = port_name(_NOISE)
     if scenario.figure == "tracking" and system.has(noise) and system.value(noise):
-        quiet = replace(run, parameters={_NOISE: 0.0})
-        return {"with noise": run, "without noise": quiet}
-    return {scenario.legend: run}
+        quiet = replace(request, parameters={_NOISE: 0.0})
+        return {"with noise": request, "without noise": quiet}
+    return {scenario.legend: request}
+
+
+def companions(request: Request) -> list[Request]:
+    """Runs that are drawn together with one: of its companion, with the least changes to it.
+
+    Raises:
+        InputError: the scenario or the changes are not usable.
+
+    """
+    found = with_companion(prepared_of(request), request)
+    return [_as_request(request, found[0], one) for one in found[1:]]
+
+
+def _as_request(request: Request, compared: Prepared, prepared: Prepared) -> Request:
+    """What was prepared as the companion of a run, as what changes its own scenario."""
+    standard = Request(compared.scenario.compare, kind=request.kind)
+    own = prepared_of(standard)
+    experiment, table = prepared.experiment, prepared.input_table
+    played = table.targets if table else ()
+    inputs = prepared.scenario.inputs
+    changed = {
+        name: getattr(experiment, name)
+        for name in ("stop_time", "step", "order", "coupling")
+        if getattr(experiment, name) != getattr(own.experiment, name)
+    }
+    return replace(
+        standard,
+        **changed,
+        parameters={
+            str(name): value
+            for name, value in prepared.system.parameters.items()
+            if own.system.value(name) != value and name not in played
+        },
+        events=None if prepared.events == own.events else request.events or request.scenario,
+        inputs=str(inputs.file) if inputs and inputs != own.scenario.inputs else None,
+        steps={
+            name: step
+            for name, step in prepared.system.steps.items()
+            if own.system.steps.get(name) != step
+        },
+    )
 
 
 def draw_section(section: Section, kept_runs: Sequence[KeptRun], folder: Path) -> list[str]:

@@ -7,17 +7,18 @@ where they are called.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 from collections.abc import Sequence
 from functools import cache
+from hashlib import sha256
 from importlib.metadata import version
-from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from fmus.discovery import fingerprint
+from fmus.kinds import CONTAINED, FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.machine.cache import folder_of, keep, kept, users_folder
 from orchestrator.machine.children import run_module
@@ -82,12 +83,6 @@ def _package(name: str) -> dict[str, Any]:
     }
 
 
-#: The kinds of FMU that a component comes as: Python sources, or their translation to C.
-KINDS = PYTHON, NATIVE = "python", "native"
-
-#: The versions of FMI; the Python kind has the first.
-FMI = ("2", "3")
-
 #: Where `auv-fmu build` writes each kind unless another folder is named.
 DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "native")}
 
@@ -95,13 +90,7 @@ DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "n
 ARCHIVE, MANIFEST = "auv.ssp", "build.json"
 
 #: What the FMUs of runs are in the user's cache folder.
-_KIND = "fmus"
-
-#: Packages that the FMUs of each kind are made of.
-_SOURCES = {PYTHON: ("auv_fmu", "fmus", "pythonfmu"), NATIVE: ("auv_fmu", "fmus")}
-
-#: Packages besides ours whose code is in them.
-_CONTAINED = {PYTHON: ("pythonfmu",), NATIVE: ()}
+_CATEGORY = "fmus"
 
 
 def build(
@@ -109,7 +98,7 @@ def build(
     loader: str | None = None,
     *,
     kind: str = PYTHON,
-    fmi: str = FMI[0],
+    fmi: str = FMI_VERSIONS[0],
     platforms: str | None = None,
     force: bool = False,
 ) -> list[Path]:
@@ -119,8 +108,8 @@ def build(
         folder: made if it does not exist.
         loader: of the Python kind, `native` or `plain`; None: what is there, and for new files
             native where it can be compiled.
-        kind: one of :data:`KINDS`.
-        fmi: version, one of :data:`FMI`.
+        kind: one of :data:`fmus.kinds.KINDS`.
+        fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
         platforms: of the native kind, with commas between them; None: this machine.
         force: move aside files of the user's that have names of these.
 
@@ -139,12 +128,12 @@ def build(
         options = ["--kind", kind, "--fmi", fmi]
         options += ["--loader", loader] if loader is not None else []
         options += ["--platforms", platforms] if platforms is not None else []
-        run_fmus("packaging.build", unfinished, *options)
+        run_fmus("build", unfinished, *options)
         archive = unfinished / ARCHIVE
         archive.write_bytes(ssp_bytes(closed_loop(unfinished, versions=WRITABLE)))
         files = [*sorted(unfinished.glob("*.fmu")), archive]
         (unfinished / CHECKSUMS).write_bytes(checksums(files))
-        (unfinished / BILL).write_bytes(bill(files, _CONTAINED[kind]))
+        (unfinished / BILL).write_bytes(bill(files, CONTAINED[kind]))
         for path in unfinished.iterdir():
             before = folder / path.name
             if before.is_file() and before.read_bytes() == path.read_bytes():
@@ -181,12 +170,12 @@ def run_fmus(module: str, folder: Path, *options: str) -> list[Path]:
 
 
 @cache
-def current_fmus(kind: str = PYTHON, fmi: str = FMI[0]) -> Path:
+def current_fmus(kind: str = PYTHON, fmi: str = FMI_VERSIONS[0]) -> Path:
     """The folder with the FMUs of the installed sources, built if it is not there.
 
     Args:
-        kind: one of :data:`KINDS`.
-        fmi: version, one of :data:`FMI`.
+        kind: one of :data:`fmus.kinds.KINDS`.
+        fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
 
     Raises:
         InputError: there is no such kind, they cannot be built, or the cache folder cannot be
@@ -195,11 +184,11 @@ def current_fmus(kind: str = PYTHON, fmi: str = FMI[0]) -> Path:
     """
     if kind not in KINDS:
         raise InputError(f"kind {kind!r}: use one of {', '.join(KINDS)}")
-    key = _fingerprint(kind, fmi)
+    key = sha256(f"{kind} {fmi} {fingerprint(kind)}".encode()).hexdigest()[:16]
     if found := _kept(key):
         return found
     try:
-        with claimed(folder_of(_KIND), wait=True):
+        with claimed(folder_of(_CATEGORY), wait=True):
             # Another process may have been first.
             return _kept(key) or _built(key, "--kind", kind, "--fmi", fmi)
     except OSError as error:
@@ -211,27 +200,12 @@ def current_fmus(kind: str = PYTHON, fmi: str = FMI[0]) -> Path:
 
 def _kept(key: str) -> Path | None:
     """The folder of FMUs that were built earlier."""
-    return next((path.parent for path in kept(_KIND, key)), None)
+    return next((path.parent for path in kept(_CATEGORY, key)), None)
 
 
 def _built(key: str, *options: str) -> Path:
     """Build FMUs, and keep them."""
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
-        run_fmus("packaging.build", Path(temporary), *options)
+        run_fmus("build", Path(temporary), *options)
         files = {path.name: path.read_bytes() for path in sorted(Path(temporary).iterdir())}
-    return keep(_KIND, key, files)[0].parent
-
-
-def _fingerprint(kind: str, fmi: str) -> str:
-    """Hash of everything that the FMUs of a kind depend on."""
-    digest = hashlib.sha256(f"{kind} {fmi}\0".encode())
-    for package in _SOURCES[kind]:
-        specification = find_spec(package)
-        assert specification is not None and specification.submodule_search_locations
-        [root] = specification.submodule_search_locations
-        for path in sorted(Path(root).rglob("*")):
-            name = path.relative_to(root)
-            if path.is_file() and path.suffix != ".pyc" and name.parts[0] != "dist":
-                digest.update(f"{package}/{name}\0".encode())
-                digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+    return keep(_CATEGORY, key, files)[0].parent

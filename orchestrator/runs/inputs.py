@@ -11,34 +11,15 @@ import numpy as np
 from orchestrator.machine.errors import InputError
 from orchestrator.master.hooks.playback import InputTable
 from orchestrator.master.observers.files import read_columns, read_rows
-from orchestrator.runs.entries import Entry, is_text
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import type_of, typed
 
 #: How a continuous Real input goes from one row to the next; the first is the default.
-_WAYS = ("linear", "hold")
+WAYS = ("linear", "hold")
 
 #: So many seconds are farther apart than two numbers can be, but for rounding [s].
 _MOST = 1e308
-
-#: What `[inputs]` may hold.
-ENTRIES: dict[str, Entry] = {
-    "file": Entry(
-        "text",
-        is_text,
-        "A table in CSV or Parquet, its path relative to this file: `time` [s] first, then inputs "
-        "that nothing feeds, as `component.port`.",
-        "",
-    ),
-    "between": Entry(
-        "text",
-        is_text,
-        "What a Real input does between two rows: `linear`, or `hold`, as all others do, and Real "
-        "inputs of variability `discrete`.",
-        "`linear`",
-    ),
-}
 
 
 @dataclass(frozen=True)
@@ -47,17 +28,12 @@ class Inputs:
 
     Attributes:
         file: with the table.
-        between: what continuous Real inputs do between two rows, one of :data:`_WAYS`.
+        between: what continuous Real inputs do between two rows, one of :data:`WAYS`.
 
     """
 
     file: Path
-    between: str = _WAYS[0]
-
-
-def inputs_of(file: str | Path | None) -> Inputs | None:
-    """Inputs from a file, if one is named."""
-    return None if file is None else Inputs(Path(file))
+    between: str = WAYS[0]
 
 
 def read_inputs(
@@ -75,8 +51,8 @@ def read_inputs(
 
     """
     file = inputs.file
-    if inputs.between not in _WAYS:
-        raise InputError(f"between = {inputs.between!r}: use one of {', '.join(_WAYS)}")
+    if inputs.between not in WAYS:
+        raise InputError(f"between = {inputs.between!r}: use one of {', '.join(WAYS)}")
     targets = tuple(system.named(port_name(name)) for name in read_columns(file))
     rows = np.vstack([np.empty((0, 1 + len(targets))), *read_rows(file)])
     try:

@@ -78,7 +78,7 @@ def build_own(
         raise InputError(f"{script}: no such Python file")
     options = [str(script), *(("--loader", loader) if loader else ())]
     with TemporaryDirectory(dir=process_folder()) as temporary:
-        [built] = run_fmus("packaging.own", Path(temporary), *options)
+        [built] = run_fmus("python.own", Path(temporary), *options)
         place = script.parent if folder is None else folder
         with replaced(place, [built.name], force=force) as unfinished:
             shutil.copyfile(built, unfinished / built.name)

@@ -6,11 +6,12 @@ import re
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from auv_fmu.euler import STEP
+from fmus.kinds import FMI_VERSIONS, PYTHON
 from orchestrator.figures import check_figure
 from orchestrator.formats.examination import open_inputs
 from orchestrator.formats.osp import STRUCTURE as OSP
@@ -18,30 +19,28 @@ from orchestrator.formats.osp import read_osp
 from orchestrator.formats.ssp import STRUCTURE as SSD
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.machine.reading import is_folder
+from orchestrator.machine.user_files import is_folder
 from orchestrator.master.experiment import (
     GAUSS_SEIDEL,
-    LINEAR,
     ORDERS,
     SOLVE,
     Experiment,
-    Order,
-    decimations,
     step_of,
     with_common_step,
 )
-from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.fmi.isolated import Isolation, isolation_of
 from orchestrator.master.hooks.clock import check_factor
 from orchestrator.master.hooks.events import Alter, Event, Events, Set
 from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.hooks.playback import InputTable, Playback
 from orchestrator.master.identity import Identity, identity
-from orchestrator.master.linear import check_linear
-from orchestrator.master.loop import LOOPS, PYTHON_LOOP, Stepping, chosen
-from orchestrator.master.observers.observer import Ending
-from orchestrator.master.schedule import stages
-from orchestrator.runs.bundle import FMI, PYTHON, current_fmus
+from orchestrator.master.loop import PYTHON_LOOP, Stepping, chosen
+from orchestrator.master.observers.observer import Ending, Observer
+from orchestrator.master.plan import Plan, planned
+from orchestrator.master.simulation import simulate
+from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.inputs import Inputs, read_inputs
+from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.runs.scenario_events import check_events, read_events, shared_events
 from orchestrator.runs.wiring import closed_loop, read_wiring
@@ -64,58 +63,50 @@ SOME_TIME = 1.0
 
 
 @dataclass(frozen=True)
-class Request:
-    """What the user asks for beyond the scenario.
-
-    Attributes:
-        stop_time, step: experiment [s]; None: the scenario's or the system's own.
-        order: of evaluation; None: the scenario's own, or else the first of :data:`ORDERS`.
-        parameters: values that win over the scenario's.
-        kind: of the bundle's FMUs, one of :data:`orchestrator.runs.bundle.KINDS`.
-        isolation: of the FMUs in processes of their own; None: they run in this one.
-        loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
-        strict: whether what is not as it should be is refused, even if it is harmless.
-        steps: of components that take longer ones of their own [s]; they win over the scenario's.
-        real_time: simulated seconds in a second; None: as many as can be had.
-        events: in the place of the scenario's, as a scenario file writes them; None: its own.
-        inputs: in the place of the scenario's.
-        coupling: one of :data:`orchestrator.master.experiment.COUPLINGS`; None: the scenario's.
-
-    """
-
-    stop_time: float | None = None
-    step: float | None = None
-    order: Order | None = None
-    parameters: Mapping[PortName, object] = field(default_factory=dict)
-    isolation: Isolation | None = None
-    kind: str = PYTHON
-    loop: str = LOOPS[0]
-    strict: bool = False
-    steps: Mapping[str, float] = field(default_factory=dict)
-    real_time: float | None = None
-    events: Sequence[Mapping[str, Any]] | None = None
-    inputs: Inputs | None = None
-    coupling: str | None = None
-
-
-@dataclass(frozen=True)
 class Prepared:
-    """A system that is ready to be run, the scenario that it comes from, and how it is stepped.
+    """A run that is ready to be made, and the scenario that it comes from.
 
     Attributes:
+        scenario: as its file has it.
+        plan: the system, and its steps.
+        isolation: of the FMUs in processes of their own; None: they run in this one.
+        loop: that makes the steps.
+        real_time: simulated seconds in a second; None: as many as can be had.
         events: that happen to it.
-        course: of inputs over time; None: they keep their values.
+        input_table: values of inputs over time; None: they keep their values.
 
     """
 
     scenario: Scenario
-    system: System
-    experiment: Experiment
+    plan: Plan
     isolation: Isolation | None = None
     loop: Stepping = PYTHON_LOOP
     real_time: float | None = None
     events: tuple[Event, ...] = ()
     input_table: InputTable | None = None
+
+    @property
+    def system(self) -> System:
+        """What is run."""
+        return self.plan.system
+
+    @property
+    def experiment(self) -> Experiment:
+        """Until when it is run, in which steps and which order."""
+        return self.plan.experiment
+
+    def run(self, observers: Sequence[Observer], hooks: Sequence[Hook] = ()) -> Ending:
+        """Make the run.
+
+        Args:
+            observers: take its rows.
+            hooks: act on it before its own do.
+
+        Raises:
+            InputError: an FMU or a parameter is not usable; nothing was stepped.
+
+        """
+        return simulate(self.plan, observers, self.isolation, self.loop, [*hooks, *self._hooks()])
 
     def doubts(self) -> list[str]:
         """What may have been forgotten, in lines: inputs without a source, a part of a vehicle."""
@@ -130,8 +121,7 @@ class Prepared:
         """All that its rows depend on."""
         return identity(self.system, self.experiment, self.events, self.input_table)
 
-    def hooks(self) -> list[Hook]:
-        """Who acts on one run of it between its steps."""
+    def _hooks(self) -> list[Hook]:
         playing: list[Hook] = [] if self.input_table is None else [Playback(self.input_table)]
         return playing + ([Events(self.events)] if self.events else [])
 
@@ -185,7 +175,7 @@ def warned(strict: bool = False) -> Iterator[Findings]:
 def loaded(
     name: str,
     kind: str = PYTHON,
-    fmi: str = FMI[0],
+    fmi: str = FMI_VERSIONS[0],
     variant: str | None = None,
     findings: Findings | None = None,
 ) -> tuple[Scenario, System]:
@@ -215,7 +205,7 @@ def loaded(
         return Scenario(named.stem, title=path.name or named.name), system
     scenario = read_scenario(name)
     check_figure(scenario.figure)
-    versions = RUNNABLE if fmi == FMI[0] else WRITABLE
+    versions = RUNNABLE if fmi == FMI_VERSIONS[0] else WRITABLE
     return scenario, closed_loop(current_fmus(kind, fmi), scenario, versions)
 
 
@@ -266,15 +256,25 @@ def left_behind(scenario: Scenario) -> str | None:
     return f"{scenario.name}: the system comes without the scenario's {names}" if names else None
 
 
-def check_brings_its_own(name: str, kind: str, fmi: str = FMI[0]) -> None:
+def check_brings_its_own(name: str, kind: str, fmi: str = FMI_VERSIONS[0]) -> None:
     """Check that no other FMUs are asked for than those that a system comes with.
 
     Raises:
         InputError: it would not have any effect.
 
     """
-    if (kind, fmi) != (PYTHON, FMI[0]):
+    if (kind, fmi) != (PYTHON, FMI_VERSIONS[0]):
         raise InputError(f"{name}: comes with its FMUs; kind and fmi are for the bundle's own")
+
+
+def prepared_of(request: Request) -> Prepared:
+    """What a request asks for.
+
+    Raises:
+        InputError: there is no such scenario, or something about the request cannot be done.
+
+    """
+    return prepare(*loaded(request.scenario, request.kind), request)
 
 
 def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
@@ -284,19 +284,22 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
         InputError: something about the request cannot be done.
 
     """
-    findings = Findings(request.strict)
-    system = system.with_parameters(request.parameters)
-    input_table, inputs = None, _first_given(request.inputs, scenario.inputs)
+    findings, values = Findings(request.strict), request.values
+    system = system.with_parameters(values)
+    input_table, inputs = None, scenario.inputs
+    if request.inputs is not None:
+        inputs = Inputs(Path(request.inputs))
     if inputs is not None:
-        given = set(request.parameters)
+        given = set(values)
         if request.inputs is None:
             given |= set(scenario.parameters)
         with findings.collecting():
             system, input_table = read_inputs(inputs, system, given)
     system.check()
-    events = scenario.events
-    if request.events is not None:
-        events = request.events
+    events = _events(request)
+    if events is None:
+        events = scenario.events
+    else:
         check_events("events", events)
     stop_time = _first_given(request.stop_time, scenario.stop_time, system.stop_time)
     if stop_time is None:
@@ -312,21 +315,18 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     if request.strict and coupling is None and order == GAUSS_SEIDEL:
         coupling = SOLVE
     experiment = Experiment(stop_time, step, order, system.start_time or 0.0, coupling)
-    if coupling == LINEAR:
-        check_linear(system)
-    decimations(system, step)
-    stages(system, order)
+    plan = planned(system, experiment)
     with findings.collecting():
         happening = read_events(scenario.name, events, replace(system, step=step))
     findings.refuse()
-    loop = chosen(request.loop, experiment, request.isolation)
+    isolation = isolation_of(request.isolate, request.step_timeout)
+    loop = chosen(request.loop, experiment, isolation)
     if request.real_time is not None:
         check_factor(request.real_time)
     return Prepared(
         scenario,
-        system,
-        experiment,
-        request.isolation,
+        plan,
+        isolation,
         loop,
         request.real_time,
         happening,
@@ -353,7 +353,7 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     played = prepared.input_table.targets if prepared.input_table else ()
     shared = {
         target: value
-        for target, value in {**scenario.parameters, **request.parameters}.items()
+        for target, value in {**scenario.parameters, **request.values}.items()
         if system.has(target) and target not in played
     }
     steps = {
@@ -361,7 +361,7 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         for name, step in {**scenario.steps, **request.steps}.items()
         if name in system.components
     }
-    events = request.events
+    events = _events(request)
     if events is None:
         events = companion.events or scenario.events
     same = replace(
@@ -445,6 +445,13 @@ def _doubts(system: System, given: Collection[PortName] = ()) -> list[str]:
         return []
     found = open_inputs(system, given), differing_vehicle(system)
     return [text for text in found if text is not None]
+
+
+def _events(request: Request) -> Sequence[Mapping[str, Any]] | None:
+    """The events that a request has in the place of the scenario's; None: the scenario's own."""
+    if isinstance(request.events, str):
+        return read_scenario(request.events).events
+    return request.events
 
 
 def _first_given(*values: T | None) -> T | None:

@@ -13,12 +13,12 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from fmus.kinds import NATIVE, PYTHON
 from orchestrator.machine.archives import runs_python
 from orchestrator.machine.ledger import RECORD
 from orchestrator.master import identity
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
-from orchestrator.runs.bundle import NATIVE, PYTHON
 from orchestrator.runs.preparation import Prepared
 from orchestrator.system.names import port_name
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of

@@ -11,33 +11,30 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fmus.kinds import PYTHON
 from orchestrator.figures.plot import plot
 from orchestrator.machine.errors import InputError, did_you_mean, reason
 from orchestrator.machine.ledger import RECORD
 from orchestrator.master.experiment import Order, written_order
-from orchestrator.master.fmi.isolated import isolation_of
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.loop import LOOPS
 from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Observer, Occurrence
 from orchestrator.master.observers.progress import Progress
 from orchestrator.master.observers.table import Table
-from orchestrator.master.simulation import simulate as run
-from orchestrator.runs.bundle import PYTHON
 from orchestrator.runs.folder import locked, replaced
-from orchestrator.runs.inputs import inputs_of
 from orchestrator.runs.preparation import (
     Prepared,
-    Request,
     check_brings_its_own,
     loaded,
     prepare,
     warned,
 )
 from orchestrator.runs.record import METRICS, Stopwatch, write_metrics, write_record
+from orchestrator.runs.request import Request
 from orchestrator.runs.resume import checkpoints_of, leave
 from orchestrator.runs.scenario import Scenario
-from orchestrator.system.names import PortName, port_name
+from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.vehicle.indices import metrics_of
 from orchestrator.vehicle.signals import loops_of
@@ -273,23 +270,20 @@ def simulate(
             scenario, system = loaded(str(system), kind, variant=variant, findings=findings)
     if not isinstance(parameters, Mapping | None):
         raise InputError(f"parameters: a mapping by component.parameter, not {parameters!r}")
-    changes: dict[PortName, object] = {
-        port_name(str(name)): value for name, value in (parameters or {}).items()
-    }
-    isolation = isolation_of(isolate, step_timeout)
     request = Request(
-        stop_time,
-        step,
-        order,
-        changes,
-        isolation,
-        kind,
-        loop,
-        strict,
-        steps or {},
-        events=events,
-        inputs=inputs_of(inputs),
+        parameters=parameters or {},
+        stop_time=stop_time,
+        step=step,
+        order=order,
         coupling=coupling,
+        kind=kind,
+        events=events,
+        inputs=inputs,
+        loop=loop,
+        isolate=isolate,
+        step_timeout=step_timeout,
+        strict=strict,
+        steps=steps or {},
     )
     prepared = prepare(scenario, system, request)
     if is_named:
@@ -301,14 +295,7 @@ def simulate(
     observers: list[Observer] = [result, *([Progress(scenario.name)] * progress)]
     with _checkpoints(prepared, checkpoint, checkpoint_every, resume) as kept:
         result.resumed_at = next((checkpoints.time for checkpoints in kept), None)
-        ending = run(
-            prepared.system,
-            prepared.experiment,
-            [*observers, *kept],
-            prepared.isolation,
-            prepared.loop,
-            [*kept, *prepared.hooks()],
-        )
+        ending = prepared.run([*observers, *kept], kept)
         leave(kept, ending.failure is None)
     for number in ending.signals:
         # Held back while the FMUs computed; now it does what it does elsewhere.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
 from shutil import rmtree
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.machine.ledger import LEDGER, RECORD, Ledger
 from orchestrator.machine.locks import process_folder
-from orchestrator.master.fmi.transfer import KINDS
+from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.clock import RealTime
 from orchestrator.master.hooks.hook import Hook
@@ -26,10 +26,10 @@ from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Ending, Observer
 from orchestrator.master.observers.progress import Progress
 from orchestrator.master.observers.selection import Selection, check_interval, matches, matching
-from orchestrator.master.simulation import simulate
 from orchestrator.runs.folder import INCOMPLETE, inner, place_of, publish, replaced
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.record import METRICS, Stopwatch, write_metrics, write_record
+from orchestrator.runs.request import CliOption, Force
 from orchestrator.runs.resume import FOLDER, checkpoints_of, leave
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import file_name
@@ -52,26 +52,37 @@ _FAILED = 1
 
 @dataclass(frozen=True)
 class Files:
-    """What is kept of a run.
+    """What is kept of a run."""
 
-    Attributes:
-        interval: of the rows in the table [s]; None: every step.
-        columns: of the table: `all`, `outputs`, or patterns with commas between them.
-        format: of the table, a key of :data:`orchestrator.master.observers.files.FORMATS`.
-        figures: whether to draw them.
-        checkpoint_every: a checkpoint for so many simulated seconds [s]; None: none.
-        resume: go on from the one that an earlier process has left.
-        force: move aside files of the user's that have names of these.
-
-    """
-
-    interval: float | None = None
-    columns: str = "all"
-    format: str = "csv"
-    figures: bool = True
-    checkpoint_every: float | None = None
-    resume: bool = False
-    force: bool = False
+    interval: Annotated[
+        float | None,
+        CliOption(
+            "rows kept in the table, one for each interval [s]; default: one a step",
+            type=float,
+            metavar="S",
+        ),
+    ] = None
+    columns: Annotated[
+        str,
+        CliOption(
+            "columns kept in the table, for example plant.y.*,controller.tau; default: all",
+            metavar="outputs|all|PATTERN,...",
+        ),
+    ] = "all"
+    format: Annotated[str, CliOption("of the table; default: csv", choices=tuple(FORMATS))] = "csv"
+    no_figures: Annotated[bool, CliOption("draw none; default: draw", action="store_true")] = False
+    checkpoint_every: Annotated[
+        float | None,
+        CliOption(
+            "keep what it takes to go on, every so many simulated seconds, in DIR/checkpoint",
+            type=float,
+            metavar="S",
+        ),
+    ] = None
+    resume: Annotated[
+        bool, CliOption("go on from the last checkpoint in DIR/checkpoint", action="store_true")
+    ] = False
+    force: Force = False
 
 
 @dataclass(frozen=True)
@@ -188,14 +199,7 @@ def run_into(
                     _give_up(run, done, unfinished, folder, command, clock, say)
 
                 with interrupts.insistence(give_up):
-                    ending = simulate(
-                        prepared.system,
-                        prepared.experiment,
-                        run.observers,
-                        prepared.isolation,
-                        prepared.loop,
-                        run.hooks,
-                    )
+                    ending = prepared.run(run.observers, run.hooks)
                 done.append(run.ended(ending))
                 missed = [] if ending.failure else prepared.missed(ending)
                 said = [f"did not happen: {event}" for event in missed]
@@ -206,7 +210,7 @@ def run_into(
                 if interrupts:
                     break
             ended_at_once = done[0].ending.failure is not None and len(done[0].seen.rows) == 1
-            if files.figures and not interrupts.urgent and not ended_at_once:
+            if not files.no_figures and not interrupts.urgent and not ended_at_once:
                 for note in _draw(runs[0].scenario, done, unfinished, interrupts):
                     say(note)
         except (OSError, MemoryError) as error:
@@ -247,7 +251,7 @@ class _Running:
         loops = loops_of(prepared.system)
         self._metrics = Metrics(loops)
         # Without figures the cautions alone look at what was seen.
-        seen = Loop.drawn if files.figures else watched
+        seen = watched if files.no_figures else Loop.drawn
         self._seen = VisibleRows({name for loop in loops for name in seen(loop)})
         self._table = FORMATS[files.format](folder / f"result.{files.format}")
         self.observers: list[Observer] = [
@@ -269,7 +273,6 @@ class _Running:
         self._real_time = None if prepared.real_time is None else RealTime(prepared.real_time)
         if self._real_time is not None:
             self.hooks.append(self._real_time)
-        self.hooks += prepared.hooks()
 
     def ended(self, ending: Ending) -> _Done:
         """When its observers have been told the end."""
@@ -379,7 +382,7 @@ def selected_columns(system: System, wanted: str, is_companion: bool = False) ->
         for component in system.components.values()
         for causality in (("output",) if outputs else ("input", "output"))
         for variable in component.having(causality)
-        if variable.type in KINDS
+        if variable.type in FMI_TYPES
     ]
     if outputs:
         return names

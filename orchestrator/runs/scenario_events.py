@@ -20,21 +20,10 @@ from orchestrator.master.hooks.events import (
     Set,
     Stop,
 )
-from orchestrator.runs.entries import (
-    Entry,
-    are_names,
-    check_entries,
-    flattened,
-    is_finite,
-    is_flag,
-    is_number,
-    is_table,
-    is_text,
-)
-from orchestrator.system.names import PortName, port_name, splits
+from orchestrator.system.names import PortName, flattened, port_name, splits
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import Linear, Mapped
-from orchestrator.system.values import INTEGERS, finite, literal, type_of, typed
+from orchestrator.system.values import INTEGERS, finite, is_finite, literal, type_of, typed
 
 #: What is between the names of a group and of its members.
 _MEMBER = (".", "[")
@@ -42,101 +31,16 @@ _MEMBER = (".", "[")
 _CONDITION = re.compile(rf"(\S+)\s*({'|'.join(COMPARISONS)})\s*(\S+)")
 
 
-def _is_name_or_names(value: Any) -> bool:
-    return is_text(value) or are_names(value)
-
-
-#: What an event may hold, in the order of the reference page.
-ENTRIES: dict[str, Entry] = {
-    "at": Entry("number", is_number, "When it happens [s].", "at `when`"),
-    "when": Entry(
-        "text",
-        is_text,
-        "The condition that it happens at: a signal, one of `< > <= >=`, and a number, such as "
-        '`"plant.eta.z > 5"`. It must have been false before.',
-        "at `at`",
-    ),
-    "repeat": Entry(
-        "true or false",
-        is_flag,
-        "Whether it happens each time that `when` becomes true, or the first time alone.",
-        "`false`",
-    ),
-    "for": Entry("number", is_number, "How long it lasts [s].", "for good"),
-    "label": Entry("text", is_text, "Its name in figures.", "what it does"),
-    "set": Entry(
-        "table of values",
-        is_table,
-        "New values of tunable parameters, and of inputs that nothing feeds.",
-        "",
-    ),
-    "override": Entry("table of values", is_table, "Values that signals have from now on.", ""),
-    "bias": Entry("table of values", is_table, "What is added to signals from now on.", ""),
-    "freeze": Entry(
-        "name, or list of names", _is_name_or_names, "Signals that keep what they were last.", ""
-    ),
-    "drop": Entry(
-        "name, or list of names",
-        _is_name_or_names,
-        "Sensors that fail: who listens keeps what it heard last, as with `freeze`.",
-        "",
-    ),
-    "lose": Entry(
-        "name, or list of names",
-        _is_name_or_names,
-        "Actuators that fail: overridden with zero.",
-        "",
-    ),
-    "release": Entry(
-        "name, or list of names",
-        _is_name_or_names,
-        "Signals that are what they are without events again.",
-        "",
-    ),
-    "reset": Entry(
-        "name, or list of names",
-        _is_name_or_names,
-        "Components that begin anew, with their parameters as they are at that time.",
-        "",
-    ),
-    "stop": Entry("true or false", is_flag, "`true`: the run ends here, and has not failed.", ""),
-}
-
-#: Actions that nothing is left of that could end.
-_AT_ONCE = ("release", "reset", "stop")
-
-
 def check_events(where: object, tables: Sequence[Mapping[str, Any]]) -> None:
     """Check what can be checked of events without a system.
 
     Raises:
-        InputError: an event is not written as one.
+        Refused: an event is not written as one.
 
     """
-    findings = Findings()
-    for number, table in enumerate(tables, start=1):
-        with findings.collecting():
-            _check_event(f"{where}: event {number}", table)
-    findings.refuse()
+    from orchestrator.runs.scenario_file import ScenarioFile  # noqa: PLC0415
 
-
-def _check_event(place: str, table: Mapping[str, Any]) -> None:
-    check_entries(place, table, ENTRIES)
-    if ("at" in table) == ("when" in table):
-        raise InputError(f"{place}: write when it happens: either at or when")
-    actions = [key for key in table if key in _ACTIONS]
-    if len(actions) != 1:
-        said = f"not {' and '.join(actions)}" if actions else f"one of {', '.join(_ACTIONS)}"
-        raise InputError(f"{place}: write one thing that it does, {said}")
-    for key in ("at", "for"):
-        if not is_finite(table.get(key, 1.0)):
-            raise InputError(f"{place}: {key} = {table[key]}: must be finite")
-    if table.get("for", 1.0) <= 0.0:
-        raise InputError(f"{place}: for = {table['for']}: must be positive")
-    if "for" in table and actions[0] in _AT_ONCE:
-        raise InputError(f"{place}: {actions[0]} has no duration: leave `for` out")
-    if "repeat" in table and "when" not in table:
-        raise InputError(f"{place}: repeat is for events with `when`")
+    ScenarioFile.check(where, {"events": list(tables)})
 
 
 def read_events(
@@ -179,14 +83,14 @@ def shared_events(
 
 
 def _event(table: Mapping[str, Any], system: System) -> Event:
-    [key] = [key for key in table if key in _ACTIONS]
+    [key] = [key for key in table if key in ACTIONS]
     start = system.start_time or 0.0
     if table.get("at", start) < start:
         raise InputError(f"at = {table['at']}: before the run begins, at {start:g} s")
     text = "stop" if key == "stop" else f"{key} {', '.join(_things(table[key]))}"
     return Event(
         text,
-        _ACTIONS[key](table[key], system),
+        ACTIONS[key](table[key], system),
         table.get("label", text),
         table.get("at"),
         _condition(table["when"], system) if "when" in table else None,
@@ -197,14 +101,15 @@ def _event(table: Mapping[str, Any], system: System) -> Event:
 
 def _things(value: Any) -> Iterator[str]:
     """What an event acts on, in words."""
-    if is_table(value):
+    if isinstance(value, Mapping):
         yield from (f"{name} = {_shown(one)}" for name, one in flattened(value))
     else:
-        yield from [value] if is_text(value) else value
+        yield from [value] if isinstance(value, str) else value
 
 
 def _shown(value: Any) -> str:
-    return f"{value:g}" if is_number(value) else literal(value)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return f"{value:g}" if is_number else literal(value)
 
 
 def _condition(text: str, system: System) -> Condition:
@@ -389,12 +294,10 @@ def _reset(names: Any, system: System) -> Action:
 
 
 def _stop(value: bool, system: System) -> Action:
-    if not value:
-        raise InputError("stop = false: leave the event out")
     return Stop("stop")
 
 
-_ACTIONS: Mapping[str, Callable[[Any, System], Action]] = {
+ACTIONS: Mapping[str, Callable[[Any, System], Action]] = {
     "set": _set,
     "override": _override,
     "bias": _bias,

@@ -14,7 +14,7 @@ from orchestrator.figures import Drawn
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.ledger import RECORD, is_changed, located
-from orchestrator.machine.reading import explained, text_of
+from orchestrator.machine.user_files import explained, text_of
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.files import FORMATS, read_columns, read_rows
 from orchestrator.master.observers.observer import Header

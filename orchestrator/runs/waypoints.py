@@ -12,32 +12,14 @@ from auv_fmu import path_planner
 from auv_fmu.actuators import Limits
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.vehicle import Vehicle
-from orchestrator.machine.reading import explained, lines_of
-from orchestrator.runs.entries import Entry, is_text
+from orchestrator.machine.user_files import explained, lines_of
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import finite
-from orchestrator.vehicle.signals import ACTUATORS, STANDARD
+from orchestrator.vehicle.signals import ACTUATORS
 
 #: The name of its model.
 _MODEL = "PathPlanner"
-
-#: What `[path]` may hold.
-ENTRIES: dict[str, Entry] = {
-    "file": Entry(
-        "text",
-        is_text,
-        "A table in CSV, its path relative to this file, with the columns `x,y,z` [m] or `t,x,y,z` "
-        "and a line for each waypoint.",
-        "",
-    ),
-    "component": Entry(
-        "text",
-        is_text,
-        "The [PathPlanner](components/PathPlanner.md) whose parameters they become.",
-        f"`{STANDARD.planner}`",
-    ),
-}
 
 #: The columns of a table, without times and with them, and what may separate them.
 _PLACE, _TIMED = ("x", "y", "z"), ("t", "x", "y", "z")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib.metadata import version
 from math import isnan
@@ -11,28 +11,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_fmu.closed_loop import Setting, splits
-from auv_fmu.euler import MOST_INTERNAL_STEPS
+from auv_fmu import closed_loop
+from auv_fmu.closed_loop import LAWS, Moment, Setting, splits
+from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS
 from auv_fmu.output_feedback import Gains
+from fmus.auv_plant.behaviour import check
+from fmus.kinds import PYTHON
+from fmus.ports.port import Refusal
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import digest_of
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
-from orchestrator.master.schedule import stages
-from orchestrator.runs.bundle import PYTHON, current_fmus
-from orchestrator.studies.batch import tally
-from orchestrator.studies.batch.columns import COLUMNS
-from orchestrator.studies.batch.kernel import Moment, Plan
-from orchestrator.studies.batch.library import compiled, digest
-from orchestrator.studies.batch.parameters import setting_of
-from orchestrator.studies.batch.standard import difference
-from orchestrator.studies.batch.verdict import (
-    misfit,
-    refused,
-    refused_at_once,
-    refused_at_start,
-)
+from orchestrator.runs.bundle import current_fmus
+from orchestrator.studies.batch import accumulator
+from orchestrator.studies.batch.kernel import COLUMNS, RunSteps, is_bounded, part_of
+from orchestrator.studies.batch.kernels import compiled, digest
+from orchestrator.studies.batch.support import setting_of, unsupported
 from orchestrator.studies.engine import Outcome, Point
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
@@ -63,7 +58,7 @@ class BatchEngine:
 
         """
         for name, system in systems.items():
-            if why := difference(system, current_fmus(kind)):
+            if why := unsupported(system, current_fmus(kind)):
                 raise InputError(f"{name}: {why}, which the batch engine cannot make; {_OTHER}")
             system.check()
         self._systems = dict(systems)
@@ -89,16 +84,16 @@ class BatchEngine:
         """
         try:
             job = _job(self._systems[run.scenario], run)
-            ends = np.array([_end(job, stop_time) for stop_time in stop_times], tally.END)
-            tallies = tally.new(len(ends))
-            made, failure = _made(job, ends, tallies, _NO_ROWS)
+            ends = np.array([_end(job, stop_time) for stop_time in stop_times], accumulator.END)
+            accumulators = accumulator.new(len(ends))
+            made, failure = _made(job, ends, accumulators, _NO_ROWS)
         except InputError as error:
             return [Outcome(run.number, {}, str(error)) for _ in stop_times]
         return [
             Outcome(run.number, {}, failure)
             if end["steps"] > made
             else Outcome(run.number, _indices(job, end, found))
-            for end, found in zip(ends, tallies, strict=True)
+            for end, found in zip(ends, accumulators, strict=True)
         ]
 
     def setting(self, run: Point) -> Setting:
@@ -111,7 +106,7 @@ class BatchEngine:
         return _job(self._systems[run.scenario], run).setting
 
     def table(self, run: Point) -> Table:
-        """A run with its rows, those of the columns :data:`.columns.COLUMNS` that it has.
+        """A run with its rows, those of the columns :data:`.kernel.COLUMNS` that it has.
 
         Raises:
             InputError: it has no start.
@@ -119,7 +114,7 @@ class BatchEngine:
         """
         job = _job(self._systems[run.scenario], run)
         rows = np.empty((job.experiment.rows, 1 + len(COLUMNS)))
-        made, failure = _made(job, np.empty(0, tally.END), tally.new(0), rows)
+        made, failure = _made(job, np.empty(0, accumulator.END), accumulator.new(0), rows)
         kept = [
             0,
             *(i for i, name in enumerate(COLUMNS, 1) if job.has((name,))),
@@ -135,7 +130,7 @@ class _Job(NamedTuple):
     system: System
     experiment: Experiment
     setting: Setting
-    plan: Plan
+    plan: RunSteps
 
     def has(self, columns: Iterable[str]) -> bool:
         """Whether it has some columns: without an observer there are no estimates of velocity."""
@@ -159,18 +154,20 @@ def _job(system: System, run: Point) -> _Job:
         raise InputError(f"the batch engine has the orders {' and '.join(ORDERS)}; {_OTHER}")
     fmus = {name: part.description.modelName for name, part in system.components.items()}
     setting = setting_of(fmus, system.parameters, experiment.step)
-    if misfit(setting):
-        raise InputError(refused_at_start(setting))
+    try:
+        check(setting.plant)
+    except Refusal as refusal:
+        raise InputError(f"initialisation refused: {refusal}") from None
     full, stop = experiment.full_steps, experiment.stop_time
     parts = splits(setting, experiment.step)
     if max(parts) > MOST_INTERNAL_STEPS:
-        failure = refused_at_once(setting, parts, _order(system, experiment))
-        raise InputError(refused_at_start(setting) or failure)
+        why = f"step {setting.h:g} s needs {max(parts)} internal steps; raise h_max"
+        raise InputError(f"stopped at t = 0 s: {why}")
     # Where there is none it has no length, and is no step.
     last_parts = (
         splits(setting, stop - full * experiment.step) if experiment.has_short_step else parts
     )
-    plan = Plan(
+    plan = RunSteps(
         experiment.rows - 1,
         full,
         experiment.step,
@@ -186,11 +183,6 @@ def _is_parameter(system: System, name: PortName) -> bool:
     return bool(system.component(name.component).variable(name.port).causality == "parameter")
 
 
-def _order(system: System, experiment: Experiment) -> list[str]:
-    """The components in the order in which they are stepped."""
-    return [name for names in stages(system, experiment.order) for name in names]
-
-
 def _parameters(system: System) -> dict[PortName, object]:
     """All parameters of a system."""
     return {
@@ -201,7 +193,7 @@ def _parameters(system: System) -> dict[PortName, object]:
 
 
 def _end(job: _Job, stop_time: float) -> tuple[int, float, float]:
-    """Where the tally of a stop time ends, as :data:`.tally.END` has it.
+    """Where the accumulator of a stop time ends, as :data:`.accumulator.END` has it.
 
     Raises:
         InputError: the run has no row there.
@@ -220,7 +212,7 @@ def _end(job: _Job, stop_time: float) -> tuple[int, float, float]:
 
 
 def _made(
-    job: _Job, ends: np.ndarray, tallies: np.ndarray, rows: np.ndarray
+    job: _Job, ends: np.ndarray, accumulators: np.ndarray, rows: np.ndarray
 ) -> tuple[int, str | None]:
     """Make a run: how many steps were taken, and why there were no more.
 
@@ -231,30 +223,72 @@ def _made(
     progress = np.empty(1, int)
     # Where an equation raises, the compiled text says no more than that.
     with suppress(ArithmeticError):
-        _run(job, job.plan, ends, tallies, rows, progress)
+        _run(job, job.plan, ends, accumulators, rows, progress)
     made = int(progress[0])
     if made < 0:
-        raise InputError(refused_at_start(job.setting))
+        raise InputError(_start_failure(job.setting, job.plan))
     if made == job.plan.steps:
         return made, None
     # What the step that is refused begins with is what a shorter run ends with.
     shorter = job.plan._replace(steps=made)
-    moment = _run(job, shorter, ends[:0], tallies[:0], _NO_ROWS, progress)
-    return made, refused(job.setting, job.plan, made, moment, _order(job.system, job.experiment))
+    moment = _run(job, shorter, ends[:0], accumulators[:0], _NO_ROWS, progress)
+    return made, _step_failure(job.setting, job.plan, made, moment)
+
+
+def _start_failure(setting: Setting, plan: RunSteps) -> str:
+    """Why a run has no start."""
+    law = LAWS[type(setting.controller)]
+
+    def start() -> Moment:
+        # Noise is too small to make a difference.
+        moment = closed_loop.begin(setting, law, (0.0, 0.0, 0.0))
+        closed_loop.act(setting, law, moment, plan.h, plan.parts, plan.delayed)
+        return moment
+
+    return f"initialisation refused: {_why(start)}"
+
+
+def _step_failure(setting: Setting, plan: RunSteps, k: int, moment: Moment) -> str:
+    """Why step k of a run, from 0, cannot be taken from a moment."""
+    law = LAWS[type(setting.controller)]
+    h, parts, end = part_of(plan, k)
+
+    def step() -> Moment:
+        instant = closed_loop.act(setting, law, moment, h, parts, plan.delayed)
+        return closed_loop.step(setting, law, instant, h, parts, end, (0.0, 0.0, 0.0))
+
+    return f"stopped at t = {moment.t:.12g} s: {_why(step)}"
+
+
+def _why(take: Callable[[], Moment]) -> str:
+    """What an equation raises on the way to a moment, or else what is wrong with the moment."""
+    try:
+        moment = take()
+    except (ArithmeticError, ValueError) as error:
+        return f"{type(error).__name__}: {error}"
+    states = {
+        "plant": moment.vehicles.plant,
+        "planner": moment.vehicles.planner,
+        "controller": moment.controller_state,
+    }
+    for name, state in states.items():
+        if not is_bounded(state):
+            return f"{name}: the state is not finite, or beyond {LARGEST_STATE:g}"
+    return "an output is not finite"
 
 
 def _run(
     job: _Job,
-    plan: Plan,
+    plan: RunSteps,
     ends: np.ndarray,
-    tallies: np.ndarray,
+    accumulators: np.ndarray,
     rows: np.ndarray,
     progress: np.ndarray,
 ) -> Moment:
     """Call the kernel."""
     run = compiled(type(job.setting.controller))  # type: ignore[arg-type]
     uniform = _NOISE.uniform(job.setting.plant.noise.seed)
-    return run(job.setting, plan, uniform, ends, tallies, rows, progress)
+    return run(job.setting, plan, uniform, ends, accumulators, rows, progress)
 
 
 class _Noise(local):
@@ -274,7 +308,7 @@ _NOISE = _Noise()
 
 
 def _indices(job: _Job, end: np.void, found: np.void) -> dict[str, float]:
-    """The indices of a tally by their columns."""
+    """The indices of an accumulator by their columns."""
     steps, t = int(end["steps"]), job.experiment.time(int(end["steps"]))
     values: dict[str, float] = {}
     for index in INDICES:

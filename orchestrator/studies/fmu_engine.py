@@ -12,7 +12,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.machine.locks import process_folder
 from orchestrator.master.identity import code_of
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, chosen
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import planned
 from orchestrator.runs.preparation import Prepared
 from orchestrator.studies.engine import Outcome, Point
 from orchestrator.system.names import port_name
@@ -62,13 +62,8 @@ class FmuEngine:
             prepared.experiment, stop_time=run.stop_time, step=run.step, order=run.order
         )
         indices = Indices(loops_of(system))
-        ending = simulate(
-            system,
-            experiment,
-            [indices],
-            loop=chosen(self._loop, experiment),
-            hooks=prepared.hooks(),
-        )
+        plan, loop = planned(system, experiment), chosen(self._loop, experiment)
+        ending = replace(prepared, plan=plan, loop=loop).run([indices])
         if ending.signals:
             raise KeyboardInterrupt
         if ending.failure is not None:
@@ -99,7 +94,7 @@ class FmuEngine:
                 for part in prepared.system.components.values()
             }
             system = replace(prepared.system, components=components)
-            self._prepared[name] = replace(prepared, system=system)
+            self._prepared[name] = replace(prepared, plan=replace(prepared.plan, system=system))
 
 
 def _place(digest: str, content: bytes) -> Path:

@@ -13,8 +13,8 @@ import numpy as np
 from fmpy.model_description import ModelVariable
 
 from orchestrator.machine.errors import InputError, reason, shortened
-from orchestrator.runs.entries import is_finite
-from orchestrator.runs.preparation import Prepared, Request, prepare
+from orchestrator.runs.preparation import Prepared, prepare
+from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.engine import Point
 from orchestrator.studies.study import (
@@ -30,7 +30,7 @@ from orchestrator.studies.study import (
 )
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from orchestrator.system.values import Value, type_of, typed
+from orchestrator.system.values import Value, is_finite, type_of, typed
 from orchestrator.vehicle.indices import index_columns
 from orchestrator.vehicle.signals import loops_of
 
@@ -110,11 +110,16 @@ class Space:
             for varied, rate in study.stop_time.per.items()
         )
         values = {
-            port_name(target): value
+            target: value
             for target, value in {**self._constants, **point}.items()
             if target in self._has[name]
         }
-        request = Request(shortest, point.get(STEP, study.step), study.order, values)
+        request = Request(
+            parameters=values,
+            stop_time=shortest,
+            step=point.get(STEP, study.step),
+            order=study.order,
+        )
         prepared = prepare(scenario, system, request)
         for step in self._ends(STEP) if STEP in self.columns else ():
             replace(prepared.experiment, step=step)

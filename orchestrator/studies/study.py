@@ -3,29 +3,19 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from orchestrator.machine.errors import InputError, did_you_mean, shortened
-from orchestrator.machine.reading import explained, text_of
-from orchestrator.master.experiment import ORDERS
-from orchestrator.runs.entries import (
-    Entry,
-    are_names,
-    check_entries,
-    flattened,
-    is_finite,
-    is_table,
-    is_text,
-)
-from orchestrator.runs.named import names_in, path_of
+from orchestrator.machine.errors import Findings, InputError, did_you_mean
+from orchestrator.machine.user_files import explained, names_in, path_of, text_of
 from orchestrator.runs.preparation import is_path
-from orchestrator.system.names import file_name, port_name
+from orchestrator.system.names import file_name, flattened, port_name
+from orchestrator.system.values import is_finite
 
 #: Studies that come with the program.
 FOLDER = Path(__file__).parent / "ready"
@@ -39,16 +29,16 @@ SPACINGS = LINEAR, LOG = "linear", "log"
 #: How samples are drawn; the first is the default.
 METHODS = SOBOL, LATIN_HYPERCUBE, RANDOM = "sobol", "latin-hypercube", "random"
 
-#: More runs than this are taken for a mistake, and so are more values of one parameter.
-MOST_RUNS, _MOST_VALUES = 1_000_000_000, 1_000_000
-
-#: What the generators of random numbers take.
-_LARGEST_SEED = 2**63 - 1
+#: More runs than this are taken for a mistake.
+MOST_RUNS = 1_000_000_000
 
 #: What may vary beside parameters.
 STEP = "step"
 
-#: What a file is not that cannot be read.
+#: Entries that tell a study from a scenario.
+_OWN = {"scenario", "vary", "sample"}
+
+#: What a message calls a file that cannot be read.
 _WHAT = "not a study"
 
 
@@ -106,7 +96,7 @@ class StopTime(NamedTuple):
 
 @dataclass(frozen=True)
 class Study:
-    """What varies, and what is run; :data:`ENTRIES` says what each entry means.
+    """What varies, and what is run; :mod:`.study_file` says what each entry means.
 
     Attributes:
         name: of the file, without its ending.
@@ -138,101 +128,6 @@ class Study:
         return (*self.vary, *(self.sample.names if self.sample else ()))
 
 
-def _is_text_or_names(value: Any) -> bool:
-    return is_text(value) or (are_names(value) and bool(value))
-
-
-def _is_number_or_table(value: Any) -> bool:
-    return is_finite(value) or is_table(value)
-
-
-def _whole_number(least: int, most: int) -> Entry:
-    def fits(value: Any) -> bool:
-        return isinstance(value, int) and not isinstance(value, bool) and least <= value <= most
-
-    return Entry(f"whole number from {least} to {most:,}", fits, "", "")
-
-
-def _one_of(names: Sequence[str]) -> Entry:
-    kind = f"name out of {', '.join(names)}"
-    return Entry(kind, lambda value: value in names, "", names[0])
-
-
-#: What a study file may hold, in the order of the reference page.
-ENTRIES: dict[str, Entry] = {
-    "scenario": Entry(
-        "name, or list of names",
-        _is_text_or_names,
-        "What is run: a scenario of `auv-fmu list`, or the path of a .toml, .ssp, .ssd or .fmu "
-        "file, or of an OspSystemStructure.xml, relative to this one. Of several, each is run at "
-        "every point, with the parameters that it has.",
-        "",
-    ),
-    "title": Entry("text", is_text, "Heading of the figures.", "none"),
-    "remark": Entry(
-        "text", is_text, "What the report says below the figures, in Markdown.", "none"
-    ),
-    "engine": _one_of(ENGINES)._replace(
-        meaning="What makes the runs: the FMUs, or the equations compiled, which know the standard "
-        "closed loop alone and give the same numbers."
-    ),
-    "stop_time": Entry(
-        "number or table",
-        _is_number_or_table,
-        "End of each run [s]. As a table, `{ base = 60.0, per = { plant.eta0.z = 1.2 } }`, a sum "
-        "over values that vary.",
-        "the scenario's",
-    ),
-    "step": Entry("number", is_finite, "Communication step [s].", "the scenario's"),
-    "order": _one_of(ORDERS)._replace(
-        meaning="In which components are stepped.", default="the scenario's"
-    ),
-    "parameters": Entry(
-        "table of values", is_table, "Parameters of all runs, as in a scenario.", "the scenario's"
-    ),
-    "vary": Entry(
-        "table of lists and ranges",
-        is_table,
-        "Every combination of these values is run: `component.parameter = [values]`, or "
-        '`{ from = 1.0, to = 10.0, n = 7, spacing = "linear" }` (or `"log"`). `step` may vary, '
-        "too.",
-        "nothing",
-    ),
-    "sample": Entry(
-        "table",
-        is_table,
-        "Points drawn at random, at every combination of `vary`: `n` of them, by a `method` out "
-        f"of {', '.join(METHODS)}, with a `seed`, and under `[sample.range]` "
-        '`component.parameter = [low, high]` or `{ from = 1.0, to = 10.0, spacing = "log" }`. '
-        '`"|a, b, c|" = [low, high]` draws the norm of two or three numbers, and every direction '
-        "with the same chance.",
-        "none",
-    ),
-    "figures": Entry("table", is_table, "What is drawn: see below.", "what moves what"),
-}
-
-_RANGE = {
-    "from": Entry("number", is_finite, "", ""),
-    "to": Entry("number", is_finite, "", ""),
-    "spacing": _one_of(SPACINGS),
-}
-
-#: What a range under `vary` holds, and one under `sample.range`.
-_GRID = {**_RANGE, "n": _whole_number(1, _MOST_VALUES)}
-
-#: What `sample` holds, and a stop time that grows.
-_SAMPLE = {
-    "method": _one_of(METHODS),
-    "n": _whole_number(1, MOST_RUNS),
-    "seed": _whole_number(0, _LARGEST_SEED),
-    "range": Entry("table of ranges", is_table, "", ""),
-}
-_STOP_TIME = {
-    "base": Entry("number", is_finite, "", ""),
-    "per": Entry("table of numbers", is_table, "", ""),
-}
-
-
 def ready_studies() -> list[str]:
     """The studies that come with the program."""
     return names_in(FOLDER)
@@ -251,6 +146,15 @@ def read_study(name: str) -> Study:
         return study_of(path.stem, tomllib.loads(text), path)
 
 
+def is_study(path: str) -> bool:
+    """Whether a file is that of a study: a TOML file with a table or entry that no scenario has."""
+    if not path.endswith(".toml"):
+        return False
+    with suppress(InputError, ValueError, RecursionError):
+        return bool(_OWN & tomllib.loads(text_of(Path(path), _WHAT)).keys())
+    return False
+
+
 def study_of(name: str, content: Mapping[str, Any], path: Path | None = None) -> Study:
     """A study from what its file holds.
 
@@ -260,44 +164,49 @@ def study_of(name: str, content: Mapping[str, Any], path: Path | None = None) ->
         path: of the file; None: there is none.
 
     Raises:
-        InputError: there is a mistake in it.
+        Refused: there is a mistake in it.
 
     """
+    from orchestrator.studies.study_file import StudyFile  # noqa: PLC0415
+
     where = str(path or name)
-    check_entries(where, content, ENTRIES)
-    if "scenario" not in content:
-        raise InputError(f'{where}: names no scenario; write scenario = "fig5"')
+    StudyFile.check(where, content)
+    findings = Findings()
     entries = dict(content)
     names = content["scenario"]
     entries["scenario"] = tuple(
         str(path.parent / scenario) if path and is_path(scenario) else scenario
-        for scenario in ([names] if is_text(names) else names)
+        for scenario in ([names] if isinstance(names, str) else names)
     )
     entries["parameters"] = dict(flattened(content.get("parameters", {})))
-    entries["vary"] = {
-        key: _values(f"{where}: vary: {key}", value)
-        for key, value in flattened(content.get("vary", {}), _is_range)
-    }
+    entries["vary"] = {}
+    for key, value in flattened(content.get("vary", {}), _is_range):
+        with findings.collecting():
+            entries["vary"][key] = _values(f"{where}: vary: {key}", value)
     if "sample" in content:
-        entries["sample"] = _sample(f"{where}: sample", content["sample"])
+        with findings.collecting():
+            entries["sample"] = _sample(f"{where}: sample", content["sample"])
     if "stop_time" in content:
-        entries["stop_time"] = _stop_time(f"{where}: stop_time", content["stop_time"])
+        entries["stop_time"] = _stop_time(content["stop_time"])
+    findings.refuse()
     study = Study(name, **entries)
     _check_names(where, study)
     return study
 
 
 def _is_range(value: Any) -> bool:
-    return is_table(value) and bool({"from", "to"} & value.keys())
+    return isinstance(value, Mapping) and bool({"from", "to"} & value.keys())
 
 
 def _values(where: str, value: Any) -> tuple[Any, ...]:
     """The values of a list, or of a range under `vary`."""
+    from orchestrator.studies.study_file import GridTable  # noqa: PLC0415
+
     if isinstance(value, list) and value:
         return tuple(value)
     if not _is_range(value):
         raise InputError(f"{where}: write [values], or {{ from = 1.0, to = 10.0, n = 7 }}")
-    _check_whole(where, value, _GRID, ("from", "to", "n"))
+    GridTable.check(where, value)
     low, high, spacing = _range(where, value)
     between = np.geomspace if spacing == LOG else np.linspace
     return tuple(between(low, high, value["n"]).tolist())
@@ -316,62 +225,48 @@ def _range(where: str, value: Any) -> Range:
 
 
 def _sample(where: str, content: Mapping[str, Any]) -> Sample:
-    _check_whole(where, content, _SAMPLE, ("n", "range"))
-    ranges = {}
+    from orchestrator.studies.study_file import RangeTable  # noqa: PLC0415
+
+    findings, ranges = Findings(), {}
     for key, value in flattened(content["range"], _is_range):
-        if _is_range(value):
-            _check_whole(f"{where}: {key}", value, _RANGE, ("from", "to"))
-        ranges[key] = _range(f"{where}: {key}", value)
-        if key.startswith("|") and (
-            len(members(key)) not in (2, 3) or not key.endswith("|") or min(ranges[key][:2]) < 0.0
-        ):
-            raise InputError(f"{where}: {key}: a norm is of two or three numbers, and not negative")
+        with findings.collecting():
+            if _is_range(value):
+                RangeTable.check(f"{where}: {key}", value)
+            ranges[key] = _range(f"{where}: {key}", value)
+            if key.startswith("|") and not _is_norm(key, ranges[key]):
+                raise InputError(
+                    f"{where}: {key}: a norm is of two or three numbers, and not negative"
+                )
+    findings.refuse()
     if not ranges:
         raise InputError(f"{where}: draws nothing; name values under [sample.range]")
     return Sample(content["n"], ranges, content.get("method", METHODS[0]), content.get("seed", 0))
 
 
-def _stop_time(where: str, value: Any) -> StopTime:
-    if is_finite(value):
-        return StopTime(value, {})
-    _check_whole(where, value, _STOP_TIME, ("base", "per"))
-    rates = dict(flattened(value["per"]))
-    for name, rate in rates.items():
-        if not is_finite(rate):
-            raise InputError(
-                f"{where}: {name} = {shortened(repr(rate))}: not a number of seconds for each of it"
-            )
-    return StopTime(value["base"], rates)
+def _is_norm(key: str, limits: Range) -> bool:
+    return len(members(key)) in (2, 3) and key.endswith("|") and min(limits[:2]) >= 0.0
 
 
-def _check_whole(
-    where: str, content: Mapping[str, Any], entries: Mapping[str, Entry], needed: Sequence[str]
-) -> None:
-    check_entries(where, content, entries)
-    missing = [name for name in needed if name not in content]
-    if missing:
-        raise InputError(f"{where}: lacks {' and '.join(missing)}")
+def _stop_time(value: Any) -> StopTime:
+    if isinstance(value, Mapping):
+        return StopTime(value["base"], dict(flattened(value["per"])))
+    return StopTime(value, {})
 
 
 def _check_names(where: str, study: Study) -> None:
-    """Check that names are names, that none stands twice, and that what is summed varies."""
+    """Check that names are names, that none is given twice, and that what is summed varies."""
+    findings = Findings()
     stated = [*study.parameters, *([STEP] * (study.step is not None)), *study.varied]
     for name in stated:
         if name != STEP or name in study.parameters:
-            with _located(where):
+            try:
                 port_name(name)
+            except InputError as error:
+                findings.problem(f"{where}: {error}")
         if stated.count(name) > 1:
-            raise InputError(f"{where}: {name} is stated twice")
+            findings.problem(f"{where}: {name} is stated twice")
     for name in study.stop_time.per if study.stop_time else ():
         if name not in study.varied:
-            raise InputError(
-                f"{where}: stop_time: {name} does not vary{did_you_mean(name, study.varied)}"
-            )
-
-
-@contextmanager
-def _located(where: str) -> Iterator[None]:
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from error
+            hint = did_you_mean(name, study.varied)
+            findings.problem(f"{where}: stop_time: {name} does not vary{hint}")
+    findings.refuse()

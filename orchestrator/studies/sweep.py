@@ -11,18 +11,19 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from tqdm import tqdm
 
+from fmus.kinds import PYTHON
 from orchestrator.figures.study_figures import draw_figures, figure_files
 from orchestrator.machine.compiler import machines_compiler
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import PACKAGES, digest_of
 from orchestrator.master.loop import LOOPS
-from orchestrator.runs.bundle import PYTHON
 from orchestrator.runs.preparation import Prepared, loaded
+from orchestrator.runs.request import CliOption, Force, Kind, LoopName
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Engine
@@ -53,24 +54,31 @@ _NAMELESS = "study"
 
 @dataclass(frozen=True)
 class Means:
-    """How the runs of a study are made.
+    """How the runs of a study are made."""
 
-    Attributes:
-        engine: one of :data:`orchestrator.studies.study.ENGINES`; None: the study's own.
-        kind: of the bundle's FMUs.
-        loop: that makes their steps.
-        scheduler: address of a Dask scheduler; None: processes of this machine.
-        workers: how many of these; None: one for each core.
-        force: move aside files of the user's that are in the way.
-
-    """
-
-    engine: str | None = None
-    kind: str = PYTHON
-    loop: str = LOOPS[0]
-    scheduler: str | None = None
-    workers: int | None = None
-    force: bool = False
+    engine: Annotated[
+        str | None,
+        CliOption(
+            "that makes the runs: the FMUs, or the compiled equations, with the same numbers; "
+            "default: the study's own",
+            choices=ENGINES,
+        ),
+    ] = None
+    kind: Kind = PYTHON
+    loop: LoopName = LOOPS[0]
+    scheduler: Annotated[
+        str | None,
+        CliOption(
+            "of a Dask scheduler whose workers make the runs, for example tcp://10.0.0.1:8786; "
+            "default: processes on this machine",
+            metavar="ADDRESS",
+        ),
+    ] = None
+    workers: Annotated[
+        int | None,
+        CliOption("processes on this machine; default: its cores", type=int, metavar="N"),
+    ] = None
+    force: Force = False
 
 
 def sweep(

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
+from typing import Any
 
 from orchestrator.machine.errors import InputError
 
@@ -52,6 +53,25 @@ def splits(text: str) -> Iterator[tuple[str, str]]:
     while dot >= 0:
         yield text[:dot], text[dot + 1 :]
         dot = text.rfind(".", 0, dot)
+
+
+def flattened(
+    table: Mapping[str, Any], is_value: Callable[[Any], bool] = lambda _: False, prefix: str = ""
+) -> Iterator[tuple[str, Any]]:
+    """The values of a table by dotted names, whether its keys were quoted or dotted.
+
+    Args:
+        table: with tables in it.
+        is_value: whether a table in it is a value itself.
+        prefix: of all names.
+
+    """
+    for key, value in table.items():
+        name = f"{prefix}.{key}" if prefix else key
+        if isinstance(value, Mapping) and not is_value(value):
+            yield from flattened(value, is_value, name)
+        else:
+            yield name, value
 
 
 def file_name(name: str, taken: Collection[str] = ()) -> str:

@@ -234,21 +234,22 @@ class System:
             raise InputError(f"{source} -> {target}: units differ, {names}")
 
 
-def _check_transformed(connection: Connection, kind: str) -> None:
+def _check_transformed(connection: Connection, fmi_type: str) -> None:
     """Refuse to compute with what is no number, and to make fractions of what has none."""
     linear = isinstance(connection.transformation, Linear)
-    if kind == "String" or (linear and kind != "Real"):
+    if fmi_type == "String" or (linear and fmi_type != "Real"):
         how = "transformed linearly" if linear else "mapped"
         raise InputError(
-            f"{connection.source} -> {connection.target}: a value of type {kind} cannot be {how}"
+            f"{connection.source} -> {connection.target}: a value of type {fmi_type} cannot be "
+            f"{how}"
         )
     if isinstance(connection.transformation, Mapped):
         least, most = {"Real": (-float_info.max, float_info.max), "Boolean": (0, 1)}.get(
-            kind, INTEGERS
+            fmi_type, INTEGERS
         )
         for _, value in connection.transformation.pairs:
-            if not least <= value <= most or (kind != "Real" and value != int(value)):
+            if not least <= value <= most or (fmi_type != "Real" and value != int(value)):
                 raise InputError(
                     f"{connection.source} -> {connection.target}: is mapped to {value:.16g}, which "
-                    f"no {kind} of FMI can be"
+                    f"no {fmi_type} of FMI can be"
                 )

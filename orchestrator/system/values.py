@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable
 from math import isclose, isfinite
 from typing import TypeAlias
@@ -96,6 +97,13 @@ def finite(text: str, where: str) -> float:
     if not isfinite(number):
         raise ValueError(f"{where} {text[:40]!r} is not finite")
     return number
+
+
+def is_finite(value: object) -> bool:
+    """Whether it is a number that can be computed with: TOML has nan, inf, and endless integers."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= sys.float_info.max
 
 
 def _plain(text: str) -> str:

@@ -15,7 +15,7 @@ module                      what it states
 :mod:`.path_planner`        a reference through waypoints, not in the paper
 :mod:`.disturbance`         (56): friction, waves and currents
 :mod:`.saturation`          Definition 2: saturation functions, Lemma 1
-:mod:`.observer`            (18), (23), (24), (50), (51): the velocity observer
+:mod:`.observer`            (24), (51): the state of the velocity observer
 :mod:`.adaptation`          (22), (49), (58): bounding function, its adaptation, Lemma 2
 :mod:`.output_feedback`     (16) to (24), (48) to (51): the proposed controller
 :mod:`.pd`                  (57), (58): the PD controller it is compared with
@@ -23,7 +23,7 @@ module                      what it states
 :mod:`.euler`               section 4.1: Euler approximation and its time step
 :mod:`.proof`               what only the proof needs; never runs inside an FMU
 :mod:`.types`               names for the tuples
-:mod:`.vectors`             difference, distance and norm
+:mod:`.vectors`             sums, differences and products of three-vectors
 ==========================  ==========================================================
 
 The functions take and return Python floats and tuples and import nothing but the standard

@@ -6,6 +6,7 @@ from math import exp, expm1
 from typing import NamedTuple
 
 from auv_fmu.types import Vector3
+from auv_fmu.vectors import difference, scaled
 
 
 class Limits(NamedTuple):
@@ -97,9 +98,5 @@ def drive(before: Vector3, tau: Vector3, T: Vector3, h: float) -> Drive:
         mean_response(before[1], tau[1], T[1], h),
         mean_response(before[2], tau[2], T[2], h),
     )
-    middle = (
-        0.25 * (6.0 * mean[0] - first[0] - last[0]),
-        0.25 * (6.0 * mean[1] - first[1] - last[1]),
-        0.25 * (6.0 * mean[2] - first[2] - last[2]),
-    )
+    middle = scaled(0.25, difference(difference(scaled(6.0, mean), first), last))
     return Drive(first, middle, last, mean)

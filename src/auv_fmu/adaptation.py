@@ -37,10 +37,11 @@ def robust_force(rho_hat: float, r: Vector3, eps_t: float) -> Vector3:
         eps_t: width of the boundary layer [W].
 
     """
+    steepness = NU * rho_hat
     return (
-        rho_hat * tanh(NU * rho_hat * r[0] / eps_t),
-        rho_hat * tanh(NU * rho_hat * r[1] / eps_t),
-        rho_hat * tanh(NU * rho_hat * r[2] / eps_t),
+        rho_hat * tanh(steepness * r[0] / eps_t),
+        rho_hat * tanh(steepness * r[1] / eps_t),
+        rho_hat * tanh(steepness * r[2] / eps_t),
     )
 
 

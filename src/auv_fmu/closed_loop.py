@@ -21,6 +21,7 @@ from auv_fmu.types import Rotation, Vector3, Vector4, Vector6
 
 #: Before the first instant.
 _NO_COMMAND: Vector3 = (0.0, 0.0, 0.0)
+_UNDISTURBED: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class LongestSteps(NamedTuple):
@@ -85,7 +86,7 @@ class Scene(NamedTuple):
     tau_w: Vector6  #: disturbance (u, v, w, p, q, r) [N, N.m]
 
 
-def begin(setting: Setting) -> Vehicles:
+def vehicles_at_start(setting: Setting) -> Vehicles:
     """Both vehicles at the start."""
     state, rotation = plant.begin(setting.plant, _NO_COMMAND, setting.plant.current)
     planned, moving = motion_planner.begin(setting.planner)
@@ -143,6 +144,33 @@ def move(
     return Vehicles(state, rotation, planned, moving)
 
 
+class Moment(NamedTuple):
+    """All that the rest of a run depends on, at one time t_k."""
+
+    t: float  #: [s]
+    vehicles: Vehicles
+    scene: Scene
+    controller_state: Any
+    before: tuple[Vector3, Vector6]  #: command and disturbance of the step that ends there
+
+
+class Instant(NamedTuple):
+    """All signals of Fig. 2 at one time t_k."""
+
+    t: float  #: [s]
+    vehicles: Vehicles
+    scene: Scene
+    measured: Any  #: what the controller is told: Measurement or PdMeasurement
+    controller_state: Any  #: a ControllerState; of the PD controller theta_hat
+    signals: Any  #: Signals or PdSignals
+    command: Vector3  #: (tau_u, tau_q, tau_r) as it reaches the actuators [N, N.m]
+    tau: Vector3  #: what the limits of (3) leave of it [N, N.m]
+    tau_w: Vector6  #: disturbance that acts (u, v, w, p, q, r) [N, N.m]
+
+
+# The controllers in the loop
+
+
 def measurement(seen: Scene) -> Measurement:
     """What the proposed controller is told."""
     y_d, dy_d, ddy_d = seen.reference
@@ -155,18 +183,16 @@ def start(gains: Gains, measured: Measurement) -> ControllerState:
 
 
 def command(
-    gains: Gains, state: ControllerState, measured: Measurement
+    gains: Gains, state: ControllerState, measured: Measurement, h: float
 ) -> tuple[ControllerState, Signals]:
     """What the proposed controller goes on from at an instant, and its signals."""
     state = output_feedback.gated(gains, state, measured.y)
-    return state, output_feedback.evaluate(gains, state, measured)
+    return state, output_feedback.evaluate(gains, state, measured, h)
 
 
-def estimates(
-    state: ControllerState, signals: Signals, measured: Measurement
-) -> tuple[Vector3, Vector4]:
+def estimates(instant: Instant) -> tuple[Vector3, Vector4]:
     """Velocity and parameters that the proposed controller goes by: dy_hat and theta_hat."""
-    return signals.dy_hat, state.theta_hat
+    return instant.signals.dy_hat, instant.controller_state.theta_hat
 
 
 def pd_measurement(seen: Scene) -> PdMeasurement:
@@ -175,65 +201,104 @@ def pd_measurement(seen: Scene) -> PdMeasurement:
     return PdMeasurement(seen.y, seen.plant.euler, y_d, dy_d, ddy_d, seen.plant.dy)
 
 
-def pd_sampled(gains: PdGains, h: float) -> PdGains:
-    """Gains of the PD controller for steps of h seconds."""
-    return gains
-
-
 def pd_start(gains: PdGains, measured: PdMeasurement) -> Vector4:
     """State of the PD controller at the start."""
     return gains.theta_0
 
 
 def pd_command(
-    gains: PdGains, theta_hat: Vector4, measured: PdMeasurement
+    gains: PdGains, theta_hat: Vector4, measured: PdMeasurement, h: float
 ) -> tuple[Vector4, PdSignals]:
     """What the PD controller goes on from at an instant, and its signals."""
     return theta_hat, pd.evaluate(gains, theta_hat, measured)
 
 
-def pd_estimates(
-    theta_hat: Vector4, signals: PdSignals, measured: PdMeasurement
-) -> tuple[Vector3, Vector4]:
+def pd_estimates(instant: Instant) -> tuple[Vector3, Vector4]:
     """Velocity and parameters that the PD controller goes by; it is told the velocity."""
-    return measured.dy, theta_hat
+    return instant.scene.plant.dy, instant.controller_state
 
 
 class Law(NamedTuple):
     """A controller in the loop: what it is told, how it starts, what it commands, how it goes on.
 
-    All but the first are given the gains of a step, which the second makes of those that are set.
     What it goes by is what it has estimated, or been told.
     """
 
     measurement: Callable[[Scene], Any]
-    sampled: Callable[[Any, float], Any]
     start: Callable[[Any, Any], Any]
-    command: Callable[[Any, Any, Any], tuple[Any, Any]]
+    command: Callable[[Any, Any, Any, float], tuple[Any, Any]]
     steps: Callable[[Any, Any, Any, Any, float, int], Any]
-    estimates: Callable[[Any, Any, Any], tuple[Vector3, Vector4]]
+    estimates: Callable[[Instant], tuple[Vector3, Vector4]]
 
 
 #: The controller that goes with a set of gains.
 LAWS: dict[type, Law] = {
-    Gains: Law(
-        measurement, output_feedback.sampled, start, command, output_feedback.steps, estimates
-    ),
-    PdGains: Law(pd_measurement, pd_sampled, pd_start, pd_command, pd.steps, pd_estimates),
+    Gains: Law(measurement, start, command, output_feedback.steps, estimates),
+    PdGains: Law(pd_measurement, pd_start, pd_command, pd.steps, pd_estimates),
 }
 
 
-class Instant(NamedTuple):
-    """All signals of Fig. 2 at one time t_k."""
+# The loop
 
-    t: float  #: [s]
-    vehicles: Vehicles
-    scene: Scene
-    controller_state: ControllerState | Vector4  #: of the PD controller theta_hat
-    signals: Signals | PdSignals
-    command: Vector3  #: (tau_u, tau_q, tau_r) as it reaches the actuators [N, N.m]
-    tau: Vector3  #: what the limits of (3) leave of it [N, N.m]
-    tau_w: Vector6  #: disturbance that acts (u, v, w, p, q, r) [N, N.m]
+
+def begin(setting: Setting, law: Law, n: Vector3) -> Moment:
+    """The start.
+
+    Args:
+        setting: of the loop.
+        law: its controller.
+        n: three independent standard normal numbers.
+
+    """
+    vehicles = vehicles_at_start(setting)
+    seen = scene(setting, vehicles, 0.0, n)
+    state = law.start(setting.controller, law.measurement(seen))
+    return Moment(0.0, vehicles, seen, state, (_NO_COMMAND, _UNDISTURBED))
+
+
+def act(
+    setting: Setting, law: Law, moment: Moment, h: float, parts: Splits, delayed: bool
+) -> Instant:
+    """All signals at a moment, from which a step begins.
+
+    Args:
+        setting: of the loop.
+        law: its controller.
+        moment: of the loop.
+        h: the step [s].
+        parts: that it is split into.
+        delayed: the command and the disturbance act one step late, as in Jacobi order (reading 5).
+
+    """
+    seen, gains, h_c = moment.scene, setting.controller, h / parts.controller
+    measured = law.measurement(seen)
+    state, signals = law.command(gains, moment.controller_state, measured, h_c)
+    now = signals.tau, seen.tau_w
+    told, tau_w = moment.before if delayed and moment.t > 0.0 else now
+    tau = plant.applied(setting.plant, told)
+    return Instant(moment.t, moment.vehicles, seen, measured, state, signals, told, tau, tau_w)
+
+
+def step(
+    setting: Setting, law: Law, instant: Instant, h: float, parts: Splits, end: float, n: Vector3
+) -> Moment:
+    """All states advance together (reading 5).
+
+    Args:
+        setting: of the loop.
+        law: its controller.
+        instant: that the step begins with.
+        h: step [s].
+        parts: that it is split into.
+        end: time at its end [s].
+        n: three independent standard normal numbers, for what is measured then.
+
+    """
+    gains, signals, n_c = setting.controller, instant.signals, parts.controller
+    state = law.steps(gains, instant.controller_state, signals, instant.measured, h / n_c, n_c)
+    vehicles = move(setting, instant.vehicles, instant.tau, instant.tau_w, h, parts)
+    now = signals.tau, instant.scene.tau_w
+    return Moment(end, vehicles, scene(setting, vehicles, end, n), state, now)
 
 
 def closed_loop(count: int, setting: Setting = PAPER, delayed: bool = False) -> Iterator[Instant]:
@@ -242,30 +307,17 @@ def closed_loop(count: int, setting: Setting = PAPER, delayed: bool = False) -> 
     Args:
         count: steps to take.
         setting: of the loop.
-        delayed: the command and the disturbance act one step late, as in Jacobi order (reading 5).
+        delayed: as for :func:`act`.
 
     Yields:
         The instants t_0 = 0 to t_count, one more than steps.
 
     """
-    law, h = LAWS[type(setting.controller)], setting.h
+    law, h, parts = LAWS[type(setting.controller)], setting.h, splits(setting, setting.h)
     gauss = plant.white_noise(setting.plant.noise.seed).gauss
-    parts = splits(setting, h)
-    gains = law.sampled(setting.controller, h / parts.controller)
-    vehicles = begin(setting)
-    before = None
+    moment = begin(setting, law, (gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)))
     for k in range(count + 1):
+        instant = act(setting, law, moment, h, parts, delayed)
+        yield instant
         n = gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)
-        seen = scene(setting, vehicles, k * h, n)
-        measured = law.measurement(seen)
-        if k == 0:
-            control = law.start(gains, measured)
-        control, signals = law.command(gains, control, measured)
-        now = signals.tau, seen.tau_w
-        told, tau_w = before if before and delayed else now
-        before = now
-        tau = plant.applied(setting.plant, told)
-        yield Instant(k * h, vehicles, seen, control, signals, told, tau, tau_w)
-        n_c = parts.controller
-        control = law.steps(gains, control, signals, measured, h / n_c, n_c)
-        vehicles = move(setting, vehicles, tau, tau_w, h, parts)
+        moment = step(setting, law, instant, h, parts, (k + 1) * h, n)

@@ -7,8 +7,9 @@ at zero roll. Written with the full R the same three lines hold for a vehicle th
 
 from __future__ import annotations
 
-from auv_fmu.attitude import rotate
+from auv_fmu.attitude import rotate, rotate_back
 from auv_fmu.types import Rotation, Vector3, Vector6
+from auv_fmu.vectors import plus_scaled, scaled
 
 #: Distance of the control point from the centre of mass in section 4.1 [m].
 ELL = 0.35
@@ -26,12 +27,7 @@ def control_point(position: Vector3, rotation: Rotation, ell: float) -> Vector3:
         Control point (x, y, z) [m], earth frame.
 
     """
-    e1 = rotation[0]
-    return (
-        position[0] + ell * e1[0],
-        position[1] + ell * e1[1],
-        position[2] + ell * e1[2],
-    )
+    return plus_scaled(position, ell, rotation[0])
 
 
 def control_point_velocity(rotation: Rotation, nu: Vector6, ell: float) -> Vector3:
@@ -54,11 +50,7 @@ def control_point_velocity(rotation: Rotation, nu: Vector6, ell: float) -> Vecto
 def jacobian(rotation: Rotation, ell: float) -> tuple[Vector3, Vector3, Vector3]:
     """J(eta) of (11) as its columns, for (u, q, r)."""
     e1, e2, e3 = rotation
-    return (
-        e1,
-        (-ell * e3[0], -ell * e3[1], -ell * e3[2]),
-        (ell * e2[0], ell * e2[1], ell * e2[2]),
-    )
+    return e1, scaled(-ell, e3), scaled(ell, e2)
 
 
 def actuator_command(rotation: Rotation, force: Vector3, ell: float) -> Vector3:
@@ -73,13 +65,8 @@ def actuator_command(rotation: Rotation, force: Vector3, ell: float) -> Vector3:
         (tau_u [N], tau_q [N.m], tau_r [N.m]).
 
     """
-    e1, e2, e3 = rotation
-    f0, f1, f2 = force
-    return (
-        e1[0] * f0 + e1[1] * f1 + e1[2] * f2,
-        -ell * (e3[0] * f0 + e3[1] * f1 + e3[2] * f2),
-        ell * (e2[0] * f0 + e2[1] * f1 + e2[2] * f2),
-    )
+    f_1, f_2, f_3 = rotate_back(rotation, force)  # the columns of J are those of R
+    return f_1, -ell * f_3, ell * f_2
 
 
 def actuated_velocity(
@@ -99,10 +86,5 @@ def actuated_velocity(
         (u [m/s], q [rad/s], r [rad/s]).
 
     """
-    e1, e2, e3 = rotation
-    d0, d1, d2 = dy
-    return (
-        e1[0] * d0 + e1[1] * d1 + e1[2] * d2,
-        (w[1] - (e3[0] * d0 + e3[1] * d1 + e3[2] * d2)) / ell,
-        ((e2[0] * d0 + e2[1] * d1 + e2[2] * d2) - w[0]) / ell,
-    )
+    d_1, d_2, d_3 = rotate_back(rotation, dy)
+    return d_1, (w[1] - d_3) / ell, (d_2 - w[0]) / ell

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import ceil
 
-from auv_fmu.types import Vector3, Vector4
+from auv_fmu.types import Vector4
 
 #: The time step h of section 4.1 [s].
 STEP = 0.02
@@ -45,15 +45,8 @@ def internal_steps(h: float, longest: float) -> int:
     return ceil(h / longest)
 
 
-def advance(x: Vector3, dx: Vector3, h: float) -> Vector3:
-    """x + h dx: one step of a state whose rate is dx."""
-    x_1, x_2, x_3 = x
-    dx_1, dx_2, dx_3 = dx
-    return x_1 + h * dx_1, x_2 + h * dx_2, x_3 + h * dx_3
-
-
 def advance_4(x: Vector4, dx: Vector4, h: float) -> Vector4:
-    """The same for a state of four components."""
+    """x + h dx: one step of a state of four components whose rate is dx."""
     x_1, x_2, x_3, x_4 = x
     dx_1, dx_2, dx_3, dx_4 = dx
     return x_1 + h * dx_1, x_2 + h * dx_2, x_3 + h * dx_3, x_4 + h * dx_4

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from auv_fmu.attitude import rotate, rotation_from_euler
 from auv_fmu.control_point import ELL, control_point, control_point_velocity
 from auv_fmu.types import Rotation, Vector3, Vector5
+from auv_fmu.vectors import plus_scaled
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 
 #: Driving force and moments (u, q, r) of section 4.1 [N, N.m]; they make the reference a helix.
@@ -106,12 +107,11 @@ def step(state: PlannerState, moving: Motion, h: float) -> PlannerState:
         h: step [s].
 
     """
-    (x, y, z), theta, psi, (u, v, w, q, r) = state
+    position, theta, psi, (u, v, w, q, r) = state
     rotation, (du, dv, dw, dq, dr) = moving
-    dx, dy, dz = rotate(rotation, (u, v, w))
     dtheta, dpsi = euler_rates(theta, q, r)
     return PlannerState(
-        (x + h * dx, y + h * dy, z + h * dz),
+        plus_scaled(position, h, rotate(rotation, (u, v, w))),
         theta + h * dtheta,
         psi + h * dpsi,
         (u + h * du, v + h * dv, w + h * dw, q + h * dq, r + h * dr),

@@ -1,8 +1,8 @@
-"""The saturated velocity observer: equations (18), (23) and (24), or (50) and (51).
+"""The state of the saturated velocity observer: equation (24), or (51), in three forms.
 
 The paper has two signals of almost the same name (reading 15): the state dy_hat_o of (23) and
-(24), and dy_o of (18), which the control law and the proof use. They differ by k_d z. Every
-function here has the name of the signal that it states; ddy_hat_o is the rate of dy_hat_o.
+(24), and dy_o of (18), which the control law and the proof use. They differ by k_d z. (18) and (23)
+stand in :func:`.output_feedback.evaluate`.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from math import expm1
 
 from auv_fmu.types import Vector3
+from auv_fmu.vectors import plus_scaled, scaled, total
 
 #: A form of the observer as a value: which one of these.
 Form = int
@@ -27,83 +28,16 @@ INTEGRAL: Form = 2
 FORMS: dict[str, Form] = {"euler": EULER, "exact": EXACT, "integral": INTEGRAL}
 
 
-def dy_hat(dy_hat_o: Vector3, s_z: Vector3, z: Vector3, lambda_: float, k_d: float) -> Vector3:
-    """dy_hat = dy_hat_o + Lambda s(z) + k_d z: equations (23) and (50).
+def gain(form: Form, k_d: float, h: float) -> float:
+    """The observer gain of a step [1/s]: k_d, or :func:`exact_gain` where that is the form.
 
     Args:
-        dy_hat_o: state of the observer [m/s].
-        s_z: s(z) of the estimation error.
-        z: estimation error y - y_hat [m].
-        lambda_: diagonal entry of Lambda [m/s].
+        form: of the observer.
         k_d: observer gain [1/s].
-
-    Returns:
-        Estimated velocity of the control point [m/s], the rate of y_hat.
+        h: step [s]; 0: there is none, as at the start.
 
     """
-    return (
-        dy_hat_o[0] + lambda_ * s_z[0] + k_d * z[0],
-        dy_hat_o[1] + lambda_ * s_z[1] + k_d * z[1],
-        dy_hat_o[2] + lambda_ * s_z[2] + k_d * z[2],
-    )
-
-
-def dy_o(dy_hat: Vector3, s_z: Vector3, lambda_: float) -> Vector3:
-    """dy_o = dy_hat - Lambda s(z) [m/s]: equation (18).
-
-    Args:
-        dy_hat: estimated velocity (23) [m/s].
-        s_z: s(z) of the estimation error.
-        lambda_: diagonal entry of Lambda [m/s].
-
-    """
-    return (
-        dy_hat[0] - lambda_ * s_z[0],
-        dy_hat[1] - lambda_ * s_z[1],
-        dy_hat[2] - lambda_ * s_z[2],
-    )
-
-
-def ddy_hat_o(ddy_r: Vector3, s_z: Vector3, lambda_: float, k_d: float) -> Vector3:
-    """ddy_hat_o = ddy_r + k_d Lambda s(z) [m/s2]: equation (51), the rate of (24) (reading 4).
-
-    Args:
-        ddy_r: acceleration of the virtual reference [m/s2].
-        s_z: s(z) of the estimation error.
-        lambda_: diagonal entry of Lambda [m/s].
-        k_d: observer gain [1/s].
-
-    """
-    return (
-        ddy_r[0] + k_d * lambda_ * s_z[0],
-        ddy_r[1] + k_d * lambda_ * s_z[1],
-        ddy_r[2] + k_d * lambda_ * s_z[2],
-    )
-
-
-def integrated(dy_r: Vector3, integral: Vector3) -> Vector3:
-    """dy_hat_o = dy_r + k_d Lambda int s(z) [m/s]: equation (24) as it is printed.
-
-    It contradicts the initial condition below it, unless dy_r(0) = 0.
-
-    Args:
-        dy_r: velocity of the virtual reference (16) [m/s].
-        integral: k_d Lambda times the integral of s(z) [m/s].
-
-    """
-    return dy_r[0] + integral[0], dy_r[1] + integral[1], dy_r[2] + integral[2]
-
-
-def integrand(s_z: Vector3, lambda_: float, k_d: float) -> Vector3:
-    """k_d Lambda s(z) [m/s2]: what (24) integrates.
-
-    Args:
-        s_z: s(z) of the estimation error.
-        lambda_: diagonal entry of Lambda [m/s].
-        k_d: observer gain [1/s].
-
-    """
-    return k_d * lambda_ * s_z[0], k_d * lambda_ * s_z[1], k_d * lambda_ * s_z[2]
+    return exact_gain(k_d, h) if form == EXACT and h else k_d
 
 
 def exact_gain(k_d: float, h: float) -> float:
@@ -127,8 +61,37 @@ def initial_dy_hat_o(s_z: Vector3, z: Vector3, lambda_: float, k_d: float) -> Ve
 
     With it the first velocity estimate (23) is zero.
     """
-    return (
-        -(lambda_ * s_z[0] + k_d * z[0]),
-        -(lambda_ * s_z[1] + k_d * z[1]),
-        -(lambda_ * s_z[2] + k_d * z[2]),
-    )
+    return scaled(-1.0, plus_scaled(scaled(lambda_, s_z), k_d, z))
+
+
+def dy_hat_o(form: Form, state: Vector3, dy_r: Vector3) -> Vector3:
+    """dy_hat_o [m/s] of (23): the state, whose rate is (51), or (24) as it is printed.
+
+    (24) is dy_hat_o = dy_r + k_d Lambda int s(z), and the state is its second term. This
+    contradicts the initial condition below it, unless dy_r(0) = 0.
+
+    Args:
+        form: of the observer.
+        state: of the observer [m/s].
+        dy_r: velocity of the virtual reference (16) [m/s].
+
+    """
+    return total(dy_r, state) if form == INTEGRAL else state
+
+
+def rate(form: Form, ddy_r: Vector3, s_z: Vector3, lambda_: float, k_d: float) -> Vector3:
+    """The rate of the state [m/s2]: equation (51), which is the rate of (24) (reading 4).
+
+    (51) is ddy_hat_o = ddy_r + k_d Lambda s(z); the integral in (24) grows by its second term.
+
+    Args:
+        form: of the observer.
+        ddy_r: acceleration of the virtual reference [m/s2].
+        s_z: s(z) of the estimation error.
+        lambda_: diagonal entry of Lambda [m/s].
+        k_d: observer gain [1/s].
+
+    """
+    if form == INTEGRAL:
+        return scaled(k_d * lambda_, s_z)
+    return plus_scaled(ddy_r, k_d * lambda_, s_z)

@@ -13,11 +13,20 @@ from auv_fmu import observer
 from auv_fmu.adaptation import bound, regressor, robust_force, theta_hat_rate
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import ELL, actuator_command
-from auv_fmu.euler import advance, advance_4
-from auv_fmu.observer import EULER, EXACT, INTEGRAL, Form
-from auv_fmu.saturation import TANH, Saturation, saturation
+from auv_fmu.euler import advance_4
+from auv_fmu.observer import EULER, Form
+from auv_fmu.saturation import TANH, Saturation, saturation, slope
 from auv_fmu.types import Vector3, Vector4
-from auv_fmu.vectors import difference, distance, norm
+from auv_fmu.vectors import (
+    difference,
+    distance,
+    minus_product,
+    minus_scaled,
+    minus_times,
+    norm,
+    plus_scaled,
+    scaled,
+)
 
 
 class Gains(NamedTuple):
@@ -71,8 +80,7 @@ def initial_state(gains: Gains, y: Vector3) -> ControllerState:
     """The initial conditions below (24): y_hat(0) = y(0), and theta_hat(0) = theta_0."""
     y_hat = y
     z = difference(y, y_hat)
-    s_z, _ = saturation(gains.s, z)
-    dy_hat_o = observer.initial_dy_hat_o(s_z, z, gains.lambda_, gains.k_d)
+    dy_hat_o = observer.initial_dy_hat_o(saturation(gains.s, z), z, gains.lambda_, gains.k_d)
     return ControllerState(y_hat, dy_hat_o, gains.theta_0)
 
 
@@ -111,141 +119,41 @@ def gated(gains: Gains, state: ControllerState, y: Vector3) -> ControllerState:
     return state if credible(gains, state, y) else restarted(gains, state, y)
 
 
-def sampled(gains: Gains, h: float) -> Gains:
-    """The gains of a step: where the form of the observer is `exact`, k_d follows from the step.
-
-    Args:
-        gains: of the controller.
-        h: step [s].
-
-    """
-    if gains.form != EXACT:
-        return gains
-    return Gains(
-        gains.K1,
-        gains.K2,
-        gains.lambda_,
-        observer.exact_gain(gains.k_d, h),
-        gains.gamma,
-        gains.sigma,
-        gains.theta_0,
-        gains.eps_t,
-        gains.ell,
-        gains.s,
-        gains.printed_jacobian,
-        gains.innovation_gate,
-        gains.form,
-    )
-
-
-def virtual_velocity(dy_d: Vector3, s_ez: Vector3, lambda_: float) -> Vector3:
-    """dy_r = dy_d - Lambda s(e - z) [m/s]: equation (16).
-
-    Args:
-        dy_d: velocity of the reference [m/s].
-        s_ez: s(e - z), where e - z = y_hat - y_d.
-        lambda_: diagonal entry of Lambda [m/s].
-
-    """
-    return (
-        dy_d[0] - lambda_ * s_ez[0],
-        dy_d[1] - lambda_ * s_ez[1],
-        dy_d[2] - lambda_ * s_ez[2],
-    )
-
-
-def virtual_acceleration(
-    ddy_d: Vector3, dy_d: Vector3, dy_hat: Vector3, slope_ez: Vector3, lambda_: float
-) -> Vector3:
-    """ddy_r = ddy_d - Lambda S'(y_hat - y_d) (dy_hat - dy_d) [m/s2]: Remark 3.
-
-    Args:
-        ddy_d, dy_d: derivatives of the reference [m/s2, m/s].
-        dy_hat: estimated velocity (23) [m/s].
-        slope_ez: diagonal of S'(e - z).
-        lambda_: diagonal entry of Lambda [m/s].
-
-    """
-    return (
-        ddy_d[0] - lambda_ * slope_ez[0] * (dy_hat[0] - dy_d[0]),
-        ddy_d[1] - lambda_ * slope_ez[1] * (dy_hat[1] - dy_d[1]),
-        ddy_d[2] - lambda_ * slope_ez[2] * (dy_hat[2] - dy_d[2]),
-    )
-
-
-def estimated_error_sum(
-    dy_hat: Vector3, dy_d: Vector3, s_ez: Vector3, s_z: Vector3, lambda_: float
-) -> Vector3:
-    """r_hat_1 + r_hat_2 = dy_hat - dy_d + Lambda s(y_hat - y_d) + Lambda s(z) [m/s], below (21).
-
-    (17) and (19) with the estimated in place of the true velocity, added up.
-
-    Args:
-        dy_hat: estimated velocity (23) [m/s].
-        dy_d: velocity of the reference [m/s].
-        s_ez, s_z: s(e - z) and s(z).
-        lambda_: diagonal entry of Lambda [m/s].
-
-    """
-    return (
-        dy_hat[0] - dy_d[0] + lambda_ * s_ez[0] + lambda_ * s_z[0],
-        dy_hat[1] - dy_d[1] + lambda_ * s_ez[1] + lambda_ * s_z[1],
-        dy_hat[2] - dy_d[2] + lambda_ * s_ez[2] + lambda_ * s_z[2],
-    )
-
-
-def control_force(
-    s_dy: Vector3, s_ez: Vector3, s_z: Vector3, robust: Vector3, K1: Vector3, K2: Vector3
-) -> Vector3:
-    """F [N] at the control point, earth frame: the bracket of (21) and (48).
-
-    Args:
-        s_dy: s(dy_o - dy_r).
-        s_ez, s_z: s(e - z) and s(z).
-        robust: the last term, :func:`.robust_force` [N].
-        K1, K2: diagonals of K_1 and K_2 [N].
-
-    """
-    return (
-        -K1[0] * s_dy[0] - K2[0] * s_ez[0] - K2[0] * s_z[0] - robust[0],
-        -K1[1] * s_dy[1] - K2[1] * s_ez[1] - K2[1] * s_z[1] - robust[1],
-        -K1[2] * s_dy[2] - K2[2] * s_ez[2] - K2[2] * s_z[2] - robust[2],
-    )
-
-
-def evaluate(gains: Gains, state: ControllerState, measurement: Measurement) -> Signals:
+def evaluate(gains: Gains, state: ControllerState, measurement: Measurement, h: float) -> Signals:
     """The control law at one instant: (16) to (24), or (48) to (51).
 
     Args:
-        gains: of the controller, :func:`sampled` for the step that begins there.
+        gains: of the controller.
         state: of observer and adaptive law.
         measurement: at the same instant.
+        h: step that begins there, which the gain of an `exact` observer follows from [s].
 
     """
     K1, K2, lambda_, k_d, gamma, sigma, theta_0, eps_t, ell, s, printed_jacobian, _, form = gains
     y, (phi, theta, psi), y_d, dy_d, ddy_d = measurement
     y_hat, dy_hat_o, theta_hat = state
+    k_d = observer.gain(form, k_d, h)
     e, z = difference(y, y_d), difference(y, y_hat)  # above (16)
-    s_z, _ = saturation(s, z)
-    s_ez, slope_ez = saturation(s, difference(y_hat, y_d))  # e - z = y_hat - y_d
-    dy_r = virtual_velocity(dy_d, s_ez, lambda_)  # (16)
-    if form == INTEGRAL:
-        dy_hat_o = observer.integrated(dy_r, dy_hat_o)  # (24) as printed
-    dy_hat = observer.dy_hat(dy_hat_o, s_z, z, lambda_, k_d)  # (23)
-    dy_o = observer.dy_o(dy_hat, s_z, lambda_)  # (18)
-    ddy_r = virtual_acceleration(ddy_d, dy_d, dy_hat, slope_ez, lambda_)  # Remark 3
-    r_hat_sum = estimated_error_sum(dy_hat, dy_d, s_ez, s_z, lambda_)  # below (21)
+    e_z = difference(y_hat, y_d)  # e - z
+    s_z, s_ez = saturation(s, z), saturation(s, e_z)
+    dy_r = minus_scaled(dy_d, lambda_, s_ez)  # (16): dy_d - Lambda s(e - z)
+    dy_hat_o = observer.dy_hat_o(form, dy_hat_o, dy_r)  # (24)
+    dy_hat = plus_scaled(plus_scaled(dy_hat_o, lambda_, s_z), k_d, z)  # (23)
+    dy_o = minus_scaled(dy_hat, lambda_, s_z)  # (18): dy_hat - Lambda s(z)
+    de = difference(dy_hat, dy_d)
+    ddy_r = minus_times(ddy_d, scaled(lambda_, slope(s, e_z, s_ez)), de)  # Remark 3
+    r_hat_sum = plus_scaled(plus_scaled(de, lambda_, s_ez), lambda_, s_z)  # below (21)
     G = regressor(dy_r, ddy_r)  # below (20)
     rho_hat = bound(G, theta_hat)  # below (21)
-    s_dy, _ = saturation(s, difference(dy_o, dy_r))
     robust = robust_force(rho_hat, r_hat_sum, eps_t)  # last term of (21)
-    F = control_force(s_dy, s_ez, s_z, robust, K1, K2)  # bracket of (21)
+    s_dy = saturation(s, difference(dy_o, dy_r))
+    # Bracket of (21): F = -K_1 s(dy_o - dy_r) - K_2 s(e - z) - K_2 s(z) - robust
+    F = minus_times(minus_times(minus_product(K1, s_dy), K2, s_ez), K2, s_z)
+    F = difference(F, robust)
     rotation = rotation_from_euler(0.0 if printed_jacobian else phi, theta, psi)  # reading 3
     tau = actuator_command(rotation, F, ell)  # (21), J^T F
     dtheta_hat = theta_hat_rate(G, norm(r_hat_sum), theta_hat, theta_0, gamma, sigma)  # (22)
-    ddy_hat_o = observer.ddy_hat_o(ddy_r, s_z, lambda_, k_d)  # (51), for (24): reading 4
-    if form == INTEGRAL:
-        ddy_hat_o = observer.integrand(s_z, lambda_, k_d)  # (24) as printed
+    ddy_hat_o = observer.rate(form, ddy_r, s_z, lambda_, k_d)  # (51), for (24): reading 4
     return Signals(tau, dy_hat, e, z, ddy_hat_o, dtheta_hat)
 
 
@@ -260,8 +168,8 @@ def step(state: ControllerState, signals: Signals, h: float) -> ControllerState:
     """
     y_hat, dy_hat_o, theta_hat = state
     return ControllerState(
-        advance(y_hat, signals.dy_hat, h),
-        advance(dy_hat_o, signals.ddy_hat_o, h),
+        plus_scaled(y_hat, h, signals.dy_hat),
+        plus_scaled(dy_hat_o, h, signals.ddy_hat_o),
         advance_4(theta_hat, signals.dtheta_hat, h),
     )
 
@@ -286,6 +194,6 @@ def steps(
     """
     state = step(state, signals, h)
     while n > 1:
-        state = step(state, evaluate(gains, state, measurement), h)
+        state = step(state, evaluate(gains, state, measurement, h), h)
         n -= 1
     return state

@@ -32,10 +32,9 @@ from typing import NamedTuple
 
 from auv_fmu.actuators import Limits
 from auv_fmu.control_point import ELL
-from auv_fmu.euler import advance
 from auv_fmu.motion_planner import STEEPEST, Reference
 from auv_fmu.types import Vector3, Vector5, Vector32
-from auv_fmu.vectors import difference, distance, norm
+from auv_fmu.vectors import difference, distance, norm, plus_scaled
 from auv_fmu.vehicle import Vehicle
 
 #: Most waypoints of a path, as many as a Vector32 holds; and those that the default leaves over.
@@ -179,14 +178,14 @@ def reference(waypoints: Waypoints, corner: Corner, t: float) -> Reference:
     T = waypoints.rounding
     k = corner.k if corner.k < waypoints.n else waypoints.n - 1
     v = velocity(waypoints, corner.k)
-    y_d, dy_d, ddy_d = advance(waypoint(waypoints, k), v, t - corner.t), v, _AT_REST
+    y_d, dy_d, ddy_d = plus_scaled(waypoint(waypoints, k), t - corner.t, v), v, _AT_REST
     while corner.k < waypoints.n and corner.t - T / 2 < t:
         a = (t - corner.t) / T + 0.5
         v_next = velocity(waypoints, corner.k + 1)
         jump = difference(v_next, v)
-        y_d = advance(y_d, jump, T * a * a * a * (1.0 - a / 2))
-        dy_d = advance(dy_d, jump, a * a * (3.0 - 2 * a))
-        ddy_d = advance(ddy_d, jump, 6 * a * (1.0 - a) / T)
+        y_d = plus_scaled(y_d, T * a * a * a * (1.0 - a / 2), jump)
+        dy_d = plus_scaled(dy_d, a * a * (3.0 - 2 * a), jump)
+        ddy_d = plus_scaled(ddy_d, 6 * a * (1.0 - a) / T, jump)
         corner = next_corner(waypoints, corner)
         v = v_next
     return Reference(y_d, dy_d, ddy_d)
@@ -223,7 +222,7 @@ def posture(y_d: Vector3, along: Vector3, ell: float) -> Vector5:
 
     """
     dx, dy, dz = along
-    x, y, z = advance(y_d, along, -ell / norm(along))
+    x, y, z = plus_scaled(y_d, -ell / norm(along), along)
     return x, y, z, atan2(-dz, sqrt(dx * dx + dy * dy)), atan2(dy, dx)
 
 
@@ -405,7 +404,7 @@ def _is_never_steep(early: Reference, late: Reference, duration: float, fastest:
 
     """
     a, d = early.dy_d, late.dy_d
-    b, c = advance(a, early.ddy_d, duration / 3), advance(d, late.ddy_d, -duration / 3)
+    b, c = plus_scaled(a, duration / 3, early.ddy_d), plus_scaled(d, -duration / 3, late.ddy_d)
     return (
         _steepness(a, a, fastest) <= 0.0
         and _steepness(a, b, fastest) <= 0.0

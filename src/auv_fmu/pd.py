@@ -9,7 +9,7 @@ from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import ELL, actuator_command
 from auv_fmu.euler import advance_4
 from auv_fmu.types import Vector3, Vector4
-from auv_fmu.vectors import difference, norm
+from auv_fmu.vectors import difference, minus_product, norm, plus_scaled
 
 
 class PdGains(NamedTuple):
@@ -44,34 +44,6 @@ class PdSignals(NamedTuple):
     dtheta_hat: Vector4  #: rate of theta_hat
 
 
-def filtered_error(dy: Vector3, dy_d: Vector3, e: Vector3, lambda_: float) -> Vector3:
-    """r = de + Lambda e [m/s] with de = dy - dy_d, below (57).
-
-    Args:
-        dy, dy_d: true and desired velocity of the control point [m/s].
-        e: tracking error [m].
-        lambda_: diagonal entry of Lambda [1/s].
-
-    """
-    return (
-        dy[0] - dy_d[0] + lambda_ * e[0],
-        dy[1] - dy_d[1] + lambda_ * e[1],
-        dy[2] - dy_d[2] + lambda_ * e[2],
-    )
-
-
-def control_force(r: Vector3, robust: Vector3, K1: Vector3) -> Vector3:
-    """F [N] at the control point, earth frame: the bracket of (57).
-
-    Args:
-        r: filtered error [m/s].
-        robust: the last term, :func:`.robust_force` [N].
-        K1: diagonal of K_1 [kg/s].
-
-    """
-    return -K1[0] * r[0] - robust[0], -K1[1] * r[1] - robust[1], -K1[2] * r[2] - robust[2]
-
-
 def evaluate(gains: PdGains, theta_hat: Vector4, measurement: PdMeasurement) -> PdSignals:
     """The control law (57) and the rate of its parameters (58).
 
@@ -84,10 +56,10 @@ def evaluate(gains: PdGains, theta_hat: Vector4, measurement: PdMeasurement) -> 
     K1, lambda_, gamma, sigma, theta_0, eps_t, ell, printed_jacobian = gains
     y, (phi, theta, psi), y_d, dy_d, ddy_d, dy = measurement
     e = difference(y, y_d)
-    r = filtered_error(dy, dy_d, e, lambda_)  # below (57)
+    r = plus_scaled(difference(dy, dy_d), lambda_, e)  # below (57): de + Lambda e
     G = regressor(dy_d, ddy_d)  # below (57)
     rho_hat = bound(G, theta_hat)  # below (57)
-    F = control_force(r, robust_force(rho_hat, r, eps_t), K1)  # bracket of (57)
+    F = difference(minus_product(K1, r), robust_force(rho_hat, r, eps_t))  # bracket of (57)
     rotation = rotation_from_euler(0.0 if printed_jacobian else phi, theta, psi)
     tau = actuator_command(rotation, F, ell)  # (57), J^T F
     dtheta_hat = theta_hat_rate(G, norm(r), theta_hat, theta_0, gamma, sigma)  # (58)

@@ -25,7 +25,7 @@ from auv_fmu.attitude import (
 )
 from auv_fmu.control_point import ELL, control_point, control_point_velocity
 from auv_fmu.types import Rotation, Vector3, Vector4, Vector6
-from auv_fmu.vectors import difference
+from auv_fmu.vectors import difference, is_zero, plus_scaled, total
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 
 #: Initial posture of section 4.1: x, y, z [m], phi, theta, psi [rad]; it does not give phi.
@@ -121,6 +121,8 @@ def over_ground(nu_r: Vector6, rotation: Rotation, water: Vector3) -> Vector6:
         water: velocity of the water [m/s], earth frame.
 
     """
+    if is_zero(water):
+        return nu_r
     u, v, w, p, q, r = nu_r
     u_c, v_c, w_c = rotate_back(rotation, water)
     return u + u_c, v + v_c, w + w_c, p, q, r
@@ -139,8 +141,7 @@ def immersed(state: PlantState, rotation: Rotation, water: Vector3) -> PlantStat
 
     """
     change = difference(state.water, water)
-    c_x, c_y, c_z = change
-    if not (c_x or c_y or c_z):
+    if is_zero(change):
         return state
     nu_r = over_ground(state.nu_r, rotation, change)
     return PlantState(state.position, state.quaternion, nu_r, state.tau, water)
@@ -211,9 +212,8 @@ def rates(
     _, quaternion, nu_r, _, water = state
     u, v, w, p, q, r = nu_r
     velocity = rotate(rotation, (u, v, w))
-    c_x, c_y, c_z = water
-    if c_x or c_y or c_z:
-        velocity = velocity[0] + c_x, velocity[1] + c_y, velocity[2] + c_z
+    if not is_zero(water):
+        velocity = total(velocity, water)
     dnu = accelerations_6dof(vehicle, roll, nu_r, rotation, tau, tau_w)
     if roll.rolls:
         return Rates(velocity, quaternion_rates(quaternion, (p, q, r)), dnu)
@@ -236,9 +236,9 @@ def moved(
         h: time [s].
 
     """
-    (x, y, z), (a, b, c, d), (u, v, w, p, q, r), _, water = state
-    (dx, dy, dz), (da, db, dc, dd), (du, dv, dw, dp, dq, dr) = rate
-    position = x + h * dx, y + h * dy, z + h * dz
+    _, (a, b, c, d), (u, v, w, p, q, r), _, water = state
+    _, (da, db, dc, dd), (du, dv, dw, dp, dq, dr) = rate
+    position = plus_scaled(state.position, h, rate.position)
     nu = u + h * du, v + h * dv, w + h * dw, p + h * dp, q + h * dq, r + h * dr
     if roll.rolls:
         attitude = normalised((a + h * da, b + h * db, c + h * dc, d + h * dd))
@@ -345,8 +345,7 @@ def begin(parameters: Parameters, tau: Vector3, water: Vector3) -> tuple[PlantSt
 
 def flow(parameters: Parameters, water: Vector3) -> Vector3:
     """Velocity of the water: the parameter `current` and what is told beside it [m/s]."""
-    c_x, c_y, c_z = parameters.current
-    return c_x + water[0], c_y + water[1], c_z + water[2]
+    return total(parameters.current, water)
 
 
 def applied(parameters: Parameters, tau: Vector3) -> Vector3:
@@ -376,11 +375,11 @@ def steps(
         n: how many.
 
     """
-    T_u, T_q, T_r = parameters.T
+    lags = not is_zero(parameters.T)
     acting = Drive(tau, tau, tau, tau)
     state = immersed(state, rotation, water)
     while n > 0:
-        if T_u or T_q or T_r:
+        if lags:
             acting = drive(state.tau, tau, parameters.T, h)
         if parameters.integrator == RK4:
             state = step_rk4(parameters, state, rotation, acting, tau_w, h)
@@ -402,15 +401,9 @@ def outputs(state: PlantState, rotation: Rotation, ell: float, rolls: bool) -> P
 
     """
     position, _, nu_r, _, water = state
-    nu = nu_r
-    c_x, c_y, c_z = water
-    if c_x or c_y or c_z:
-        nu = over_ground(nu_r, rotation, water)
-    euler = euler_from_rotation(rotation)
-    if not rolls:
-        euler = euler_without_roll(rotation)
+    nu = over_ground(nu_r, rotation, water)
     return PlantOutputs(
-        euler,
+        euler_from_rotation(rotation) if rolls else euler_without_roll(rotation),
         control_point(position, rotation, ell),
         control_point_velocity(rotation, nu, ell),
         nu,
@@ -437,4 +430,4 @@ def measure(y: Vector3, n: Vector3, std: float) -> Vector3:
         std: standard deviation of each axis [m]; not in the paper (reading 7).
 
     """
-    return y[0] + std * n[0], y[1] + std * n[1], y[2] + std * n[2]
+    return plus_scaled(y, std, n)

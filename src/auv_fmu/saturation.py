@@ -1,7 +1,6 @@
 """Saturation functions: Definition 2, the subject of Lemma 1 and Theorem 2.
 
-As in section 2.1 and above Theorem 2 they act on vectors, component by component. Each returns
-its value and its slope together, because Remark 3 needs both.
+As in section 2.1 and above Theorem 2 they act on vectors, component by component.
 """
 
 from __future__ import annotations
@@ -13,11 +12,11 @@ from auv_fmu.types import Vector3
 #: A saturation function as a value: which one of this module it is.
 Saturation = int
 
-#: Those named in the paper.
+#: Those named in the paper: tanh(xi), and xi / sqrt(1 + xi^2).
 TANH: Saturation = 0
 ALGEBRAIC: Saturation = 1
 
-#: One more, whose slope is another: Theorem 2 weighs K_1 with it.
+#: One more, (2 / pi) atan(xi), whose slope is another: Theorem 2 weighs K_1 with it.
 ARCTAN: Saturation = 2
 
 #: All by the names users select them with.
@@ -33,44 +32,33 @@ MAXIMUM_SLOPE: dict[str, float] = {"tanh": 1.0, "algebraic": 1.0, "arctan": _SCA
 _LARGE = 1e9
 
 
-def saturation(s: Saturation, xi: Vector3) -> tuple[Vector3, Vector3]:
-    """s(xi) and the diagonal of S'(xi), for the saturation function s."""
+def saturation(s: Saturation, xi: Vector3) -> Vector3:
+    """s(xi), for the saturation function s: M = 1 for each of them."""
     if s == TANH:
-        return hyperbolic_tangent(xi)
+        return tanh(xi[0]), tanh(xi[1]), tanh(xi[2])
     if s == ALGEBRAIC:
-        return algebraic(xi)
-    return arc_tangent(xi)
+        return xi[0] / root(xi[0]), xi[1] / root(xi[1]), xi[2] / root(xi[2])
+    return _SCALE * atan(xi[0]), _SCALE * atan(xi[1]), _SCALE * atan(xi[2])
 
 
-def hyperbolic_tangent(xi: Vector3) -> tuple[Vector3, Vector3]:
-    """Tanh(xi) and the diagonal of Sech^2(xi): M = 1, s'_M = 1."""
-    s_1, s_2, s_3 = tanh(xi[0]), tanh(xi[1]), tanh(xi[2])
-    return (s_1, s_2, s_3), (1.0 - s_1 * s_1, 1.0 - s_2 * s_2, 1.0 - s_3 * s_3)
+def slope(s: Saturation, xi: Vector3, s_xi: Vector3) -> Vector3:
+    """The diagonal of S'(xi): Sech^2(xi), (1 + xi_i^2)^(-3/2), or (2 / pi) / (1 + xi_i^2).
 
+    Args:
+        s: the saturation function.
+        xi: its argument.
+        s_xi: s(xi).
 
-def algebraic(xi: Vector3) -> tuple[Vector3, Vector3]:
-    """xi_i / sqrt(1 + xi_i^2) and its slopes (1 + xi_i^2)^(-3/2): M = 1, s'_M = 1."""
-    root_1, root_2, root_3 = root(xi[0]), root(xi[1]), root(xi[2])
+    """
+    if s == TANH:
+        return 1.0 - s_xi[0] * s_xi[0], 1.0 - s_xi[1] * s_xi[1], 1.0 - s_xi[2] * s_xi[2]
+    if s == ALGEBRAIC:
+        r_1, r_2, r_3 = root(xi[0]), root(xi[1]), root(xi[2])
+        return 1.0 / (r_1 * r_1 * r_1), 1.0 / (r_2 * r_2 * r_2), 1.0 / (r_3 * r_3 * r_3)
     return (
-        (xi[0] / root_1, xi[1] / root_2, xi[2] / root_3),
-        (
-            1.0 / (root_1 * root_1 * root_1),
-            1.0 / (root_2 * root_2 * root_2),
-            1.0 / (root_3 * root_3 * root_3),
-        ),
-    )
-
-
-def arc_tangent(xi: Vector3) -> tuple[Vector3, Vector3]:
-    """(2 / pi) atan(xi_i) and its slopes (2 / pi) / (1 + xi_i^2): M = 1, s'_M = 2 / pi."""
-    xi_1, xi_2, xi_3 = xi
-    return (
-        (_SCALE * atan(xi_1), _SCALE * atan(xi_2), _SCALE * atan(xi_3)),
-        (
-            _SCALE / (1.0 + xi_1 * xi_1),
-            _SCALE / (1.0 + xi_2 * xi_2),
-            _SCALE / (1.0 + xi_3 * xi_3),
-        ),
+        _SCALE / (1.0 + xi[0] * xi[0]),
+        _SCALE / (1.0 + xi[1] * xi[1]),
+        _SCALE / (1.0 + xi[2] * xi[2]),
     )
 
 

@@ -1,4 +1,7 @@
-"""The little algebra of vectors that the equations need."""
+"""The little algebra of vectors that the equations need.
+
+Matrices of gains are diagonal: a diagonal matrix is given as its diagonal, a Vector3.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,44 @@ from math import sqrt
 from auv_fmu.types import Vector3
 
 
+def total(a: Vector3, b: Vector3) -> Vector3:
+    """The vector a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
 def difference(a: Vector3, b: Vector3) -> Vector3:
     """The vector a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def scaled(k: float, a: Vector3) -> Vector3:
+    """The vector k a."""
+    return k * a[0], k * a[1], k * a[2]
+
+
+def plus_scaled(a: Vector3, k: float, b: Vector3) -> Vector3:
+    """The vector a + k b."""
+    return a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]
+
+
+def minus_scaled(a: Vector3, k: float, b: Vector3) -> Vector3:
+    """The vector a - k b."""
+    return a[0] - k * b[0], a[1] - k * b[1], a[2] - k * b[2]
+
+
+def minus_times(a: Vector3, D: Vector3, b: Vector3) -> Vector3:
+    """The vector a - D b, with a diagonal matrix D."""
+    return a[0] - D[0] * b[0], a[1] - D[1] * b[1], a[2] - D[2] * b[2]
+
+
+def minus_product(D: Vector3, a: Vector3) -> Vector3:
+    """The vector -D a, with a diagonal matrix D."""
+    return -D[0] * a[0], -D[1] * a[1], -D[2] * a[2]
+
+
+def is_zero(a: Vector3) -> bool:
+    """Whether all components are zero."""
+    return not (a[0] or a[1] or a[2])
 
 
 def distance(a: Vector3, b: Vector3) -> float:
@@ -18,7 +56,7 @@ def distance(a: Vector3, b: Vector3) -> float:
     return sqrt(x * x + y * y + z * z)
 
 
-def norm(x: Vector3) -> float:
+def norm(a: Vector3) -> float:
     """Euclidean norm."""
-    a, b, c = x
-    return sqrt(a * a + b * b + c * c)
+    x, y, z = a
+    return sqrt(x * x + y * y + z * z)

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import re
-from runpy import run_path
+from importlib import import_module
 
 import pytest
 from PIL import Image
 
-from orchestrator.studies.ready_page import PICTURES, ready_page
 from orchestrator.studies.study import read_study, ready_studies
 from orchestrator.vehicle.indices import index_columns
+from pages import PICTURES
 from support.markdown import DOCS
 
 PAGE = DOCS / "ready-studies.md"
-
-
-def test_page_is_what_the_files_say():
-    assert ready_page() == PAGE.read_text(encoding="utf-8"), "run `auv-fmu docs`"
 
 
 def test_every_picture_is_on_the_page_in_all_its_colours_and_small():
@@ -34,15 +30,15 @@ def test_every_picture_is_on_the_page_in_all_its_colours_and_small():
 def test_numbers_are_read_off_columns_that_runs_have(name):
     pandas = pytest.importorskip("pandas", reason="needs the extra `docs`")
     pytest.importorskip("scipy", reason="needs the extra `studies`")
-    tool = run_path(str(DOCS.parent / "tools" / "study_numbers.py"))
+    tool = import_module("study_numbers")
     study = read_study(name)
     row = dict.fromkeys((*study.varied, *index_columns()), 1.0) | {
         "scenario": "fig5",
         "failure": "",
     }
     row |= {key: values[0] for key, values in study.vary.items()}
-    runs = tool["prepared"](name, pandas.DataFrame([{"run": 0, **row}]))
-    for statistic, columns, by, where in map(tool["parsed"], tool["lines_of"](name)):
-        assert statistic in tool["STATISTICS"]
+    runs = tool.prepared(name, pandas.DataFrame([{"run": 0, **row}]))
+    for statistic, columns, by, where in map(tool.parsed, tool.lines_of(name)):
+        assert statistic in tool.STATISTICS
         assert {column.removeprefix("tenth_") for column in (*columns, *by)} <= {*runs}
         assert not where or runs.query(where) is not None

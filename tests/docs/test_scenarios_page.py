@@ -7,21 +7,10 @@ import json
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.runs.scenario_page import scenario_page
 from support.markdown import DOCS, blocks
 
 PAGE = DOCS / "scenarios.md"
 EXAMPLES = [block.text for block in blocks(PAGE, "toml")]
-
-
-def test_page_is_what_the_declarations_say():
-    assert scenario_page() == PAGE.read_text(encoding="utf-8"), "run `auv-fmu docs`"
-
-
-def test_docs_writes_the_page_and_those_of_the_components(tmp_path):
-    assert main(["docs", "--out", str(tmp_path)]) == 0
-    written = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.md")}
-    assert {"scenarios.md", "paper.md", "components/AuvPlant.md"} <= written
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=range(len(EXAMPLES)))

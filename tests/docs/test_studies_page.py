@@ -13,7 +13,6 @@ from orchestrator.runs.preparation import loaded
 from orchestrator.studies.figure_entries import read_figures
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import ready_studies, study_of
-from orchestrator.studies.study_page import study_page
 from orchestrator.vehicle.indices import index_columns
 from support.markdown import DOCS, blocks
 
@@ -24,10 +23,6 @@ needs_extra = pytest.mark.skipif(
     not all(map(find_spec, ("distributed", "pyarrow", "scipy"))),
     reason="needs the extra `studies`",
 )
-
-
-def test_page_is_what_the_declarations_say():
-    assert study_page() == TEXT, "run `auv-fmu docs`"
 
 
 def test_page_names_all_columns_options_and_ready_studies():

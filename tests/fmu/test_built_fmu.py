@@ -22,7 +22,8 @@ from fmpy.validation import validate_fmu
 
 import auv_fmu
 import fmus
-from support.instances import NAMES, WITH_INPUTS, FmuInstance, unpacked
+from support.instances import FmuInstance, unpacked
+from support.settings import NAMES, WITH_INPUTS
 
 each = pytest.mark.parametrize("name", NAMES)
 
@@ -242,7 +243,7 @@ def test_process_with_an_instance_ends_in_peace(dist: Path, tmp_path: Path):
 def build(folder: Path, packages: Path) -> None:
     """Build all FMUs from the sources in a folder, in a process of its own."""
     subprocess.run(
-        [sys.executable, "-m", "fmus.packaging.build", "--out", str(folder)],
+        [sys.executable, "-m", "fmus.build", "--out", str(folder)],
         env={"PYTHONPATH": str(packages), "PYTHONHASHSEED": "random", "PATH": os.environ["PATH"]},
         check=True,
         capture_output=True,

@@ -22,8 +22,8 @@ from typing import Any
 import fmpy
 import pytest
 
-from fmus.packaging.loader import compiler
-from fmus.packaging.own import build_own
+from fmus.python.loader import compiler
+from fmus.python.own import build_own
 from support.kinds import FIXTURES
 from support.raw_fmi import (
     DISCARD,

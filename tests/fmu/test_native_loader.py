@@ -11,10 +11,11 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.packaging.loader import FLAGS, FOLDER, compiler
-from fmus.packaging.own import build_own
+from fmus.python.loader import FLAGS, FOLDER, compiler
+from fmus.python.own import build_own
 from orchestrator.runs import bundle
-from support.instances import NAMES
+from support.settings import NAMES
+from support.tiers import slow
 
 LIBPYTHON = Path(
     str(sysconfig.get_config_var("LIBDIR")), str(sysconfig.get_config_var("INSTSONAME"))
@@ -85,7 +86,7 @@ def with_libpython(tmp_path: Path) -> Path:
 def test_all_fmus_run_side_by_side_in_a_c_host(dist: Path, tmp_path: Path, with_libpython: Path):
     """1,000 steps each, state saved, serialised and restored bit for bit, all freed, status 0."""
     process = run(with_libpython, *unpacked(dist, tmp_path))
-    assert process.stdout.endswith("6 FMUs, 1000 steps each\n")
+    assert process.stdout.endswith(f"{len(NAMES)} FMUs, 1000 steps each\n")
     assert process.returncode == 0, process.stderr
 
 
@@ -184,7 +185,7 @@ def test_libpython_without_its_standard_library_does_not_end_the_host(dist, tmp_
 
 
 @needs_libpython
-@pytest.mark.parametrize("count", [2, 16])
+@pytest.mark.parametrize("count", [2, *slow(16)])
 def test_threads_that_instantiate_at_the_same_moment(dist: Path, tmp_path: Path, count: int):
     """One interpreter starts, whoever comes first, and all go by the same sys.path."""
     host = compiled_host(tmp_path, *FINDS_LIBPYTHON, name="threads")
@@ -288,6 +289,7 @@ def test_what_a_slave_prints_is_there_when_the_host_ends(tmp_path: Path):
     assert process.returncode == 0
 
 
+@pytest.mark.slow
 @needs_libpython
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")
 def test_valgrind_finds_no_error_of_the_loader(dist: Path, tmp_path: Path, with_libpython: Path):
@@ -304,6 +306,7 @@ def test_valgrind_finds_no_error_of_the_loader(dist: Path, tmp_path: Path, with_
     assert errors == []
 
 
+@pytest.mark.slow
 @needs_libpython
 @pytest.mark.parametrize("name", ["ObserverController", "MotionPlanner"])
 def test_sanitizers_find_nothing_whatever_a_host_calls(dist: Path, tmp_path: Path, name: str):

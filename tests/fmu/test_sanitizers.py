@@ -8,10 +8,13 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from support.instances import NAMES
 from support.sanitizers import GCC, MEMORY, THREADS, sanitize, sanitized_host
+from support.settings import NAMES
 
-pytestmark = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(GCC is None, reason="gcc is not installed"),
+]
 
 #: Calls of a host that makes them at random, and how often it starts anew.
 CALLS, SEEDS = 5_000, range(2)
@@ -45,7 +48,9 @@ def fmus(native: Path, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 def test_nothing_is_wrong_and_nothing_stays_of_a_run_side_by_side(fmus, tmp_path: Path):
     """With states that are saved, serialised, restored and freed."""
-    assert said_by(sanitized_host("host", tmp_path), *fmus).endswith("6 FMUs, 1000 steps each\n")
+    assert said_by(sanitized_host("host", tmp_path), *fmus).endswith(
+        f"{len(NAMES)} FMUs, 1000 steps each\n"
+    )
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -64,6 +69,6 @@ def test_nothing_stays_of_a_logger_that_does_not_come_back(fmus: list[str], tmp_
 def test_threads_do_not_touch_the_same(native: Path, tmp_path: Path):
     """Each FMU in a thread, and each library in four."""
     fmus, host = sanitized(native, tmp_path, THREADS), sanitized_host("threads", tmp_path, THREADS)
-    assert said_by(host, *fmus) == "6 threads\n"
+    assert said_by(host, *fmus) == f"{len(NAMES)} threads\n"
     for place in range(0, len(fmus), 2):
         assert said_by(host, *fmus[place : place + 2] * 4) == "4 threads\n"

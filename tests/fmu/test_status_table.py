@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from functools import cache
 from itertools import product
 from pathlib import Path
 
@@ -11,8 +13,9 @@ import pytest
 
 from orchestrator.runs import bundle
 from support.calls import CASES, MODEL_EXCHANGE_FUNCTIONS
-from support.instances import NAMES
+from support.cells import has_call
 from support.kinds import FIXTURES
+from support.settings import NAMES, REPRESENTATIVES
 from support.status_table import (
     CREATION,
     ERROR,
@@ -22,7 +25,7 @@ from support.status_table import (
     without_an_instance,
     without_the_loader,
 )
-from support.trials import SKIPPED, Cell, trials
+from support.trials import Cell, trials
 from support.worker import Lost, Worker
 
 #: Longest time for a trial, on a slow machine [s].
@@ -47,6 +50,9 @@ OF_THE_SLAVE = {
     and not (rows()[key].cells[state].answer.fails and rows()[key].is_unsound)
 }
 
+#: With ports of most types.
+PLAIN = "ObserverController"
+
 
 def unpacked(fmus: Path, folder: Path, *names: str) -> list[Path]:
     for name in names:
@@ -54,46 +60,64 @@ def unpacked(fmus: Path, folder: Path, *names: str) -> list[Path]:
     return [folder / name for name in names]
 
 
-@pytest.fixture(scope="module", params=product(FIXTURES, NAMES), ids="-".join)
-def worker(
+#: Kinds, components, and the cells that they have.
+ALL = [
+    pytest.param(
+        kind,
+        name,
+        cell,
+        id=f"{kind}-{name}-{cell}",
+        marks=() if name in REPRESENTATIVES else pytest.mark.slow,
+    )
+    for kind, name in product(FIXTURES, NAMES)
+    for cell, (key, state) in CELLS.items()
+    if not state or has_call(name, key)
+]
+
+
+@pytest.fixture(scope="module")
+def workers(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Worker[Cell, str]]:
-    """A process that tries cells on one of the FMUs, of one of the kinds."""
-    kind, name = request.param
-    another = NAMES[NAMES.index(name) - 1]
-    fmus = request.getfixturevalue(FIXTURES[kind])
-    folders = unpacked(fmus, tmp_path_factory.mktemp("status"), name, another)
-    with Worker(trials, *folders, kind) as process:
-        yield process
+) -> Iterator[Callable[[str, str], Worker[Cell, str]]]:
+    """Processes that try cells, one for each kind and component."""
+    with ExitStack() as stack:
+
+        @cache
+        def worker(kind: str, name: str) -> Worker[Cell, str]:
+            another = NAMES[NAMES.index(name) - 1]
+            fmus = request.getfixturevalue(FIXTURES[kind])
+            folders = unpacked(fmus, tmp_path_factory.mktemp("status"), name, another)
+            return stack.enter_context(Worker(trials, *folders, kind))
+
+        yield worker
 
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Worker[Cell, str]]:
-    """The same for the FMU with ports of most types, without the native loader."""
+    """The same for an FMU without the native loader."""
     folder = tmp_path_factory.mktemp("plain")
     bundle.build(folder, "plain")
-    with Worker(trials, *unpacked(folder, folder, "ObserverController", "AuvPlant")) as process:
+    with Worker(trials, *unpacked(folder, folder, PLAIN, "AuvPlant")) as process:
         yield process
 
 
 def hold(worker: Worker[Cell, str], cell: Cell) -> None:
     wrong = worker.ask(cell, PATIENCE)
     assert not isinstance(wrong, Lost), f"the process is lost: {wrong.why}"
-    if wrong == SKIPPED:
-        pytest.skip("this FMU has no such port")
     assert wrong == ""
 
 
-@pytest.mark.parametrize("cell", CELLS)
-def test_cell(worker: Worker[Cell, str], cell: str):
-    hold(worker, CELLS[cell])
+@pytest.mark.parametrize(("kind", "name", "cell"), ALL)
+def test_cell(workers: Callable[[str, str], Worker[Cell, str]], kind: str, name: str, cell: str):
+    hold(workers(kind, name), CELLS[cell])
 
 
-@pytest.mark.parametrize("cell", OF_THE_SLAVE)
+@pytest.mark.parametrize("cell", [c for c in OF_THE_SLAVE if has_call(PLAIN, OF_THE_SLAVE[c][0])])
 def test_cell_of_a_plain_fmu(plain: Worker[Cell, str], cell: str):
     hold(plain, OF_THE_SLAVE[cell])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", without_the_loader(), ids=": ".join)
 def test_what_is_said_of_a_plain_fmu(plain: Worker[Cell, str], key: tuple[str, str]):
     wrong = plain.ask((key, "stepping"), PATIENCE)

@@ -15,19 +15,17 @@ import fmpy
 import numpy as np
 import pytest
 
-from fmus.packaging.compilers import FLAGS
-from fmus.packaging.platforms import TARGETS
+from fmus.compilers import FLAGS
+from fmus.kinds import TARGETS
 from orchestrator.exchange import c_host
 from orchestrator.exchange.verify import verify
 from orchestrator.machine.compiler import machines_compiler
 from orchestrator.master.experiment import Experiment
 from orchestrator.runs import bundle
-from orchestrator.runs.scenario import read_scenario
-from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import Component
 from orchestrator.system.structure import System
-from support.instances import NAMES
-from support.runs import run
+from support.runs import run, system_of
+from support.settings import NAMES
 
 #: Both controllers, so that all FMUs of the paper are run.
 SCENARIOS = ("fig4", "fig5-pd")
@@ -50,10 +48,6 @@ def in_root() -> list[str]:
     if subprocess.run([*command, "/", "true"], capture_output=True, check=False).returncode != 0:
         pytest.skip("the root folder may not be changed here")
     return command
-
-
-def system_of(folder: Path, scenario: str) -> System:
-    return closed_loop(folder, read_scenario(scenario))
 
 
 def symbols(library: Path, option: str) -> set[str]:
@@ -159,6 +153,7 @@ def arm(unpacked: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @needs_zig
 @pytest.mark.skipif(WINE is None, reason="there is no wine")
 @each_scenario
@@ -170,6 +165,7 @@ def test_windows_gives_the_same_but_for_rounding(native: Path, windows: Path, sc
     np.testing.assert_allclose(there, here, rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.slow
 @needs_zig
 @pytest.mark.skipif(QEMU is None, reason="there is no qemu-aarch64")
 @pytest.mark.skipif(not ARM_LIBRARIES.is_dir(), reason="there is no C library for ARM")
@@ -181,6 +177,7 @@ def test_arm_gives_the_same_bit_for_bit(native: Path, arm: Path, scenario: str):
     np.testing.assert_array_equal(there, here)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CMAKE is None, reason="there is no cmake")
 @each_scenario
 def test_fmpy_builds_the_same_from_the_sources_alone(native: Path, tmp_path: Path, scenario: str):

@@ -8,8 +8,9 @@ from random import Random
 
 from fuzz.model import Model, keep
 from fuzz.player import FREE, GOOD, MAKE, Action, Calls
-from support.calls import CASES, NO_START, OVERFLOWING, Call, Draw, Item
+from support.calls import CASES, Call, Draw, Item
 from support.raw import Description, Variable
+from support.settings import trials_of
 from support.status_table import creations, rows
 from support.trials import CREATIONS
 
@@ -199,7 +200,7 @@ _RARELY = [min(_WEIGHTS.get(key, 1.0), 1.0) for key in _ALPHABET]
 def _extreme(draw: Draw) -> Call | None:
     """A legal value that is very large or very small."""
     name = draw.description.name
-    settings = [setting[name] for setting in (OVERFLOWING, NO_START) if name in setting]
+    settings = [*filter(None, (trials_of(name).overflow, trials_of(name).no_start))]
     if settings and draw.random.random() < 0.3:
         setting = draw.random.choice(settings)
         values = {**setting.at_start, **setting.values}

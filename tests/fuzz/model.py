@@ -8,6 +8,7 @@ from typing import Any
 
 from support.calls import ODD_TRUTH, SAME, Call
 from support.raw import Description, Status, Variable
+from support.settings import trials_of
 from support.status_table import ERROR, MODES, Cell, rows
 
 _FIXED = "a fixed parameter"
@@ -93,6 +94,8 @@ class Model:
             for item in call.arguments["items"]:
                 port = self._port_of(call, item.reference)
                 self.values = {**self.values, port.name: _meant(port, item.value)}
+                wild = trials_of(self.description.name).wild.get(port.name)
+                self.wild = self.wild or _meant(port, item.value) == wild
                 self.wild = self.wild or not _is_tame(port, item.value)
 
 
@@ -126,8 +129,7 @@ def _meant(port: Variable, value: Any) -> Any:
 def _is_tame(port: Variable, value: object) -> bool:
     """Whether no run can overflow with a value, and no other parameter can speak against it."""
     if not isinstance(value, float):
-        # Without roll two start values must be 0.
-        return port.name != "roll" or bool(value)
+        return True
     if value in (port.minimum, port.maximum):
         return False
     # Only what is drawn to be extreme is -0.0, where a way may come back to itself.

@@ -13,16 +13,15 @@ from itertools import chain, pairwise
 from math import hypot, isclose, isfinite
 from typing import Any
 
-from auv_fmu import motion_planner, path_planner, plant
+from auv_fmu import plant
 from auv_fmu.attitude import rotation_from_quaternion
-from auv_fmu.motion_planner import PlannerState
 from auv_fmu.plant import PlantState
-from fmus.auv_plant.ports import PARAMETERS as OF_THE_PLANT
-from fmus.motion_planner.ports import PARAMETERS as OF_THE_PLANNER
-from fmus.path_planner.ports import PARAMETERS as OF_THE_PATH
+from fmus.discovery import ports_of
+from fmus.ports.groups import slices
+from fmus.ports.port import Refusal
 from support import states
-from support.calls import CHOICES
 from support.raw import Description, Variable
+from support.settings import behaviour_of, choices_of, parameters_of
 from support.status_table import MODES
 
 #: Rounding of what is 1, or equal, in exact arithmetic.
@@ -50,11 +49,11 @@ def faults(said: Any, description: Description, samples: Sequence[dict[str, Any]
     if not isinstance(said, dict) or said.keys() != samples[0].keys():
         return ["other parts than those of a state"]
     found = [*_faults(said, description, samples)]
-    kept_true = _INVARIANTS.get(description.name)
-    if found or kept_true is None or said["state"] is None:
+    if found or said["state"] is None:
         return found
     try:
-        return [*kept_true(said)]
+        kept_true = _INVARIANTS.get(description.name, lambda said: ())
+        return [*kept_true(said), *_follows(said, description.name)]
     except (ArithmeticError, ValueError) as error:
         return [f"nothing follows from it: {error}"]
 
@@ -76,14 +75,18 @@ def _faults(
             yield from (
                 f"{p.name} = {v!r:.30}"
                 for p, v in zip(ports, values, strict=True)
-                if not _fits(p, v)
+                if not _fits(description, p, v)
             )
     parameters = {port.name: port for port in description.of("parameter")}
     values = said["parameters"]
     if not isinstance(values, dict) or values.keys() != parameters.keys():
         yield "other parameters"
     else:
-        yield from (f"{n} = {v!r:.30}" for n, v in values.items() if not _fits(parameters[n], v))
+        yield from (
+            f"{n} = {v!r:.30}"
+            for n, v in values.items()
+            if not _fits(description, parameters[n], v)
+        )
     if not isinstance(said["fault"], bool):
         yield "fault is neither true nor false"
     yield from _faults_of_state(said, samples)
@@ -116,9 +119,9 @@ def _is_number(value: Any) -> bool:
         return False
 
 
-def _fits(port: Variable, value: Any) -> bool:
+def _fits(fmu: Description, port: Variable, value: Any) -> bool:
     if port.kind == "String":
-        return value in CHOICES.get(port.name, (port.start,))
+        return value in choices_of(fmu.name, port.name)
     if port.kind == "Boolean":
         return isinstance(value, bool)
     if port.kind == "Integer" and not isinstance(value, int):
@@ -172,11 +175,10 @@ def _plant(said: dict[str, Any]) -> Iterator[str]:
     if not _is_unit(quaternion):
         yield f"a quaternion that is no unit: {quaternion}"
         return
-    yield from _generator(said["hidden"])
     parameters, outputs = said["parameters"], said["outputs"]
     state = PlantState(*map(tuple, said["state"]))
     rotation = rotation_from_quaternion(state.quaternion)
-    known = OF_THE_PLANT.of(parameters)
+    known = parameters_of("AuvPlant").of(parameters)
     euler, y, dy, nu, _ = plant.outputs(state, rotation, known.ell, known.roll.rolls)
     if not parameters["roll"] and (nu_r[3] or abs(rotation[1][2]) > TOLERANCE):
         yield "roll where there is none"
@@ -213,32 +215,31 @@ def _generator(hidden: Any) -> Iterator[str]:
         yield "a number kept that is none"
 
 
-def _planner(said: dict[str, Any]) -> Iterator[str]:
-    position, theta, psi, nu = said["state"]
-    parameters = OF_THE_PLANNER.of(said["parameters"])
-    state = PlannerState(tuple(position), theta, psi, tuple(nu))
-    moving = motion_planner.motion(parameters.vehicle, state, parameters.tau_d)
-    reference = motion_planner.reference(state, moving, parameters.ell)
-    if not _near(said["outputs"], [*chain(*reference), *position, theta, psi]):
-        yield "outputs that are not those of the state"
+def _follows(said: dict[str, Any], name: str) -> Iterator[str]:
+    """What a behaviour says of the outputs that belong to a state."""
+    behaviour, declared = behaviour_of(name), ports_of(name)
+    expected = behaviour.hooks["expected"]
+    if behaviour.noisy:
+        yield from _generator(said["hidden"])
+    if expected is None:
+        return
+    places = slices([port for port in declared if port.causality == "output"])
+    given = {
+        "parameters": parameters_of(name).of(said["parameters"]),
+        "state": behaviour.state(*(tuple(x) if isinstance(x, list) else x for x in said["state"])),
+        "outputs": {group: tuple(said["outputs"][place]) for group, place in places.items()},
+    }
+    try:
+        groups = expected(*(given[argument] for argument in behaviour.arguments("expected")))
+    except Refusal as refusal:
+        yield str(refusal)
+    else:
+        if not _near(said["outputs"], [*chain(*groups.values())]):
+            yield "outputs that are not those of the state"
 
 
-def _path(said: dict[str, Any]) -> Iterator[str]:
-    parameters, state = OF_THE_PATH.of(said["parameters"]), path_planner.PathState(*said["state"])
-    first = path_planner.first_corner(parameters.waypoints, state.start)
-    corner = path_planner.corner_ahead(parameters.waypoints, first, state.t)
-    reference = path_planner.reference(parameters.waypoints, corner, state.t)
-    along = path_planner.course(parameters.waypoints, corner, reference.dy_d)
-    eta_d = path_planner.posture(reference.y_d, along, parameters.ell)
-    if not _near(said["outputs"], [*chain(*reference), *eta_d]):
-        yield "outputs that are not those of the state"
-
-
-_INVARIANTS: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
-    "AuvPlant": _plant,
-    "MotionPlanner": _planner,
-    "PathPlanner": _path,
-}
+#: What is told of a state without asking the behaviour.
+_INVARIANTS: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {"AuvPlant": _plant}
 
 
 def without_checksum(content: bytes) -> dict[str, Any] | None:

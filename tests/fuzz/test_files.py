@@ -8,6 +8,7 @@ from random import Random
 import pytest
 
 from fuzz import files
+from support.tiers import slow
 
 #: Files of each kind.
 RUNS = 25
@@ -16,7 +17,7 @@ RUNS = 25
 TABLES = 200
 
 NAMES = (
-    "description", "fmu", "ssd", "ssv", "ssp", "scenario", "plot", "view", "record", "table",
+    "description", "ssd", "scenario", "record", "table", "fmu", "ssv", "ssp", "plot", "view",
 )  # fmt: skip
 
 
@@ -26,7 +27,7 @@ def kinds() -> Iterator[dict[str, files.Kind]]:
         yield found
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES[:5], *slow(*NAMES[5:])])
 def test_mutated_files_are_taken_or_refused_in_one_line(kinds, name: str):
     if name not in kinds:
         pytest.skip("needs plotly")

@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -19,10 +20,11 @@ from fuzz.reachable import faults, without_checksum
 from fuzz.sequences import Finding, Fuzzer, unpacked
 from support import states
 from support.calls import CASES, Call, Draw, Item
-from support.instances import NAMES
 from support.native_states import Unwritable
 from support.raw import Description, Library, Variable, instance
 from support.sanitizers import GCC, compiled, sanitize, sanitizers
+from support.settings import EACH, NAMES, REPRESENTATIVES
+from support.tiers import slow
 from support.worker import Lost, Worker
 
 #: Seeds of CI: those of the night come after them.
@@ -44,8 +46,12 @@ def kinds(dist: Path, native: Path) -> Iterator[dict[str, Folders]]:
         }
 
 
+#: Kinds and components that are tried with `-m slow`.
+OTHERS = [((kind, name),) for kind, name in product(KINDS, NAMES) if name not in REPRESENTATIVES]
+
+
 @pytest.fixture(
-    scope="module", params=[(kind, name) for kind in KINDS for name in NAMES], ids=" ".join
+    scope="module", params=[*product(KINDS, REPRESENTATIVES), *slow(*OTHERS)], ids=" ".join
 )
 def fuzzer(request: pytest.FixtureRequest, kinds: dict[str, Folders]) -> Iterator[Fuzzer]:
     kind, name = request.param
@@ -73,13 +79,14 @@ def test_no_state_is_taken_that_cannot_be_reached(fuzzer: Fuzzer):
     assert not findings, explained(fuzzer, "states", findings)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", EACH)
 def test_kinds_answer_alike(kinds: dict[str, Folders], name: str):
     with Fuzzer(kinds["python"], name, kinds["native"]) as fuzzer:
         findings = [f for _, found in fuzzer.attack("twins", TWINS) for f in found]
         assert not findings, explained(fuzzer, "twins", findings)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(GCC is None, reason="gcc is not installed")
 def test_sanitizers_find_nothing(native: Path):
     with unpacked([native / f"{name}.fmu" for name in NAMES]) as folders, sanitizers() as reports:

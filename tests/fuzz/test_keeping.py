@@ -160,7 +160,7 @@ def quick(here: Path) -> Iterator[None]:
     """Without what takes seconds and writes elsewhere: compilers, processes, most of a report."""
 
     def copied(module: str, folder: Path, *options: str) -> list[Path]:
-        source = current_fmus() if module == "packaging.build" else here / "own"
+        source = current_fmus() if module == "build" else here / "own"
         found = [*source.glob("*.fmu"), *source.glob(MANIFEST)]
         return [Path(shutil.copy(path, folder)) for path in found]
 

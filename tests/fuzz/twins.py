@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from ctypes import byref, c_double, c_int
 from typing import Any
 
-from fmus.packaging.kinds import KINDS, NATIVE, PYTHON
+from fmus.kinds import KINDS, NATIVE, PYTHON
 from fuzz.player import STATES_EVERY, Calls, Difference, Players, Side
 from support import states
 from support.calls import Call, Saved, make

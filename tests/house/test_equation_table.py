@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import auv_fmu
-from fmus.packaging.discovery import components
+from fmus.discovery import components
 
 TESTS = Path(__file__).parents[1]
 PAGE = (TESTS.parent / "docs" / "equations.md").read_text(encoding="utf-8")
@@ -83,6 +83,6 @@ def test_symbol_is_the_name_port_and_unit_that_the_table_says(row):
     assert set(quoted(code)) <= variables()
     for name in quoted(port):
         component, variable = name.split(".", 1)
-        module = import_module(components()[component].replace(".slave", ".ports"))
+        module = import_module(f"{components()[component]}.ports")
         [declared] = [p for p in module.PORTS if p.name == variable]
         assert (declared.unit or "") == unit

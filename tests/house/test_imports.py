@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
@@ -12,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.packaging.discovery import components
+from fmus.discovery import components, ports_of
 
 ROOT = Path(__file__).parents[2]
 
@@ -22,7 +23,10 @@ FLOORS = {
         "machine", "system", "formats", "master", "vehicle", "figures", "runs", "exchange",
         "studies", "paper", "commands",
     ),
-    "fmus": ("ports", "slave", "native", "components", "packaging"),
+    "fmus": (
+        "ports", "components", "kinds", "archive", "discovery", "documentation", "compilers",
+        "python", "native", "build",
+    ),
 }  # fmt: skip
 
 #: What a package may import besides itself and the standard library.
@@ -30,10 +34,15 @@ ALLOWED = {
     "auv_fmu": set(),
     "fmus": {"auv_fmu", "markdown_it", "pythonfmu"},
     "orchestrator": {
-        "auv_fmu", "dask", "distributed", "fmpy", "libcosimpy", "lxml", "markdown_it", "matplotlib",
-        "numba", "numpy", "pandas", "PIL", "platformdirs", "pyarrow", "scipy", "tornado", "tqdm",
+        "auv_fmu", "dask", "distributed", "fmpy", "fmus", "libcosimpy", "lxml", "markdown_it",
+        "matplotlib", "numba", "numpy", "pandas", "PIL", "platformdirs", "pyarrow", "pydantic",
+        "pydantic_core", "scipy",
+        "tornado", "tqdm",
     },
 }  # fmt: skip
+
+#: What else may be imported of `fmus`: how FMUs run, and PythonFMU, stays out of the process.
+DECLARED = re.compile(r"fmus\.(kinds|discovery|ports|\w+\.(ports|behaviour))(\.|$)")
 
 #: Rooms that run any system.
 GENERAL = ("machine", "system", "formats", "master")
@@ -73,13 +82,6 @@ def room(package: str, name: tuple[str, ...]) -> str:
     return "components" if package == "fmus" and first in component_folders() else first
 
 
-def is_declaration(imported: tuple[str, ...]) -> bool:
-    """Whether a module of `fmus` says what ports, components and kinds are, and runs none."""
-    _, where, *names = imported
-    of_component = where in component_folders() and names[0] in ("ports", "behaviour")
-    return where == "ports" or of_component or "kinds" in imported
-
-
 @pytest.mark.parametrize("package", ALLOWED)
 def test_packages_import_what_they_may(package):
     for path, name in modules(package):
@@ -88,10 +90,7 @@ def test_packages_import_what_they_may(package):
         if package == "auv_fmu" and name[:1] == ("proof",):
             allowed = allowed | {"numpy"}
         for imported in imports(path):
-            if package == "orchestrator" and imported[0] == "fmus":
-                assert is_declaration(imported), f"{path} imports {'.'.join(imported)}"
-            else:
-                assert imported[0] in allowed, f"{path} imports {imported[0]}"
+            assert imported[0] in allowed, f"{path} imports {imported[0]}"
 
 
 @pytest.mark.parametrize("package", FLOORS)
@@ -108,19 +107,30 @@ def test_imports_run_downwards(package):
                 assert other <= own, f"{path} imports {'.'.join(imported)}, which is above it"
 
 
-def test_the_general_half_does_not_import_the_mathematics():
+def test_the_general_half_imports_neither_the_mathematics_nor_the_components():
     for path, name in modules("orchestrator"):
         if name and name[0] in GENERAL:
-            assert not any(imported[0] == "auv_fmu" for imported in imports(path)), path
+            assert {imported[0] for imported in imports(path)}.isdisjoint(("auv_fmu", "fmus")), path
+
+
+def test_the_orchestrator_knows_of_components_only_what_they_declare():
+    for path, _ in modules("orchestrator"):
+        for imported in imports(path):
+            if imported[0] == "fmus":
+                assert DECLARED.match(".".join(imported)), f"{path} imports {'.'.join(imported)}"
+
+
+def test_what_components_declare_brings_no_pythonfmu_into_the_process():
+    declared = [f"{package}.ports" for package in components().values()]
+    code = f"import sys, fmus.kinds, fmus.discovery, {', '.join(declared)}; "
+    code += "from fmus.discovery import fingerprint; fingerprint('python'); "
+    code += "sys.exit('pythonfmu' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def ports() -> set[str]:
     """Names of all ports and of their groups."""
-    found = {
-        port.name
-        for module in components().values()
-        for port in import_module(module.replace(".slave", ".ports")).PORTS
-    }
+    found = {port.name for component in components() for port in ports_of(component)}
     return found | {re.split(r"[.\[]", name)[0] for name in found}
 
 

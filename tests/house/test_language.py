@@ -8,12 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from fmus.discovery import components
 from fmus.native.language import MATHEMATICS, OUTSIDE, foreign
 
 ROOT = Path(__file__).parents[2]
 EQUATIONS = [
     *sorted((ROOT / "src/auv_fmu").glob("*.py")),
-    *sorted((ROOT / "fmus").glob("*/behaviour.py")),
+    *(ROOT / package.replace(".", "/") / "behaviour.py" for package in components().values()),
 ]
 
 

@@ -6,7 +6,7 @@ are named by slots, so that it does not matter where they lie in memory.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from ctypes import (
     addressof,
     byref,
@@ -20,9 +20,10 @@ from ctypes import (
     string_at,
 )
 from dataclasses import dataclass, field
+from functools import partial
 from math import copysign, inf, nan, nextafter
 from random import Random
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from support import states
 from support.raw import (
@@ -35,17 +36,13 @@ from support.raw import (
     Variable,
 )
 from support.raw_fmi import OF_MODEL_EXCHANGE
+from support.settings import Setting, choices_of, trials_of
 
 Arguments = dict[str, Any]
+T = TypeVar("T")
 
 #: A reference that no FMU of this size has.
 UNKNOWN = 4_294_967_295
-
-#: Texts that a port takes, which modelDescription.xml has no place for.
-CHOICES = {
-    "saturation": ("tanh", "algebraic", "arctan"),
-    "observer": ("euler", "exact", "integral"),
-}
 
 #: Byte 0xff, which no UTF-8 has, as a string that keeps it (`surrogateescape`).
 NOT_UTF_8 = "\udcff"
@@ -106,6 +103,10 @@ class Saved:
     foreign: bytes = b"{}"
 
 
+class Lacking(Exception):
+    """An FMU has no port, or no state was saved, that a case needs."""
+
+
 @dataclass
 class Draw:
     """What arguments are drawn from."""
@@ -125,20 +126,28 @@ class Draw:
     def slot(self) -> str:
         return f"{self.prefix}s{self.random.randrange(4)}"
 
-    def any_of(self, variables: list[Variable]) -> Variable | None:
-        return self.random.choice(variables) if variables else None
+    def any_of(self, found: Sequence[T]) -> T:
+        """One of what there is to choose from.
+
+        Raises:
+            Lacking: there is nothing.
+
+        """
+        if not found:
+            raise Lacking
+        return self.random.choice(found)
 
     def good_value(self, variable: Variable) -> Any:
         """One that a run goes on well with."""
         start, low, high = variable.start, variable.minimum, variable.maximum
         if variable.kind == "String":
-            return self.random.choice(CHOICES.get(variable.name, (start,)))
+            return self.random.choice(choices_of(self.description.name, variable.name) or (start,))
         if variable.kind == "Boolean":
             return self.random.randrange(2)
         if variable.kind == "Integer":
             some = (-(2**31), -1, 0, 1, 42, 2**31 - 1) if low is None else (start,)
             return self.random.choice(some)
-        spread = SPREADS.get(self.description.name, 0.5)
+        spread = trials_of(self.description.name).spread
         value = (start or 0.0) * self.random.uniform(1.0 - spread, 1.0 + spread)
         value = value or self.random.uniform(-0.5, 0.5)
         value = value if low is None else max(low, value)
@@ -164,10 +173,18 @@ CASES: dict[tuple[str, str], Callable[[Draw], Arguments | None]] = {}
 
 
 def _case(function: str, case: str = "") -> Callable[[Any], Any]:
-    def add(draw: Callable[[Draw], Arguments | None]) -> Any:
+    """Add a case, whose arguments are None for an FMU that lacks what it needs."""
+
+    def add(arguments: Callable[..., Arguments]) -> Any:
+        def drawn(draw: Draw) -> Arguments | None:
+            try:
+                return arguments(draw)
+            except Lacking:
+                return None
+
         assert (function, case) not in CASES
-        CASES[function, case] = draw
-        return draw
+        CASES[function, case] = drawn
+        return arguments
 
     return add
 
@@ -176,257 +193,254 @@ def _items(*items: Item, **more: Any) -> Arguments:
     return {"items": [*items], **more}
 
 
-def _item(variable: Variable | None, value: Any, good: bool = True) -> Arguments | None:
-    return None if variable is None else _items(Item(variable.reference, value, good))
+def _item(variable: Variable, value: Any, good: bool = True) -> Arguments:
+    return _items(Item(variable.reference, value, good))
+
+
+def _shuffled(draw: Draw, *items: Item) -> Arguments:
+    found = [*items]
+    draw.random.shuffle(found)
+    return _items(*found)
 
 
 # Values
 
 
-def _of_another_kind(draw: Draw, kind: str) -> Variable | None:
-    return draw.any_of([v for v in draw.description.variables if v.kind != kind])
+def _inputs(draw: Draw) -> list[Variable]:
+    return draw.description.of("input", "Real")
 
 
-def _text_port(draw: Draw) -> Variable | None:
-    return draw.any_of([v for v in draw.description.variables if v.kind == "String"])
+def _parameters(draw: Draw, variability: str, kind: str = "Real") -> list[Variable]:
+    found = draw.description.of("parameter", kind)
+    return [v for v in found if v.variability == variability]
+
+
+def _tunable(draw: Draw) -> list[Variable]:
+    return _parameters(draw, "tunable")
+
+
+def _of_kind(draw: Draw, *kinds: str) -> list[Variable]:
+    return [v for v in draw.description.variables if v.kind in kinds]
+
+
+def _changeable(draw: Draw) -> Variable:
+    """A Real port that can be set at any time before the end."""
+    return draw.any_of([v for v in draw.settable("Real") if v.variability != "fixed"])
+
+
+def _good(found: Callable[[Draw], list[Variable]]) -> Callable[[Draw], Arguments]:
+    def arguments(draw: Draw) -> Arguments:
+        variable = draw.any_of(found(draw))
+        return _item(variable, draw.good_value(variable))
+
+    return arguments
 
 
 def _value_cases(kind: str) -> None:
     """The cases that are the same for all types."""
     some: Any = {"Real": 1.0, "Integer": 1, "Boolean": 1, "String": "x"}[kind]
-
-    def parameters(draw: Draw, *variabilities: str) -> Variable | None:
-        found = draw.description.of("parameter", kind)
-        return draw.any_of([v for v in found if v.variability in variabilities])
-
-    def good(draw: Draw, variable: Variable | None) -> Arguments | None:
-        return None if variable is None else _item(variable, draw.good_value(variable))
-
+    others = [other for other in KINDS if other != kind]
+    bad = Item(0, some, False)
     for action in ("Get", "Set"):
         function = f"fmi2{action}{kind}"
         _case(function, "n = 0, with NULL")(lambda draw: _items(null="both"))
-        _case(function, "references NULL, n > 0")(
-            lambda draw: _items(Item(0, some, False), null="references")
-        )
-        _case(function, "values NULL, n > 0")(
-            lambda draw: _items(Item(0, some, False), null="values")
-        )
+        _case(function, "references NULL, n > 0")(lambda draw: _items(bad, null="references"))
+        _case(function, "values NULL, n > 0")(lambda draw: _items(bad, null="values"))
         if kind == "Real":
-            _case(function, "n = 2^60")(lambda draw: _items(Item(0, some, False), n=2**60))
+            _case(function, "n = 2^60")(lambda draw: _items(bad, n=2**60))
         _case(function, "an unknown reference")(
             lambda draw: _items(
                 Item(draw.random.choice((UNKNOWN, 2**31, len(draw.description.variables))),
                      some, False)
             )
         )  # fmt: skip
+        # Hosts read Integers and Booleans as Reals.
+        case, kinds = "a port of another type", others
         if function == "fmi2GetReal":
-            _case(function, "a String")(lambda draw: _item(_text_port(draw), some, False))
-        else:
-            _case(function, "a port of another type")(
-                lambda draw: _item(_of_another_kind(draw, kind), some, False)
-            )
-    _case(f"fmi2Get{kind}", "all ports")(
-        lambda draw: _items(
-            *(Item(v.reference) for v in draw.description.variables if v.kind == kind)
+            case, kinds = "a String", ["String"]
+        _case(function, case)(
+            lambda draw, kinds=kinds: _item(draw.any_of(_of_kind(draw, *kinds)), some, False)
         )
+    _case(f"fmi2Get{kind}", "all ports")(
+        lambda draw: _items(*(Item(v.reference) for v in _of_kind(draw, kind)))
     )
 
     @_case(f"fmi2Set{kind}", "a fixed parameter")
-    def _fixed(draw: Draw) -> Arguments | None:
-        variable = parameters(draw, "fixed")
-        found = [] if variable is None else [draw.good_value(variable) for _ in range(20)]
+    def _fixed(draw: Draw) -> Arguments:
+        variable = draw.any_of(_parameters(draw, "fixed", kind))
+        found = [draw.good_value(variable) for _ in range(20)]
         others = [value for value in found if value != draw.value(variable)]
-        return _item(variable, others[0]) if others else None
+        if not others:
+            raise Lacking
+        return _item(variable, others[0])
 
     @_case(f"fmi2Set{kind}", SAME)
-    def _same(draw: Draw) -> Arguments | None:
-        variable = parameters(draw, "fixed")
-        return None if variable is None else _item(variable, draw.value(variable))
+    def _same(draw: Draw) -> Arguments:
+        variable = draw.any_of(_parameters(draw, "fixed", kind))
+        return _item(variable, draw.value(variable))
 
     if kind in ("Real", "Boolean"):
         _case(f"fmi2Set{kind}", "an output")(
             lambda draw: _item(draw.any_of(draw.description.of("output", kind)), some, False)
         )
-    if kind == "Real":
-        _case("fmi2SetReal", "a tunable parameter")(
-            lambda draw: good(draw, parameters(draw, "tunable"))
-        )
-        _case("fmi2SetReal", "an input")(
-            lambda draw: good(draw, draw.any_of(draw.description.of("input")))
-        )
 
 
 for _kind in KINDS:
     _value_cases(_kind)
+_case("fmi2SetReal", "a tunable parameter")(_good(_tunable))
+_case("fmi2SetReal", "an input")(_good(_inputs))
 
 
 @_case("fmi2SetReal", "all inputs")
-def _all_inputs(draw: Draw) -> Arguments | None:
-    inputs = draw.description.of("input", "Real")
-    return _items(*(Item(v.reference, draw.good_value(v)) for v in inputs)) if inputs else None
-
-
-def _changeable(draw: Draw) -> Variable | None:
-    """A Real port that can be set at any time before the end."""
-    found = draw.settable("Real")
-    return draw.any_of([v for v in found if v.variability != "fixed"])
+def _all_inputs(draw: Draw) -> Arguments:
+    draw.any_of(_inputs(draw))
+    return _items(*(Item(v.reference, draw.good_value(v)) for v in _inputs(draw)))
 
 
 @_case("fmi2SetReal", "the same twice")
-def _same_twice(draw: Draw) -> Arguments | None:
+def _same_twice(draw: Draw) -> Arguments:
     port = _changeable(draw)
-    if port is None:
-        return None
     return _items(*(Item(port.reference, draw.good_value(port)) for _ in range(2)))
 
 
 @_case("fmi2SetReal", "100,000 times the same")
-def _many(draw: Draw) -> Arguments | None:
+def _many(draw: Draw) -> Arguments:
     port = _changeable(draw)
-    return None if port is None else _items(Item(port.reference, draw.good_value(port)), times=MANY)
+    return _items(Item(port.reference, draw.good_value(port)), times=MANY)
 
 
-@_case("fmi2GetReal", "100,000 times the same")
-def _many_to_get(draw: Draw) -> Arguments | None:
-    port = draw.any_of([v for v in draw.description.variables if v.kind == "Real"])
-    return None if port is None else _items(Item(port.reference), times=MANY)
+_case("fmi2GetReal", "100,000 times the same")(
+    lambda draw: _items(Item(draw.any_of(_of_kind(draw, "Real")).reference), times=MANY)
+)
 
 
-def _tunable(draw: Draw) -> list[Variable]:
-    found = draw.description.of("parameter", "Real")
-    return [v for v in found if v.variability == "tunable"]
-
-
-for _whose, _found in (
-    ("input", lambda draw: draw.description.of("input", "Real")),
-    ("parameter", lambda draw: _tunable(draw) or draw.description.of("parameter", "Real")),
-):
-    _article = "an" if _whose == "input" else "a"
-
-    @_case("fmi2SetReal", f"NaN for {_article} {_whose}")
-    def _set_nan(draw: Draw, found: Callable[[Draw], Any] = _found) -> Arguments | None:
-        return _item(draw.any_of(found(draw)), nan, False)
-
-    @_case("fmi2SetReal", f"an infinite value for {_article} {_whose}")
-    def _set_infinite(draw: Draw, found: Callable[[Draw], Any] = _found) -> Arguments | None:
-        return _item(draw.any_of(found(draw)), draw.random.choice((inf, -inf)), False)
-
-
-def _beyond(limit: float, direction: float, random: Random) -> float:
+def _beyond(limit: Any, direction: float, random: Random) -> float:
     return random.choice((nextafter(limit, direction), copysign(1e300, direction)))
 
 
-@_case("fmi2SetReal", "below the range")
-def _below(draw: Draw) -> Arguments | None:
-    port = draw.any_of([v for v in draw.settable("Real") if v.minimum is not None])
-    if port is None:
-        return None
-    return _item(port, _beyond(port.minimum, -inf, draw.random), False)
+#: Real ports, and values that they do not take.
+_BAD: dict[str, tuple[Callable[[Draw], list[Variable]], Callable[[Variable, Random], float]]] = {
+    **{
+        case.format(whose): (found, value)
+        for whose, found in (
+            ("an input", _inputs),
+            (
+                "a parameter",
+                lambda draw: _tunable(draw) or draw.description.of("parameter", "Real"),
+            ),
+        )
+        for case, value in (
+            ("NaN for {}", lambda port, random: nan),
+            ("an infinite value for {}", lambda port, random: random.choice((inf, -inf))),
+        )
+    },
+    "below the range": (
+        lambda draw: [v for v in draw.settable("Real") if v.minimum is not None],
+        lambda port, random: _beyond(port.minimum, -inf, random),
+    ),
+    "above the range": (
+        lambda draw: [v for v in draw.settable("Real") if v.maximum is not None],
+        lambda port, random: _beyond(port.maximum, inf, random),
+    ),
+}
+for _case_name in _BAD:
+
+    @_case("fmi2SetReal", _case_name)
+    def _bad(draw: Draw, case: str = _case_name) -> Arguments:
+        found, value = _BAD[case]
+        port = draw.any_of(found(draw))
+        return _item(port, value(port, draw.random), False)
 
 
-@_case("fmi2SetReal", "above the range")
-def _above(draw: Draw) -> Arguments | None:
-    port = draw.any_of([v for v in draw.settable("Real") if v.maximum is not None])
-    if port is None:
-        return None
-    return _item(port, _beyond(port.maximum, inf, draw.random), False)
-
-
-for _whose, _found in (
-    ("inputs", lambda draw: draw.description.of("input", "Real")),
-    ("parameters", _tunable),
-):
+for _whose, _found in (("inputs", _inputs), ("parameters", _tunable)):
 
     @_case("fmi2SetReal", f"one bad among good {_whose}")
-    def _one_bad(draw: Draw, found: Callable[[Draw], Any] = _found) -> Arguments | None:
+    def _one_bad(draw: Draw, found: Callable[[Draw], Any] = _found) -> Arguments:
         ports = found(draw)
         if len(ports) < 2:
-            return None
+            raise Lacking
         first, second = draw.random.sample(ports, 2)
-        items = [Item(first.reference, draw.good_value(first)), Item(second.reference, nan, False)]
-        draw.random.shuffle(items)
-        return _items(*items)
+        good = Item(first.reference, draw.good_value(first))
+        return _shuffled(draw, good, Item(second.reference, nan, False))
 
 
 @_case("fmi2SetReal", "an unknown reference among good")
-def _unknown_among_good(draw: Draw) -> Arguments | None:
+def _unknown_among_good(draw: Draw) -> Arguments:
     port = _changeable(draw)
-    if port is None:
-        return None
-    items = [Item(port.reference, draw.good_value(port), False), Item(UNKNOWN, 1.0, False)]
-    draw.random.shuffle(items)
-    return _items(*items)
+    good = Item(port.reference, draw.good_value(port), False)
+    return _shuffled(draw, good, Item(UNKNOWN, 1.0, False))
 
 
 @_case("fmi2GetReal", "one bad among good")
-def _one_bad_to_get(draw: Draw) -> Arguments | None:
+def _one_bad_to_get(draw: Draw) -> Arguments:
     good = draw.any_of(draw.description.of("output", "Real"))
-    bad = draw.random.choice((_text_port(draw), None))
-    if good is None:
-        return None
-    items = [Item(good.reference), Item(UNKNOWN if bad is None else bad.reference, None, False)]
-    draw.random.shuffle(items)
-    return _items(*items)
+    texts = [port.reference for port in _of_kind(draw, "String")]
+    bad = draw.random.choice((UNKNOWN, *texts))
+    return _shuffled(draw, Item(good.reference), Item(bad, None, False))
 
 
-@_case("fmi2GetReal", "all Integers and Booleans")
-def _numbers(draw: Draw) -> Arguments | None:
-    kinds = ("Integer", "Boolean")
-    return _items(*(Item(v.reference) for v in draw.description.variables if v.kind in kinds))
+_case("fmi2GetReal", "all Integers and Booleans")(
+    lambda draw: _items(*(Item(v.reference) for v in _of_kind(draw, "Integer", "Boolean")))
+)
 
 
 @_case("fmi2SetBoolean", ODD_TRUTH)
-def _odd_boolean(draw: Draw) -> Arguments | None:
+def _odd_boolean(draw: Draw) -> Arguments:
     found = draw.description.of("parameter", "Boolean")
     port = draw.any_of([variable for variable in found if not draw.value(variable)])
     return _item(port, draw.random.choice((2, -1, 2**31 - 1)))
 
 
-def _text(text: str) -> Callable[[Draw], Arguments | None]:
-    return lambda draw: _item(draw.any_of(draw.settable("String")), text, False)
-
-
-_case("fmi2SetString", "a text that is no choice")(_text("sigmoid"))
-_case("fmi2SetString", "a text of 100,000 characters")(_text("x" * MANY))
-_case("fmi2SetString", "a text that is not UTF-8")(_text(f"ta{NOT_UTF_8}nh"))
-
-
-@_case("fmi2SetString", "a text that is NULL")
-def _null_text(draw: Draw) -> Arguments | None:
-    return _item(draw.any_of(draw.settable("String")), None, False)
-
+for _case_name, _text in (
+    ("a text that is no choice", "sigmoid"),
+    ("a text of 100,000 characters", "x" * MANY),
+    ("a text that is not UTF-8", f"ta{NOT_UTF_8}nh"),
+    ("a text that is NULL", None),
+):
+    _case("fmi2SetString", _case_name)(
+        lambda draw, text=_text: _item(draw.any_of(draw.settable("String")), text, False)
+    )
 
 # Logging, initialisation and end, steps
 
-
-def _logging(case: str, on: int, categories: list[str | None], null: bool = False) -> None:
-    _case("fmi2SetDebugLogging", case)(
-        lambda draw: {"on": on, "categories": categories, "null": null}
+for _case_name, _arguments in (
+    ("on, no categories", {"on": 1, "categories": []}),
+    ("off", {"on": 0, "categories": []}),
+    ("a category that is not declared", {"on": 1, "categories": ["undeclared"]}),
+    ("categories NULL, n > 0", {"on": 1, "categories": ["x"], "null": True}),
+    ("a category that is NULL", {"on": 1, "categories": [None]}),
+    ("a category that is not UTF-8", {"on": 1, "categories": [NOT_UTF_8]}),
+):
+    _case("fmi2SetDebugLogging", _case_name)(
+        lambda draw, arguments=_arguments: {"null": False, **arguments}
     )
 
 
-_logging("on, no categories", 1, [])
-_logging("off", 0, [])
-_logging("a category that is not declared", 1, ["undeclared"])
-_logging("categories NULL, n > 0", 1, ["x"], null=True)
-_logging("a category that is NULL", 1, [None])
-_logging("a category that is not UTF-8", 1, [NOT_UTF_8])
-
-
-def _setup(case: str, arguments: Callable[[Draw], Arguments]) -> None:
-    _case("fmi2SetupExperiment", case)(
-        lambda draw: {"start": 0.0, "stop": None, "tolerance": None, **arguments(draw)}
+def _one_of(function: str, before: Callable[[Draw], Arguments], case: str, **values: Any) -> None:
+    """Add a case in which arguments are drawn from tuples; the others are what they were."""
+    _case(function, case)(
+        lambda draw: {
+            **before(draw),
+            **{
+                name: draw.random.choice(value) if isinstance(value, tuple) else value
+                for name, value in values.items()
+            },
+        }
     )
 
 
-_setup("start", lambda draw: {"start": draw.random.choice((0.0, 1.5, -3.0))})
-_setup("start, stop, tolerance", lambda draw: {"stop": 10.0, "tolerance": 1e-6})
-_setup("stop infinite", lambda draw: {"stop": inf})
+_setup = partial(
+    _one_of, "fmi2SetupExperiment", lambda draw: {"start": 0.0, "stop": None, "tolerance": None}
+)
+_setup("start", start=(0.0, 1.5, -3.0))
+_setup("start, stop, tolerance", stop=10.0, tolerance=1e-6)
+_setup("stop infinite", stop=inf)
 _setup(
     "stop NaN or before start, tolerance NaN, which nothing uses",
-    lambda draw: {"stop": draw.random.choice((nan, -1.0, -inf)), "tolerance": nan},
+    stop=(nan, -1.0, -inf),
+    tolerance=nan,
 )
-_setup("start NaN or infinite", lambda draw: {"start": draw.random.choice((nan, inf, -inf))})
+_setup("start NaN or infinite", start=(nan, inf, -inf))
 
 for _mode_call in (
     "fmi2EnterInitializationMode",
@@ -438,178 +452,104 @@ for _mode_call in (
     _case(_mode_call)(lambda draw: {})
 
 
-class Setting(NamedTuple):
-    """Values that a case needs, each of which is good, and values with which all is well again."""
-
-    at_start: Mapping[str, float]
-    values: Mapping[str, float]
-    good: Mapping[str, float]
-    time: float = 0.0
-
-
-#: How far good values may lie from those at the start, where they must fit together [share].
-SPREADS = {"PathPlanner": 0.02}
-
-#: Values with which a state or an output of a step leaves the range of numbers.
-OVERFLOWING = {
-    "AuvPlant": Setting({"m11": 1e-9}, {"tau_w.u": 1e300}, {"tau_w.u": 0.0}),
-    "ObserverController": Setting({}, {"dy_d.x": 1e150}, {"dy_d.x": 0.0}),
-    "PdController": Setting({}, {"y.x": 1e155}, {"y.x": 0.0}),
-    "DisturbanceGenerator": Setting({}, {"omega_d": 1e308}, {"omega_d": 1.0}, 1e3),
-}
-
-#: Values that no state and outputs at the start time follow from.
-NO_START = {
-    "AuvPlant": Setting({}, {"tau_min.u": 0.0, "tau_max.u": 0.0}, {"tau_max.u": 80.0}),
-    "ObserverController": Setting({}, {"dy_d.x": 1e200}, {"dy_d.x": 0.0}),
-    "PdController": Setting({}, {"dy_d.x": 1e200}, {"dy_d.x": 0.0}),
-    "MotionPlanner": Setting({}, {"m11": 1e-9, "tau_d.u": 1e300}, {"tau_d.u": 5.0}),
-    "PathPlanner": Setting({}, {"turn_max": 0.0}, {"turn_max": 4.0}),
-}
+def _setting(found: Setting | None) -> Setting:
+    if found is None:
+        raise Lacking
+    return found
 
 
 @_case("fmi2ExitInitializationMode", "values that give no start")
-def _no_start(draw: Draw) -> Arguments | None:
-    return {} if draw.description.name in NO_START else None
+def _no_start(draw: Draw) -> Arguments:
+    _setting(trials_of(draw.description.name).no_start)
+    return {}
 
 
 @_case("fmi2GetReal", "outputs of values that give no start")
-def _outputs_of_no_start(draw: Draw) -> Arguments | None:
-    if draw.description.name not in NO_START:
-        return None
+def _outputs_of_no_start(draw: Draw) -> Arguments:
+    _setting(trials_of(draw.description.name).no_start)
     return _items(*(Item(v.reference) for v in draw.description.of("output", "Real")))
 
 
-def _step(case: str, arguments: Callable[[Draw], Arguments]) -> None:
-    _case("fmi2DoStep", case)(lambda draw: {"time": draw.time, "h": 0.02, **arguments(draw)})
-
-
-_step("a step", lambda draw: {})
-_step("a step of another length", lambda draw: {"h": draw.random.choice((1e-9, 0.001, 0.05, 0.1))})
-_step("a time that does not follow", lambda draw: {"time": draw.random.choice((-1.0, 0.37, 55.0))})
-_step("a step of zero, which changes nothing", lambda draw: {"h": draw.random.choice((0.0, -0.0))})
-_step("a step that is negative", lambda draw: {"h": draw.random.choice((-0.02, -1e-300, -1e300))})
-_step("a step that is NaN or infinite", lambda draw: {"h": draw.random.choice((nan, inf, -inf))})
-_step("a time that is NaN or infinite", lambda draw: {"time": draw.random.choice((nan, inf, -inf))})
+_step = partial(_one_of, "fmi2DoStep", lambda draw: {"time": draw.time, "h": 0.02})
+_step("a step")
+_step("a step of another length", h=(1e-9, 0.001, 0.05, 0.1))
+_step("a time that does not follow", time=(-1.0, 0.37, 55.0))
+_step("a step of zero, which changes nothing", h=(0.0, -0.0))
+_step("a step that is negative", h=(-0.02, -1e-300, -1e300))
+_step("a step that is NaN or infinite", h=(nan, inf, -inf))
+_step("a time that is NaN or infinite", time=(nan, inf, -inf))
 
 
 @_case("fmi2DoStep", "more than 1,000,000 times h_max")
-def _too_long(draw: Draw) -> Arguments | None:
-    if not any(v.name == "h_max" for v in draw.description.variables):
-        return None
+def _too_long(draw: Draw) -> Arguments:
+    draw.any_of([v for v in draw.description.variables if v.name == "h_max"])
     return {"time": draw.time, "h": draw.random.choice((2.0, 1e3, 1e200)) * MOST_INTERNAL_STEPS}
 
 
 @_case("fmi2DoStep", "values that the equations overflow with")
-def _overflow(draw: Draw) -> Arguments | None:
-    setting = OVERFLOWING.get(draw.description.name)
-    return None if setting is None else {"time": draw.time + setting.time, "h": 0.02}
+def _overflow(draw: Draw) -> Arguments:
+    setting = _setting(trials_of(draw.description.name).overflow)
+    return {"time": draw.time + setting.time, "h": 0.02}
 
 
 # States
 
-
-@_case("fmi2GetFMUstate")
-def _get_state(draw: Draw) -> Arguments:
-    return {"slot": draw.slot()}
-
-
-@_case("fmi2GetFMUstate", "into a state from before")
-def _get_state_again(draw: Draw) -> Arguments | None:
-    return {"slot": draw.random.choice(draw.own), "again": True} if draw.own else None
-
-
+_case("fmi2GetFMUstate")(lambda draw: {"slot": draw.slot()})
+_case("fmi2GetFMUstate", "into a state from before")(
+    lambda draw: {"slot": draw.any_of(draw.own), "again": True}
+)
 for _state_call in (
     "fmi2SetFMUstate",
     "fmi2FreeFMUstate",
     "fmi2SerializedFMUstateSize",
     "fmi2SerializeFMUstate",
 ):
-
-    @_case(_state_call, "a state")
-    def _own_state(draw: Draw) -> Arguments | None:
-        return {"slot": draw.random.choice(draw.own)} if draw.own else None
-
-    @_case(_state_call, "a state that was freed")
-    def _freed_state(draw: Draw) -> Arguments | None:
-        return {"freed": draw.random.choice(draw.freed)} if draw.freed else None
-
-    @_case(_state_call, "NULL")
-    def _null_state(draw: Draw) -> Arguments:
-        return {"null": True}
-
+    _case(_state_call, "a state")(lambda draw: {"slot": draw.any_of(draw.own)})
+    _case(_state_call, "a state that was freed")(lambda draw: {"freed": draw.any_of(draw.freed)})
+    _case(_state_call, "NULL")(lambda draw: {"null": True})
     if _state_call != "fmi2SerializeFMUstate":
-
-        @_case(_state_call, "a pointer to something else")
-        def _stray_state(draw: Draw) -> Arguments:
-            return {"stray": True}
-
-
-@_case("fmi2FreeFMUstate", "a state that is NULL")
-def _free_null(draw: Draw) -> Arguments:
-    return {"nothing": True}
-
-
-@_case("fmi2SetFMUstate", "a state of another instance")
-def _others_state(draw: Draw) -> Arguments | None:
-    return {"slot": draw.random.choice(draw.others)} if draw.others else None
-
-
-@_case("fmi2SetFMUstate", "a state that was serialised")
-def _serialised(draw: Draw) -> Arguments | None:
-    return {"bytes of": draw.random.choice(draw.own), "change": None} if draw.own else None
-
-
-def _changed(case: str, change: str) -> None:
-    @_case("fmi2SetFMUstate", case)
-    def _draw(draw: Draw) -> Arguments | None:
-        if not draw.own:
-            return None
-        seed = draw.random.randrange(2**32)
-        return {"bytes of": draw.random.choice(draw.own), "change": change, "seed": seed}
-
-
-_changed("bytes that are no state", "noise")
-_changed("bytes that were cut off", "cut")
-_changed("bytes that were changed", "changed")
-_changed("values that no run leads to, checksum and all", "impossible")
-
-
-@_case("fmi2SetFMUstate", "bytes of another FMU's state")
-def _foreign(draw: Draw) -> Arguments:
-    return {"foreign": True}
-
-
+        _case(_state_call, "a pointer to something else")(lambda draw: {"stray": True})
+_case("fmi2FreeFMUstate", "a state that is NULL")(lambda draw: {"nothing": True})
+_case("fmi2SetFMUstate", "a state of another instance")(
+    lambda draw: {"slot": draw.any_of(draw.others)}
+)
+_case("fmi2SetFMUstate", "a state that was serialised")(
+    lambda draw: {"bytes of": draw.any_of(draw.own), "change": None}
+)
+for _case_name, _change in (
+    ("bytes that are no state", "noise"),
+    ("bytes that were cut off", "cut"),
+    ("bytes that were changed", "changed"),
+    ("values that no run leads to, checksum and all", "impossible"),
+):
+    _case("fmi2SetFMUstate", _case_name)(
+        lambda draw, change=_change: {
+            "bytes of": draw.any_of(draw.own),
+            "change": change,
+            "seed": draw.random.randrange(2**32),
+        }
+    )
+_case("fmi2SetFMUstate", "bytes of another FMU's state")(lambda draw: {"foreign": True})
 for _case_name, _arguments in (
     ("too few bytes", {"more": -1}),
     ("too many bytes", {"more": 8}),
     ("bytes NULL", {"no bytes": True}),
 ):
-
-    @_case("fmi2SerializeFMUstate", _case_name)
-    def _serialise(draw: Draw, more: Arguments = _arguments) -> Arguments | None:
-        return {"slot": draw.random.choice(draw.own), **more} if draw.own else None
-
-
+    _case("fmi2SerializeFMUstate", _case_name)(
+        lambda draw, more=_arguments: {"slot": draw.any_of(draw.own), **more}
+    )
 _case("fmi2GetFMUstate", "NULL")(lambda draw: {"null": True})
-
-
-@_case("fmi2DeSerializeFMUstate", "bytes of a state")
-def _deserialise(draw: Draw) -> Arguments | None:
-    return {"bytes of": draw.random.choice(draw.own)} if draw.own else None
-
-
+_case("fmi2DeSerializeFMUstate", "bytes of a state")(
+    lambda draw: {"bytes of": draw.any_of(draw.own)}
+)
 _case("fmi2DeSerializeFMUstate", "bytes that are none, refused when they are set")(
     lambda draw: {"bytes": draw.random.choice((b"[" * 5000, b"\xff\x00", b"{}", b"null"))}
 )
 _case("fmi2DeSerializeFMUstate", "n = 0")(lambda draw: {"bytes": b""})
 for _state_call in ("fmi2GetFMUstate", "fmi2DeSerializeFMUstate"):
-
-    @_case(_state_call, "into a state that was freed")
-    def _into_freed(draw: Draw) -> Arguments | None:
-        return {"bytes": b"{}", "freed": draw.random.choice(draw.freed)} if draw.freed else None
-
-
+    _case(_state_call, "into a state that was freed")(
+        lambda draw: {"bytes": b"{}", "freed": draw.any_of(draw.freed)}
+    )
 _case("fmi2DeSerializeFMUstate", "bytes NULL, n > 0")(lambda draw: {"no bytes": True})
 _case("fmi2DeSerializeFMUstate", "state NULL")(lambda draw: {"bytes": b"{}", "null": True})
 
@@ -623,9 +563,10 @@ _UNSUPPORTED = (
 )
 for _function in _UNSUPPORTED:
     _case(_function, "anything")(lambda draw: {})
-
-for _kind_of_status, _number in (("Real", LAST_SUCCESSFUL_TIME_KIND), ("Boolean", TERMINATED_KIND)):
-    _named = {"Real": "fmi2LastSuccessfulTime", "Boolean": "fmi2Terminated"}[_kind_of_status]
+for _kind_of_status, _named, _number in (
+    ("Real", "fmi2LastSuccessfulTime", LAST_SUCCESSFUL_TIME_KIND),
+    ("Boolean", "fmi2Terminated", TERMINATED_KIND),
+):
     for _case_name, _arguments in (
         (_named, {"kind": _number}),
         ("another kind", {"kind": 0}),

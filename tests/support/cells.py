@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cache
 from random import Random
 from typing import NamedTuple
+from xml.etree import ElementTree
 
+from fmus.discovery import ports_of
+from fmus.kinds import PYTHON
+from fmus.ports.description_fmi2 import fmi2_description
 from support import states
-from support.calls import CASES, NO_START, OVERFLOWING, Call, Draw, Saved, Setting, make
-from support.raw import Host, Library, Status, Variable, instance
+from support.calls import CASES, Call, Draw, Saved, make
+from support.raw import Description, Host, Library, Status, Variable, description_in, instance
+from support.settings import Setting, Trials, trials_of
 from support.status_table import ERROR, Cell, Row, rows
 
 #: Step of the trials [s], and how many come before the state stepping is tried.
 H, STEPS = 0.02, 3
 
-#: The rows that need values of their own, by the names of the FMUs that have such values.
-_SETTINGS: Mapping[tuple[str, str], Mapping[str, Setting]] = {
-    ("fmi2DoStep", "values that the equations overflow with"): OVERFLOWING,
-    ("fmi2ExitInitializationMode", "values that give no start"): NO_START,
-    ("fmi2GetReal", "outputs of values that give no start"): NO_START,
+#: The rows that need values of their own.
+_SETTINGS: Mapping[tuple[str, str], Callable[[Trials], Setting | None]] = {
+    ("fmi2DoStep", "values that the equations overflow with"): lambda trials: trials.overflow,
+    ("fmi2ExitInitializationMode", "values that give no start"): lambda trials: trials.no_start,
+    ("fmi2GetReal", "outputs of values that give no start"): lambda trials: trials.no_start,
 }
 
 
@@ -29,7 +35,34 @@ class Company(NamedTuple):
     foreign: bytes  #: a serialised state of another FMU
 
 
-def check(library: Library, key: tuple[str, str], state: str, company: Company) -> bool:
+@cache
+def has_call(name: str, key: tuple[str, str]) -> bool:
+    """Whether a component has the ports that the call of a row is about."""
+    return CASES[key](_draw(_description(name))) is not None
+
+
+@cache
+def _description(name: str) -> Description:
+    """What the FMU of a component says of itself, without building it."""
+    text = fmi2_description(name, "", "", ports_of(name))
+    return description_in(ElementTree.fromstring(text), PYTHON)
+
+
+def _draw(description: Description, time: float = 0.0) -> Draw:
+    return Draw(Random(1), description, ["own"], ["other"], ["freed"], time)
+
+
+def company_of(library: Library, other: Library) -> Company:
+    """Company for trials on an FMU, which another one gives a state to."""
+    with instance(other) as foreign:
+        content = foreign.content()
+    beside = Host(library)
+    assert beside.instantiate()
+    assert beside.setup() == beside.enter() == beside.exit() == Status.OK
+    return Company(beside, content)
+
+
+def check(library: Library, key: tuple[str, str], state: str, company: Company) -> None:
     """Hold an FMU against a cell.
 
     Args:
@@ -37,9 +70,6 @@ def check(library: Library, key: tuple[str, str], state: str, company: Company) 
         key: function and case of the row.
         state: the column.
         company: of the instance.
-
-    Returns:
-        Whether this FMU has such a call.
 
     Raises:
         AssertionError: it answers otherwise.
@@ -53,11 +83,8 @@ def check(library: Library, key: tuple[str, str], state: str, company: Company) 
     for goes_on in ways:
         with instance(library) as host:
             trial = Trial(host, company, row, state)
-            if trial.call is None:
-                return False
             trial.check_call()
             goes_on(trial)
-    return True
 
 
 class Trial:
@@ -68,7 +95,8 @@ class Trial:
         self.cell: Cell = row.cells[state]
         self.mode = "stepping" if state == ERROR else state
         self.time = 0.0
-        self.setting = _SETTINGS.get(row.key, {}).get(host.description.name)
+        found = _SETTINGS.get(row.key)
+        self.setting = found and found(trials_of(host.description.name))
         self._reach(state)
         self.good = host.get_state()
         freed = host.get_state()
@@ -78,9 +106,10 @@ class Trial:
             company.foreign,
         )
         assert host.free_state(freed) == Status.OK
-        self.draw = Draw(Random(1), host.description, ["own"], ["other"], ["freed"], self.time)
-        arguments = CASES[row.key](self.draw)
-        self.call = None if arguments is None else Call(*row.key, arguments)
+        self.draw = _draw(host.description, self.time)
+        drawn = CASES[row.key](self.draw)
+        assert drawn is not None, f"{host.description.name} has no such port"
+        self.call = Call(*row.key, drawn)
 
     def _reach(self, state: str) -> None:
         host = self.host
@@ -124,7 +153,6 @@ class Trial:
 
     def check_call(self) -> None:
         host, call, answer = self.host, self.call, self.cell.answer
-        assert call is not None
         if answer.name == "restored" and self.state == "stepping":
             assert self._step() == Status.OK
         values, content, fault = host.values(), _content(host), host.fault()
@@ -151,7 +179,7 @@ class Trial:
     def _status(self) -> Status:
         """What the call is answered with: PythonFMU knows fmi2OK, and fmi2Discard of steps."""
         answer, library, call = self.cell.answer, self.host.library, self.call
-        is_get = answer.name == "refused" and call is not None and "items" in call.arguments
+        is_get = answer.name == "refused" and "items" in call.arguments
         if not self._is_told_late and (library.answers or not is_get):
             return Status[answer.status.removeprefix("fmi2")]
         return Status.Discard if self.row.function == "fmi2DoStep" else Status.OK

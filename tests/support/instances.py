@@ -13,20 +13,17 @@ import fmpy
 from fmpy.fmi2 import FMU2Slave
 from pythonfmu.enums import Fmi2Status
 
-from fmus.packaging.discovery import components
-from fmus.slave.callbacks import ANSWER
-from fmus.slave.component import Component
-
-#: Names of all components, and of those with inputs.
-NAMES = [*components()]
-WITH_INPUTS = [name for name in NAMES if not name.endswith("Planner")]
+from fmus.discovery import components
+from fmus.python.callbacks import ANSWER
+from fmus.python.component import Component
+from fmus.python.slave import slave_of
 
 
 def component(name: str) -> type[Component[Any, Any, Any, Any]]:
     """The class of a component."""
-    found: type[Component[Any, Any, Any, Any]]
-    found = getattr(import_module(components()[name]), name)
-    return found
+    package = components()[name]
+    ports, behaviour = (import_module(f"{package}.{part}") for part in ("ports", "behaviour"))
+    return slave_of(name, ports, behaviour)
 
 
 def messages_of(slave: Component[Any, Any, Any, Any]) -> list[str]:

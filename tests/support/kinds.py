@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from fmus.packaging.kinds import NATIVE, PYTHON
+from fmus.kinds import NATIVE, PYTHON
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Ending
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
@@ -52,7 +53,7 @@ def outcome(
     table = Table()
     try:
         system = closed_loop(fmus, read_scenario(scenario)).with_parameters(changes)
-        ending = simulate(system, experiment, [table])
+        ending = simulate(planned(system, experiment), [table])
     except InputError as error:
         return Outcome(str(error), None, (), np.empty((0, 0)))
     columns = table.header.columns

@@ -11,6 +11,7 @@ import numpy as np
 
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName, port_name
@@ -221,7 +222,7 @@ def error(folder: Path, model: Model, experiment: Experiment, says: str = "depen
     """The largest error of the outputs of a model, relative to their amplitudes."""
     fmus = {name: linear(folder, says) for name in model.parts}
     table = Table()
-    simulate(system_of(fmus, model.parts, model.wires), experiment, [table])
+    simulate(planned(system_of(fmus, model.parts, model.wires), experiment), [table])
     assert table.failure is None
     right = exact(model.parts, model.wires, np.asarray(table.time))
     return max(

@@ -6,29 +6,19 @@ import struct
 from binascii import crc32
 from collections.abc import Sequence
 from functools import cache
-from importlib import import_module
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args, get_type_hints
 
-from fmus.packaging.discovery import components
+from fmus.discovery import ports_of
 from fmus.ports.port import Port
+from support.settings import behaviour_of
 from support.status_table import MODES
 
 CHECKSUM = "checksum"
 
 MAGIC = "FMU state 2"
 
-#: Lengths of the groups of numbers that a state consists of, 0: of a number in no group.
-_SHAPES = {
-    "AuvPlant": (3, 4, 6, 3, 3),
-    "DisturbanceGenerator": (),
-    "MotionPlanner": (3, 0, 0, 5),
-    "ObserverController": (3, 3, 4),
-    "PathPlanner": (0, 0),
-    "PdController": (4,),
-}
-
-#: Which keep a generator of noise: words of its state and the place of the next, of its kind.
-_NOISY, _WORDS, _VERSION = "AuvPlant", 625, 3
+#: A generator of noise: words of its state and the place of the next, and its kind.
+_WORDS, _VERSION = 625, 3
 
 
 #: What Python raises where a value is not what it should be.
@@ -44,7 +34,9 @@ class Unwritable(ValueError):
 
 
 class _Layout(NamedTuple):
-    name: str
+    #: Lengths of the groups of numbers that a state consists of, 0: of a number in no group.
+    shape: Sequence[int]
+    is_noisy: bool
     parameters: Sequence[Port]
     inputs: int
     outputs: int
@@ -52,12 +44,15 @@ class _Layout(NamedTuple):
 
 @cache
 def _layout(name: str) -> _Layout:
-    ports: Sequence[Port] = import_module(f"{components()[name].rpartition('.')[0]}.ports").PORTS
+    ports: Sequence[Port] = ports_of(name)
     of = {
         causality: [port for port in ports if port.causality == causality]
         for causality in ("input", "output", "parameter")
     }
-    return _Layout(name, of["parameter"], len(of["input"]), len(of["output"]))
+    behaviour = behaviour_of(name)
+    shape = [len(get_args(kind)) for kind in get_type_hints(behaviour.state).values()]
+    noisy, n, m = bool(behaviour.noisy), len(of["input"]), len(of["output"])
+    return _Layout(shape, noisy, of["parameter"], n, m)
 
 
 class _Reader:
@@ -114,8 +109,8 @@ def _read(source: _Reader) -> NativeState | None:
         hidden=None,
     )
     if source.word():
-        said["state"] = [source.reals(n) if n else source.real() for n in _SHAPES[layout.name]]
-        if layout.name == _NOISY:
+        said["state"] = [source.reals(n) if n else source.real() for n in layout.shape]
+        if layout.is_noisy:
             words, has_next, following = source.words(_WORDS), source.word(), source.real()
             said["hidden"] = [_VERSION, words, following if has_next else None]
     said["fault"] = bool(source.word())
@@ -176,7 +171,7 @@ def _written(said: NativeState) -> bytes:
     if said["state"] is not None:
         for group in said["state"]:
             parts.append(_reals(*group) if isinstance(group, list) else _reals(group))
-        if layout.name == _NOISY:
+        if layout.is_noisy:
             _, words, following = said["hidden"]
             parts += [_words(*words, following is not None), _reals(following or 0.0)]
     return b"".join(parts) + _words(said["fault"], said[CHECKSUM])

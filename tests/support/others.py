@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 from zipfile import ZipFile
 
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.hooks.hook import Hook
-from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
-from orchestrator.master.simulation import simulate
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from support.compiled import library_of
+from support.runs import table_of
 
 _SOURCE = Path(__file__).with_name("others.c")
 
@@ -103,16 +101,7 @@ def system_of(fmu: Path, names: str = "a", wires: dict[str, str] | None = None) 
 
 
 def run(
-    system: System,
-    stop_time: float = 1.0,
-    step: float = 0.1,
-    loop: str = "python",
-    isolation: Isolation | None = None,
-    order: str = "jacobi",
-    hooks: Sequence[Hook] = (),
+    system: System, stop_time: float = 1.0, step: float = 0.1, order: str = "jacobi", **how: Any
 ) -> Table:
     """All rows of a run."""
-    table, experiment = Table(), Experiment(stop_time, step, order)
-    how = chosen(loop, experiment, isolation)
-    simulate(system, experiment, [table], isolation, how, hooks)
-    return table
+    return table_of(system, Experiment(stop_time, step, order), **how)

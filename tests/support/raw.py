@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from fmus.packaging.kinds import NATIVE, PYTHON
+from fmus.kinds import NATIVE, PYTHON
 from support.raw_fmi import CO_SIMULATION, Callbacks, Logger
 
 
@@ -88,6 +88,10 @@ class Description:
 
 def read_description(folder: Path) -> Description:
     root = ElementTree.parse(folder / "modelDescription.xml").getroot()
+    return description_in(root, NATIVE if (folder / "sources").is_dir() else PYTHON)
+
+
+def description_in(root: ElementTree.Element, kind: str) -> Description:
     implementation = root.find("CoSimulation")
     assert implementation is not None
     return Description(
@@ -95,23 +99,28 @@ def read_description(folder: Path) -> Description:
         root.attrib["guid"],
         implementation.attrib["modelIdentifier"],
         tuple(_variable(element) for element in root.iterfind("ModelVariables/ScalarVariable")),
-        NATIVE if (folder / "sources").is_dir() else PYTHON,
+        kind,
     )
 
 
 def _variable(element: ElementTree.Element) -> Variable:
     [value] = [child for child in element if child.tag in KINDS]
-    start = value.get("start")
-    convert = {"Real": float, "Integer": int, "Boolean": lambda text: text == "true"}
-    limits = [value.get("min"), value.get("max")]
+    return variable(element, value.tag, value, value.get("start"))
+
+
+def variable(
+    element: ElementTree.Element, kind: str, limited: ElementTree.Element, start: str | None
+) -> Variable:
+    """A variable of an element, with the limits of one, and a start value as text."""
+    convert = {"Real": float, "Integer": int, "Boolean": "true".__eq__, "String": str}[kind]
     return Variable(
         element.attrib["name"],
         int(element.attrib["valueReference"]),
-        value.tag,
+        kind,
         element.attrib["causality"],
         element.attrib["variability"],
-        start if start is None or value.tag == "String" else convert[value.tag](start),
-        *(None if limit is None else float(limit) for limit in limits),
+        None if start is None else convert(start),
+        *(None if limit is None else float(limit) for limit in map(limited.get, ("min", "max"))),
     )
 
 

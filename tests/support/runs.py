@@ -2,18 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from orchestrator.master.experiment import Experiment, Order
+from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.preparation import Prepared, Request, loaded, prepare
+from orchestrator.runs.preparation import Prepared, loaded, prepare
+from orchestrator.runs.request import Request
+from orchestrator.runs.scenario import read_scenario
+from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.structure import System
 from orchestrator.vehicle.indices import metrics_of
+
+
+def table_of(
+    system: System,
+    experiment: Experiment,
+    loop: str = "python",
+    isolation: Isolation | None = None,
+    hooks: Sequence[Hook] = (),
+) -> Table:
+    """All rows of a run, however it ends."""
+    table = Table()
+    how = chosen(loop, experiment, isolation)
+    simulate(planned(system, experiment), [table], isolation, how, hooks)
+    return table
+
+
+def whole(system: System, experiment: Experiment, *args: Any, **how: Any) -> Table:
+    """All rows of a run that comes to its end."""
+    table = table_of(system, experiment, *args, **how)
+    assert table.failure is None
+    return table
 
 
 def run(
@@ -23,10 +52,13 @@ def run(
     order: Order = "gauss-seidel",
     loop: str = "python",
 ) -> Table:
-    """All rows of a run."""
-    table, experiment = Table(), Experiment(stop_time, step, order)
-    simulate(system, experiment, [table], loop=chosen(loop, experiment))
-    return table
+    """All rows of a run, by its times."""
+    return table_of(system, Experiment(stop_time, step, order), loop)
+
+
+def system_of(fmus: Path, scenario: str) -> System:
+    """The closed loop of a scenario, of the FMUs in a folder."""
+    return closed_loop(fmus, read_scenario(scenario))
 
 
 def prepared(name: str | Path, kind: str = "native", request: Request | None = None) -> Prepared:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from fmus.ports.quantities import ETA, NU, TAU
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
-from orchestrator.system.names import port_name
+from orchestrator.system.names import PortName, port_name
 from orchestrator.vehicle.signals import STANDARD
 
 COLUMNS = (
@@ -45,9 +46,11 @@ def loop_table(n: int = 400, without: Collection[str] = (), seed: int = 1) -> Ta
     return Table.of(Header(columns, experiment, known, units=UNITS), rows)
 
 
-def table_of(**columns: np.ndarray) -> Table:
-    """A table of given columns, `a__b` for `a.b`, and no parameters."""
+def table_of(
+    time: np.ndarray, parameters: Mapping[PortName, Any] | None = None, **columns: Any
+) -> Table:
+    """A table of given columns, `a__b` for `a.b`; a number stands in all rows."""
     names = tuple(name.replace("__", ".") for name in columns)
-    n = len(next(iter(columns.values())))
-    rows = np.column_stack((STEP * np.arange(n), *columns.values()))
-    return Table.of(Header(names, Experiment((n - 1) * STEP, STEP)), rows)
+    values = [np.broadcast_to(value, len(time)) for value in columns.values()]
+    header = Header(names, Experiment(float(time[-1]), float(time[1])), parameters or {})
+    return Table.of(header, np.column_stack([time, *values]))

@@ -5,16 +5,16 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from ctypes import addressof, c_double, c_int, c_void_p
+from ctypes import addressof, c_double, c_int, c_size_t, c_void_p
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from fmus.packaging.kinds import PYTHON
-from support.calls import MANY, MODEL_EXCHANGE_FUNCTIONS
-from support.cells import Company, check
+from fmus.kinds import PYTHON
+from support.calls import MANY
+from support.cells import check, company_of
 from support.raw import Host, Library, Status, instance
-from support.raw_fmi import MODEL_EXCHANGE
+from support.raw_fmi import MODEL_EXCHANGE, SIGNATURES
 from support.status_table import (
     CREATION,
     WITHOUT_AN_INSTANCE,
@@ -24,8 +24,6 @@ from support.status_table import (
 
 #: A row and a column.
 Cell = tuple[tuple[str, str], str]
-
-SKIPPED = "skipped"
 
 _NOT_UTF_8 = b"ta\xffnh"
 
@@ -63,12 +61,7 @@ def trials(folder: Path, other: Path, kind: str = PYTHON) -> Callable[[Cell], st
 
     """
     library = Library(folder)
-    with instance(Library(other)) as foreign:
-        content = foreign.content()
-    beside = Host(library)
-    assert beside.instantiate()
-    assert beside.setup() == beside.enter() == beside.exit() == Status.OK
-    company = Company(beside, content)
+    company = company_of(library, Library(other))
 
     def trial(cell: Cell) -> str:
         (function, case), state = cell
@@ -77,8 +70,8 @@ def trials(folder: Path, other: Path, kind: str = PYTHON) -> Callable[[Cell], st
                 _check_creation(library, case, creations(kind)[case])
             elif function == WITHOUT_AN_INSTANCE:
                 _check_without_an_instance(library, case)
-            elif not check(library, (function, case), state, company):
-                return SKIPPED
+            else:
+                check(library, (function, case), state, company)
         except Exception as error:  # PythonFMU may leave one behind that is not of this trial.
             return f"{type(error).__name__}: {error}".splitlines()[0]
         return ""
@@ -133,31 +126,11 @@ def _check_creation(library: Library, case: str, possible: bool) -> None:
         assert after.setup() == Status.OK, "no instance can be made any more"
 
 
-#: Every call, with arguments that are good on an instance.
-_CALLS: tuple[tuple[Any, ...], ...] = (
-    ("fmi2SetDebugLogging", 1, 0, None),
-    ("fmi2SetupExperiment", 0, c_double(0.0), c_double(0.0), 0, c_double(0.0)),
-    ("fmi2EnterInitializationMode",),
-    ("fmi2ExitInitializationMode",),
-    ("fmi2Terminate",),
-    ("fmi2Reset",),
-    *((f"fmi2{action}{kind}", None, 0, None)
-      for action in ("Get", "Set") for kind in ("Real", "Integer", "Boolean", "String")),
-    ("fmi2GetFMUstate", (c_double * 1)()),
-    ("fmi2SetFMUstate", None),
-    ("fmi2FreeFMUstate", (c_double * 1)()),
-    ("fmi2SerializedFMUstateSize", None, (c_double * 1)()),
-    ("fmi2SerializeFMUstate", None, (c_double * 1)(), 8),
-    ("fmi2DeSerializeFMUstate", b"{}", 2, (c_double * 1)()),
-    ("fmi2GetDirectionalDerivative", None, 0, None, 0, None, None),
-    ("fmi2SetRealInputDerivatives", None, 0, None, None),
-    ("fmi2GetRealOutputDerivatives", None, 0, None, None),
-    ("fmi2DoStep", c_double(0.0), c_double(0.02), 1),
-    ("fmi2CancelStep",),
-    *((function, None, 0, None) for function in MODEL_EXCHANGE_FUNCTIONS),
-    *((f"fmi2Get{kind}Status", 0, (c_double * 1)())
-      for kind in ("", "Real", "Integer", "Boolean", "String")),
-)  # fmt: skip
+def _argument(kind: Any) -> Any:
+    """What does no harm on an instance: zero, no state, or room for what a pointer asks for."""
+    if kind in (c_int, c_double, c_size_t):
+        return kind()
+    return None if kind is c_void_p else (c_double * 8)()
 
 
 def _check_without_an_instance(library: Library, case: str) -> None:
@@ -173,8 +146,9 @@ def _check_without_an_instance(library: Library, case: str) -> None:
             gone.free()
         elif case == "a pointer to something else":
             target = addressof(memory)
-        for name, *arguments in _CALLS:
-            status = witness.call_on(target, name, *arguments)
+        for short, signature in SIGNATURES.items():
+            name = f"fmi2{short}"
+            status = witness.call_on(target, name, *map(_argument, signature))
             assert f"fmi2{status.name}" == without_an_instance()[case], f"{name}: {status.name}"
         witness.library.functions.fmi2FreeInstance(c_void_p(target))
         assert list(memory) == [0] * 64

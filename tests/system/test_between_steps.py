@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fmus.kinds import NATIVE
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.fmi.instance import Ended
 from orchestrator.master.hooks.hook import NEVER, Run
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.bundle import NATIVE
 from orchestrator.runs.preparation import load
 from orchestrator.system.names import port_name
 from support.machine import LOOPS
@@ -48,7 +49,9 @@ class Pushes:
 def test_a_hook_acts_on_the_steps_that_it_names(loop, order):
     system, experiment = load("fig4", NATIVE), Experiment(14.0, 0.02, order)
     table, pushes = Table(), Pushes(10, 620, 650)
-    ending = simulate(system, experiment, [table], None, chosen(loop, experiment), hooks=[pushes])
+    ending = simulate(
+        planned(system, experiment), [table], None, chosen(loop, experiment), hooks=[pushes]
+    )
     assert pushes.times == [0, 10, 620, 650]
     assert (ending.failure, ending.remark) == (None, "ended at t = 13 s: enough")
     assert len(table) == 651

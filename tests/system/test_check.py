@@ -15,7 +15,8 @@ from orchestrator.formats.examination import open_inputs
 from orchestrator.formats.ssp import STRUCTURE
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.preparation import Request, load, loaded, prepare
+from orchestrator.runs.preparation import load, loaded, prepare
+from orchestrator.runs.request import Request
 from orchestrator.runs.result import simulate
 from orchestrator.runs.scenario import names
 from orchestrator.system.component import read_component
@@ -86,6 +87,20 @@ def test_run_says_the_first_and_how_many_more(workplace, capsys):
     out, err = capsys.readouterr()
     assert "nobody" in err and "4 more: see `auv-fmu check`" in err
     assert not out
+
+
+def test_all_mistakes_of_a_study_are_said(tmp_path, capsys):
+    file = tmp_path / "mine.toml"
+    file.write_text('titel = "x"\n[sample]\nn = 0\n[sample.range]\nplant.ell = [0.3, 0.4]\n')
+    assert main(["check", str(file)]) == 2
+    said = [line.partition("mine.toml: ")[2] for line in capsys.readouterr().out.splitlines()]
+    assert {text.partition(";")[0] for text in said} == {
+        "sample: n = 0: write a whole number from 1 to 1,000,000,000",
+        "unknown entry 'titel'",
+        "lacks scenario",
+    }
+    file.write_text('scenario = "fig5"\n[vary]\nplant.ell = [0.3, 0.4]\n')
+    assert main(["check", str(file)]) == 0
 
 
 def test_all_mistakes_of_an_archive_are_said(dist, workplace, capsys):

@@ -187,6 +187,7 @@ def test_a_run_with_a_companion_and_figures(capsys):
     assert result("killed") == result("whole")
 
 
+@pytest.mark.slow
 def test_killed_before_any_call_that_changes_the_disk():
     """Before every third one."""
     arguments = ["fig4", "--no-figures", "--stop-time", "0.16", "--checkpoint-every", "0.08"]
@@ -200,6 +201,7 @@ def test_killed_before_any_call_that_changes_the_disk():
     assert n > 20
 
 
+@pytest.mark.slow
 def test_killed_at_any_time_by_the_kernel():
     """With another loop and without isolation it goes on as well."""
     arguments = ["fig4", "--stop-time", "5", "--no-figures", *CHECKPOINTS]

@@ -18,7 +18,6 @@ from auv_fmu.output_feedback import Gains
 from auv_fmu.plant import RollAxis
 from auv_fmu.saturation import ARCTAN
 from orchestrator.master.observers.table import Table
-from orchestrator.runs.wiring import closed_loop as wired
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 from orchestrator.vehicle.indices import metrics_of
@@ -29,11 +28,6 @@ from support.runs import final_error, run
 STEPS = 5000
 UQR, XYZ = ("u", "q", "r"), ("x", "y", "z")
 QUIET = {PortName("plant", "noise.std"): 0.0}
-
-
-@pytest.fixture(scope="module")
-def system(dist: Path) -> System:
-    return wired(dist)
 
 
 @pytest.fixture(scope="module")

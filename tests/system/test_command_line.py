@@ -13,10 +13,12 @@ import pytest
 from fmpy.util import read_csv
 
 from orchestrator.commands.main import main
+from orchestrator.machine.cache import users_folder
 from orchestrator.machine.ledger import LEDGER
 from orchestrator.runs import bundle
 from orchestrator.runs.scenario import FOLDER as SCENARIOS
 from orchestrator.runs.scenario import names, read_scenario
+from support.texts import mentions, tells
 
 
 def files(folder: Path) -> set[str]:
@@ -66,18 +68,23 @@ def test_build_replaces_fmus_that_are_not_what_was_built(dist, workplace):
     assert other.stat().st_mtime_ns == untouched
 
 
-def test_run_replaces_a_cached_fmu_that_is_not_what_was_built(workplace):
-    fmu = bundle.current_fmus() / "AuvPlant.fmu"
-    whole = fmu.read_bytes()
-    fmu.write_bytes(whole[:1000])
+def test_run_replaces_a_cached_fmu_that_is_not_what_was_built(workplace, monkeypatch):
+    bundle.current_fmus()
+    # Other tests read the one that all share.
+    cache = shutil.copytree(users_folder(), workplace / "cache" / users_folder().name)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(cache.parent))
+    bundle.current_fmus.cache_clear()
     try:
+        fmu = bundle.current_fmus() / "AuvPlant.fmu"
+        whole = fmu.read_bytes()
+        fmu.write_bytes(whole[:1000])
         bundle.current_fmus.cache_clear()
         assert main(["run", "fig4", "--stop-time", "0.1", "--no-figures"]) == 0
         assert (bundle.current_fmus() / "AuvPlant.fmu").read_bytes() == whole
         # Whatever that is, it is not ours to overwrite.
         assert fmu.read_bytes() == whole[:1000]
     finally:
-        fmu.write_bytes(whole)
+        bundle.current_fmus.cache_clear()
 
 
 def test_run_writes_into_its_folder_alone(workplace):
@@ -168,17 +175,17 @@ def test_gains_prints_both_sides_and_the_verdicts(workplace, capsys):
     assert main(["gains"]) == 0
     shown = capsys.readouterr().out
     assert "10 > 15: violated" in shown
-    assert "15 + 0.5 (zeta_1 + zeta_2), at least 191.7: violated" in shown
-    assert "alpha_1 = -5, alpha_2 = 0, alpha_3 <= -161.7, alpha_4 <= 958.8" in shown
+    assert tells(shown, [191.7], (-5, 0, -161.7, 958.8))
+
     assert "R_A is empty" in shown
-    assert "the paper's own gains: as printed they miss (30), and (31)" in shown
+    assert "the paper's own gains" in shown
     assert main(["gains", "--set", "controller.lambda=3"]) == 0
     shown = capsys.readouterr().out
     assert "30 > 25: met" in shown
     assert "paper's own gains" not in shown
     # Theorem 2 weighs K_1 with s'_M = 2 / pi: 20 / pi + 5 is 11.3662.
     assert main(["gains", "--set", "controller.saturation=arctan"]) == 0
-    assert "30 > 11.3662 + 0.5 (zeta_1 + zeta_2)" in capsys.readouterr().out
+    assert tells(capsys.readouterr().out, (30, 11.3662))
 
 
 def test_edited_copy_of_a_comparison_compares_like_with_like(workplace):
@@ -211,8 +218,9 @@ def test_every_scenario_is_exported_and_runs_from_its_ssp(workplace, scenario):
     folder = workplace / "exports" / scenario
     assert {f"{scenario}.ssp", "OspSystemStructure.xml", "AuvPlant.fmu"} <= files(folder)
     archive = str(folder / f"{scenario}.ssp")
-    assert main(["run", scenario, "--stop-time", "0.5", "--out", "direct"]) == 0
-    assert main(["run", archive, "--stop-time", "0.5", "--out", "exported"]) == 0
+    how = ("--stop-time", "0.5", "--no-figures")
+    assert main(["run", scenario, *how, "--out", "direct"]) == 0
+    assert main(["run", archive, *how, "--out", "exported"]) == 0
     direct, exported = (Path(name, "result.csv").read_text() for name in ("direct", "exported"))
     assert exported == direct
 
@@ -231,56 +239,56 @@ def test_animation_is_written(workplace):
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["run", "fig99"], "no scenario 'fig99'; there are"),
+        (["run", "fig99"], "'fig99'; fig4"),
         (["run", "missing.ssp"], "missing.ssp"),
         (["run", "fig4", "--set", "plant.m11"], "COMPONENT.PARAMETER=VALUE"),
         (["run", "fig4", "--set", "m11=3"], "component.port"),
-        (["run", "fig4", "--set", "plant.m11=nan"], "must be finite"),
-        (["run", "fig4", "--set", "plant.mass=3"], "no port or parameter"),
-        (["run", "fig4", "--step", "-1"], "must be positive"),
-        (["run", "fig4", "--stop-time", "0"], "must be positive"),
+        (["run", "fig4", "--set", "plant.m11=nan"], "finite"),
+        (["run", "fig4", "--set", "plant.mass=3"], "plant 'mass'"),
+        (["run", "fig4", "--step", "-1"], "positive"),
+        (["run", "fig4", "--stop-time", "0"], "positive"),
         (["run", "broken.toml"], "broken.toml"),
-        (["run", "unknown.toml"], "unknown entry 'stop_tme'"),
-        (["run", "wrong.toml"], "wrong type"),
-        (["run", "figure.toml"], "no figure 'none'"),
-        (["run", "broken.ssp"], "cannot be opened"),
+        (["run", "unknown.toml"], "'stop_tme'"),
+        (["run", "wrong.toml"], "type"),
+        (["run", "figure.toml"], "'none'"),
+        (["run", "broken.ssp"], "broken.ssp"),
         (["run", "fig4", "--out", "file/below"], "--out"),
-        (["run", "fig4", "--out", ""], "the argument after --out is empty"),
-        (["run", "fig4", "--order", ""], "the argument after --order is empty"),
-        (["run", "fig4", "--order="], "--order= says nothing"),
-        (["plot", ""], "the argument after plot is empty"),
-        (["build", "--out", "file/below"], "cannot write into"),
-        (["run", "wire.toml"], "controller has no input dy nor inputs dy.*"),
-        (["run", "wires.toml"], "not a table of names"),
-        (["run", "only.toml"], "no such component"),
-        (["run", "bool.toml"], "wrong type"),
-        (["run", "compare.toml"], "no scenario 'nosuch'"),
+        (["run", "fig4", "--out", ""], "--out"),
+        (["run", "fig4", "--order", ""], "--order"),
+        (["run", "fig4", "--order="], "--order="),
+        (["plot", ""], "plot"),
+        (["build", "--out", "file/below"], "file/below"),
+        (["run", "wire.toml"], "controller dy dy.*"),
+        (["run", "wires.toml"], "wires"),
+        (["run", "only.toml"], "pilot"),
+        (["run", "bool.toml"], "type"),
+        (["run", "compare.toml"], "'nosuch'"),
         (["run", "fig4", "--stop-time", "1e300"], "steps"),
         (["run", "fig4", "--step", "1e-300"], "steps"),
-        (["run", "fig4", "--set", "plant.noise.seed=4294967297"], "must be at most"),
-        (["run", "fig4", "--set", "controller.K1=20"], "did you mean K1[1]"),
-        (["run", "fig4", "--interval", "0"], "must be positive"),
-        (["run", "named.toml"], "letters, digits and _ alone"),
-        (["verify", "broken.ssp", "--tolerance", "nan"], "must not be negative"),
-        (["run", "fig4", "--columns", "plant.tua.*"], "no column matches"),
-        (["run", "unwired.toml"], "no wire 'plant.tua' to remove; did you mean plant.tau"),
-        (["run", "fig4", "--stop-time", "0.1", "--out", "taken"], "taken/result.csv is not"),
-        (["gains", "--set", "plant.ell=0"], "must be at least"),
-        (["gains", "--set", "controller.K1[1]=nan"], "must be finite"),
-        (["run", "missing.toml"], "no such file"),
-        (["gains", "--set", "controller.lambda=much"], "not a real number"),
-        (["gains", "--set", "controller.saturation=sigmoid"], "use one of tanh, algebraic"),
-        (["animate", "fig4", "--stop-time", "0.1", "--out", "film.avi"], "write a .gif"),
-        (["run", "digits.toml"], "must be smaller than 1e308 s"),
-        (["run", "more_digits.toml"], "not a scenario: Exceeds the limit"),
-        (["run", "parameter.toml"], "not a real number"),
-        (["run", "infinite.toml"], "must be finite"),
-        (["run", "arrays.toml"], "nested too deeply"),
-        (["run", "keys.toml"], "nested too deeply"),
+        (["run", "fig4", "--set", "plant.noise.seed=4294967297"], "plant.noise.seed"),
+        (["run", "fig4", "--set", "controller.K1=20"], "K1[1]"),
+        (["run", "fig4", "--interval", "0"], "positive"),
+        (["run", "named.toml"], "a.b"),
+        (["verify", "broken.ssp", "--tolerance", "nan"], "tolerance"),
+        (["run", "fig4", "--columns", "plant.tua.*"], "plant.tua.*"),
+        (["run", "unwired.toml"], "'plant.tua' plant.tau"),
+        (["run", "fig4", "--stop-time", "0.1", "--out", "taken"], "taken/result.csv"),
+        (["gains", "--set", "plant.ell=0"], "plant.ell"),
+        (["gains", "--set", "controller.K1[1]=nan"], "finite"),
+        (["run", "missing.toml"], "missing.fmu"),
+        (["gains", "--set", "controller.lambda=much"], "real"),
+        (["gains", "--set", "controller.saturation=sigmoid"], "tanh, algebraic"),
+        (["animate", "fig4", "--stop-time", "0.1", "--out", "film.avi"], ".gif"),
+        (["run", "digits.toml"], "1e308"),
+        (["run", "more_digits.toml"], "more_digits.toml limit"),
+        (["run", "parameter.toml"], "real"),
+        (["run", "infinite.toml"], "finite"),
+        (["run", "arrays.toml"], "nested"),
+        (["run", "keys.toml"], "nested"),
         (["run", "list.toml"], "[[[[[[[[[[[[["),
-        (["run", "zero.toml"], "not a text in UTF-8"),
-        (["run", "fig4", "--set", "plant.noise.seed=1_0"], "not an integer"),
-        (["run", "fig4", "--set", "plant.m11=\u0662"], "not a real number"),
+        (["run", "zero.toml"], "UTF-8"),
+        (["run", "fig4", "--set", "plant.noise.seed=1_0"], "integer"),
+        (["run", "fig4", "--set", "plant.m11=\u0662"], "real"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(workplace, capsys, arguments, reason):
@@ -309,7 +317,7 @@ def test_bad_input_is_one_line_and_status_2(workplace, capsys, arguments, reason
     (workplace / "missing.toml").write_text('[components]\ncontroller = "missing.fmu"')
     assert main(arguments) == 2
     error = capsys.readouterr().err
-    assert reason in error
+    assert mentions(error, reason)
     assert error.count("\n") == 1
     assert error.startswith("auv-fmu: ")
 

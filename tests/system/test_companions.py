@@ -10,9 +10,9 @@ import pytest
 
 from orchestrator.commands.main import main
 from orchestrator.master.observers.table import Table
-from orchestrator.master.simulation import simulate
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.preparation import Request, loaded, prepare, with_companion
+from orchestrator.runs.preparation import loaded, prepare, with_companion
+from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.vehicle.signals import STANDARD
 from support.markdown import DOCS, blocks
@@ -33,7 +33,7 @@ def runs_of(text, stop_time=1.0):
     tables = []
     for prepared in pair_of(f"stop_time = {stop_time}\n{text}"):
         table = Table()
-        simulate(prepared.system, prepared.experiment, [table], hooks=prepared.hooks())
+        prepared.run([table])
         tables.append(table)
     return tables
 

@@ -20,6 +20,7 @@ from orchestrator.machine.errors import InputError
 from support.archives import archive, component, described, fmu, system, variable
 from support.others import build
 from support.relay import relay
+from support.texts import mentions
 
 STEP, STEPS = 0.125, 24
 
@@ -133,20 +134,20 @@ def test_what_is_written_for_libcosim_is_read_again(dist: Path, tmp_path: Path):
     ("old", "new", "why"),
     [
         ('<LinearTransformation name="scaled" factor="0.5" offset="-0.25"/>',
-         '<Sum name="scaled" inputCount="1"/>', "function scaled: a <Sum> is not supported"),
-        ('offset="-0.25"', 'offset="1,5"', "offset '1,5' is no number"),
-        ("VariableConnection>", "VariableGroupConnection>", "a <VariableGroupConnection> of 2 var"),
-        ('name="in"/>', 'name="into"/>', "function scaled: takes one variable, and has 0"),
-        ('function="scaled" name="in"', 'function="scale" name="in"', "no function 'scale'"),
-        ('simulator="c" name="v"', 'simulator="c" name="w"', "c has no port or parameter 'w'"),
-        ('simulator="b" name="y"', 'simulator="d" name="y"', "has no component 'd'"),
-        ('<Real value="0.7"/>', '<Real value="much"/>', "a.v = much: not a real number"),
-        ('<Real value="0.7"/>', "", "a.v: an initial value without a value"),
-        ('name="b" source', 'name="a" source', "two simulators are named a"),
-        ('source="relay.fmu" stepSize', 'source="none.fmu" stepSize', "holds no 'none.fmu' for b"),
+         '<Sum name="scaled" inputCount="1"/>', "scaled: <Sum>"),
+        ('offset="-0.25"', 'offset="1,5"', "offset '1,5'"),
+        ("VariableConnection>", "VariableGroupConnection>", "<VariableGroupConnection> 2"),
+        ('name="in"/>', 'name="into"/>', "scaled: 0"),
+        ('function="scaled" name="in"', 'function="scale" name="in"', "'scale'"),
+        ('simulator="c" name="v"', 'simulator="c" name="w"', "c 'w'"),
+        ('simulator="b" name="y"', 'simulator="d" name="y"', "'d'"),
+        ('<Real value="0.7"/>', '<Real value="much"/>', "a.v much"),
+        ('<Real value="0.7"/>', "", "a.v: value"),
+        ('name="b" source', 'name="a" source', "two a"),
+        ('source="relay.fmu" stepSize', 'source="none.fmu" stepSize', "'none.fmu' b"),
         ('"../fmus/relay%20one.fmu"', '"proxyfmu://host?file=x.fmu"', "'proxyfmu://host?file=x"),
-        (f"<BaseStepSize>{STEP}<", "<BaseStepSize>fast<", "BaseStepSize 'fast' is no number"),
-        ("<OspSystemStructure ", "<OspSystem ", "mismatched tag"),
+        (f"<BaseStepSize>{STEP}<", "<BaseStepSize>fast<", "BaseStepSize 'fast'"),
+        ("<OspSystemStructure ", "<OspSystem ", "tag"),
     ],
 )  # fmt: skip
 def test_what_of_an_osp_file_cannot_be_run_is_said_by_name(osp: Path, old, new, why):
@@ -154,14 +155,14 @@ def test_what_of_an_osp_file_cannot_be_run_is_said_by_name(osp: Path, old, new, 
     (osp / STRUCTURE).write_text(OSP.replace(old, new), encoding="utf-8")
     with pytest.raises(InputError) as error:
         load(osp)
-    assert why in str(error.value) and "\n" not in str(error.value)
+    assert mentions(str(error.value), why) and "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "why"),
     [
-        ("fixedStep", "ecco", "asks for the algorithm 'ecco'; steps of one length are made"),
-        (f'"{2 * STEP}"', f'"{2.03 * STEP}"', "b: its step of 0.25375 s becomes 0.25 s"),
+        ("fixedStep", "ecco", "'ecco'"),
+        (f'"{2 * STEP}"', f'"{2.03 * STEP}"', "b: .* 0.25375 s .* 0.25 s"),
     ],
 )
 def test_what_of_an_osp_file_changes_is_a_warning(osp: Path, old, new, why):
@@ -181,7 +182,7 @@ def test_units_of_an_osp_file_are_not_converted(tmp_path: Path):
         f"{wire}</VariableConnection></Connections></OspSystemStructure>",
         encoding="utf-8",
     )
-    with pytest.warns(UserWarning, match=r"m\.y -> mm\.u: units differ, m and mm; values are take"):
+    with pytest.warns(UserWarning, match=r"m\.y -> mm\.u: .* m and mm"):
         [connection] = load(tmp_path).connections
     assert connection.transformation is not None and connection.transformation(2.5) == 2.5
 
@@ -241,13 +242,13 @@ def test_a_scenario_wins_over_a_folder_of_its_name(dist: Path, workplace: Path):
 @pytest.mark.parametrize(
     ("name", "why"),
     [
-        ("mine.mo", "or give a .toml, .ssp, .ssd or .fmu file, an OspSystemStructure.xml, or a fo"),
-        ("empty", "empty: not a readable SSP: there is no SystemStructure.ssd in it"),
-        ("none.ssd", "not a readable SSP: there is no none.ssd in it"),
-        ("none.xml", "none.xml: no such file"),
-        ("other.xml", "not a readable OspSystemStructure.xml: it describes a <other>"),
-        ("text.xml", "not a readable OspSystemStructure.xml: syntax error"),
-        ("none.fmu", "none.fmu: no such file"),
+        ("mine.mo", ".toml .ssp .ssd .fmu OspSystemStructure.xml"),
+        ("empty", "empty: SystemStructure.ssd"),
+        ("none.ssd", "none.ssd"),
+        ("none.xml", "none.xml:"),
+        ("other.xml", "OspSystemStructure.xml <other>"),
+        ("text.xml", "OspSystemStructure.xml: syntax"),
+        ("none.fmu", "none.fmu:"),
     ],
 )
 def test_what_is_none_of_these_is_refused_in_one_line(workplace: Path, capsys, name, why):
@@ -257,7 +258,7 @@ def test_what_is_none_of_these_is_refused_in_one_line(workplace: Path, capsys, n
     for command in ("run", "check"):
         assert main([command, name]) == 2
         out, err = capsys.readouterr()
-        assert why in (out + err) and len((out + err).splitlines()) == 1
+        assert mentions(out + err, why) and len((out + err).splitlines()) == 1
 
 
 WIRED = """
@@ -305,13 +306,13 @@ def test_a_scenario_wires_single_ports_beside_groups(dist: Path, wired: Path):
 @pytest.mark.parametrize(
     ("wire", "why"),
     [
-        ('"g.u" = "t.out"', "g.u is one input, and t has no port 'out'; did you mean out.a or out"),
-        ('"g.u" = "t.yy"', "g.u is one input, and t has no port 'yy'; did you mean y?"),
-        ('"x.in" = "t.one"', "t.one is one port, and x.in a group of inputs; wire one of them; "
-         "did you mean in.a or in.b?"),
-        ('"g.sped" = "t.y"', "g has no input sped nor inputs sped.*; did you mean speed?"),
-        ('"g.u" = "tt.y"', "there is no component 'tt'; did you mean t?"),
-        ('"t.y" = "g.u"', "g.u is of causality input, not output"),
+        ('"g.u" = "t.out"', "g.u t 'out' out.a out.b"),
+        ('"g.u" = "t.yy"', "g.u t 'yy' y?"),
+        ('"x.in" = "t.one"', "t.one x.in "
+         "in.a in.b?"),
+        ('"g.sped" = "t.y"', "g sped sped.* speed?"),
+        ('"g.u" = "tt.y"', "'tt' t?"),
+        ('"t.y" = "g.u"', "g.u input output"),
     ],
 )  # fmt: skip
 def test_a_wire_that_cannot_be_says_what_to_write(dist: Path, wired: Path, wire: str, why: str):
@@ -319,7 +320,7 @@ def test_a_wire_that_cannot_be_says_what_to_write(dist: Path, wired: Path, wire:
     wired.write_text(WIRED.replace(old, wire), encoding="utf-8")
     with pytest.raises(InputError) as error:
         load(wired).check()
-    assert why in str(error.value) and "\n" not in str(error.value)
+    assert mentions(str(error.value), why) and "\n" not in str(error.value)
 
 
 def test_a_wire_of_two_single_ports_carries_their_values(dist: Path, workplace: Path):

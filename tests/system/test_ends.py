@@ -14,6 +14,7 @@ from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from support.others import WAYS, build, run, system_of
+from support.tiers import slow
 
 EVERY_WAY = pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 
@@ -117,7 +118,7 @@ def rows_of(table):
 
 @EVERY_WAY
 @pytest.mark.parametrize("order", ["jacobi", "gauss-seidel"])
-@pytest.mark.parametrize("who", "abc")
+@pytest.mark.parametrize("who", ["b", *slow("a", "c")])
 @pytest.mark.parametrize(("at", "n"), [(0.5, 6), (0.45, 6), (0.02, 2)])
 def test_the_last_row_is_that_of_the_time_which_the_fmu_has_come_to(
     tmp_path, way, order, who, at, n

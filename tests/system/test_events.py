@@ -20,8 +20,8 @@ from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS
 from orchestrator.master.observers.table import Table
-from orchestrator.master.simulation import simulate as run
-from orchestrator.runs.preparation import Request, loaded, prepare, with_companion
+from orchestrator.runs.preparation import loaded, prepare, with_companion
+from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.vehicle.signals import tracking_error
 
@@ -283,10 +283,7 @@ def test_what_is_said_of_the_scenarios_is_so(name):
     own = prepare(scenario, loaded(name, "native")[1], Request(kind="native", loop="compiled"))
     for prepared in with_companion(own, Request(kind="native", loop="compiled")):
         table = Table()
-        run(
-            prepared.system, prepared.experiment, [table],
-            loop=prepared.loop, hooks=prepared.hooks(),
-        )  # fmt: skip
+        prepared.run([table])
         error = np.linalg.norm(tracking_error(table), axis=1)
         time, after = table.time, table.time >= begin
         before, largest, below, force = SAID[name][prepared.scenario.label]

@@ -260,9 +260,9 @@ def test_an_fmu_that_cannot_be_instantiated_says_that_it_needs_a_tool(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "why"),
     [
-        ('fmiVersion="2.0"', 'fmiVersion="1.0"', "is of FMI 1.0; only FMUs of FMI 2.0"),
-        ('fmiVersion="2.0"', 'fmiVersion="3.0"', "is of FMI 3.0; only FMUs of FMI 2.0"),
-        ("CoSimulation", "ModelExchange", "is for model exchange alone"),
+        ('fmiVersion="2.0"', 'fmiVersion="1.0"', r"FMI 1\.0.* FMI 2\.0"),
+        ('fmiVersion="2.0"', 'fmiVersion="3.0"', r"FMI 3\.0.* FMI 2\.0"),
+        ("CoSimulation", "ModelExchange", "model exchange"),
     ],
 )
 def test_other_versions_and_kinds_are_refused_by_name(tmp_path, old, new, why):
@@ -308,7 +308,7 @@ def test_the_mode_of_who_simulates_is_left_as_it_was(tmp_path):
 @pytest.mark.parametrize(
     ("text", "instead", "words"),
     [
-        ('factor="1000"', 'factor="1_000"', "factor of <BaseUnit> is '1_000'"),
+        ('factor="1000"', 'factor="1_000"', "factor .*<BaseUnit> .*'1_000'"),
         ('m="1"', 'm="\N{ARABIC-INDIC DIGIT ONE}"', "m of <BaseUnit> is '.'"),
         ('m="1"', 'm="1_0"', "m of <BaseUnit> is '1_0'"),
         ('name="storm" value="4"', 'name="storm" value="4_0"', "value of <Item> is '4_0'"),
@@ -328,21 +328,21 @@ def test_numbers_of_descriptions_that_others_do_not_read_are_refused(
     change = (rest, units.replace(text, instead) + rest)
     if text not in units:
         change = text, instead
-    with pytest.raises(InputError, match=f"not a readable FMU: {words}.*is no number"):
+    with pytest.raises(InputError, match=words):
         read_component("a", build(tmp_path, change=change))
 
 
 @pytest.mark.parametrize(
     ("item", "words"),
     [
-        ('name="storm"', "an <Item> of an enumeration has no value"),
-        ('value="4"', "an <Item> of an enumeration has no name"),
-        ('name="storm" value="1.5"', "value of <Item> is '1.5', which is no number"),
+        ('name="storm"', "<Item> .*value"),
+        ('value="4"', "<Item> .*name"),
+        ('name="storm" value="1.5"', "value of <Item> .*'1.5'"),
     ],
 )
 def test_items_of_enumerations_that_are_none_are_refused(tmp_path, item, words):
     fmu = build(tmp_path, change=('name="storm" value="4"', item))
-    with pytest.raises(InputError, match=f"not a readable FMU: {words}"):
+    with pytest.raises(InputError, match=words):
         read_component("a", fmu)
 
 

@@ -26,12 +26,15 @@ from orchestrator.master.loop import chosen
 from orchestrator.master.observers.files import read_rows
 from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
 from orchestrator.system.structure import System
 from support.foreign import build_c_fmu, build_raising_fmu, build_slave, foreign_system
 from support.machine import LOOPS, contents
+from support.texts import mentions
+from support.tiers import slow
 
 STEP = 0.02
 
@@ -78,7 +81,7 @@ def left_over(mark: str) -> list[Path]:
 
 def run_isolated(system: System, timeout: float = 20.0, stop_time: float = 0.5) -> Table:
     table = Table()
-    simulate(system, Experiment(stop_time, STEP), [table], Isolation(timeout))
+    simulate(planned(system, Experiment(stop_time, STEP)), [table], Isolation(timeout))
     return table
 
 
@@ -92,7 +95,7 @@ def test_rows_are_those_of_a_run_in_one_process(dist: Path, order: str):
     system = closed_loop(dist)
     here, there = Table(), Table()
     for table, isolation in ((here, None), (there, Isolation())):
-        simulate(system, Experiment(3.0, 0.03, order), [table], isolation)
+        simulate(planned(system, Experiment(3.0, 0.03, order)), [table], isolation)
     assert here.header == there.header
     assert here.rows.tobytes() == there.rows.tobytes()
     assert there.failure is None
@@ -109,22 +112,23 @@ def test_a_foreign_fmu_that_behaves_runs_to_the_end(c_fmu: Path):
 @pytest.mark.parametrize(
     ("act", "words"),
     [
-        ("SILENT_ERROR", "bad: fmi2DoStep failed with status 3 (error)"),
-        ("FATAL", "bad: beyond repair"),
-        ("EXITS", "bad: its process exited with status 3 in doStep"),
-        ("CRASHES", "bad: its process was ended by SIGSEGV (Segmentation fault) in doStep"),
-        ("ABORTS", "bad: its process was ended by SIGABRT (Aborted) in doStep"),
-        ("KILLED", "bad: its process was ended by SIGKILL (Killed, perhaps for want of memory)"),
-        ("SIGNALS", "bad: its process was ended by signal 40 (Real-time signal 6) in doStep"),
-        ("LEAVES_A_PROCESS", "bad: its process was ended by SIGABRT (Aborted) in doStep"),
-        ("CLOSES_ALL", "bad: its process exited with status 0 in doStep"),
-        ("ANSWERS_ITSELF", "bad: its process answers nonsense"),
+        ("SILENT_ERROR", "fmi2DoStep 3"),
+        ("FATAL", "beyond repair"),
+        ("EXITS", "3 doStep"),
+        ("CRASHES", "SIGSEGV doStep"),
+        ("ABORTS", "SIGABRT doStep"),
+        ("KILLED", "SIGKILL memory"),
+        ("SIGNALS", "40 doStep"),
+        ("LEAVES_A_PROCESS", "SIGABRT doStep"),
+        ("CLOSES_ALL", "0 doStep"),
+        ("ANSWERS_ITSELF", "process"),
     ],
 )
 def test_what_an_isolated_fmu_does_ends_the_run_in_one_line(c_fmu, mark, act, words):
     table = run_isolated(foreign_system(c_fmu, act, at=0.1))
     assert table.failure is not None
-    assert table.failure.startswith(f"stopped at t = 0.1 s: {words}")
+    assert table.failure.startswith("stopped at t = 0.1 s: bad: ")
+    assert mentions(table.failure, words)
     assert "\n" not in table.failure
     assert rows_until(table, 0.1)
     assert left_over(mark) == []
@@ -133,7 +137,7 @@ def test_what_an_isolated_fmu_does_ends_the_run_in_one_line(c_fmu, mark, act, wo
 @pytest.mark.parametrize("act", ["HANGS", "SPINS"])
 def test_an_isolated_fmu_that_hangs_is_ended(c_fmu, mark, act):
     table = run_isolated(foreign_system(c_fmu, act, at=0.1), timeout=1.0)
-    assert table.failure == "stopped at t = 0.1 s: bad: doStep has not ended within 1 s"
+    assert mentions(table.failure, "0.1 bad: doStep 1")
     assert rows_until(table, 0.1)
     assert left_over(mark) == []
 
@@ -141,8 +145,8 @@ def test_an_isolated_fmu_that_hangs_is_ended(c_fmu, mark, act):
 @pytest.mark.parametrize(
     ("variable", "words"),
     [
-        ("hangs", "instantiate has not ended within 1 s"),
-        ("crashes", "its process was ended by SIGABRT"),
+        ("hangs", "instantiate .* 1 s"),
+        ("crashes", "SIGABRT"),
     ],
 )
 def test_an_isolated_fmu_that_fails_while_it_is_instantiated(
@@ -158,7 +162,7 @@ def test_an_isolated_fmu_that_fails_while_it_is_instantiated(
 def test_an_fmu_that_cannot_be_instantiated_is_bad_input(c_fmu, monkeypatch, isolation):
     monkeypatch.setenv("FOREIGN_INSTANTIATE", "refuses")
     with pytest.raises(InputError, match=r"bad: foreign\.fmu cannot be") as error:
-        simulate(foreign_system(c_fmu), Experiment(0.5, STEP), (), isolation)
+        simulate(planned(foreign_system(c_fmu), Experiment(0.5, STEP)), (), isolation)
     assert not isinstance(error.value, StartError)
 
 
@@ -193,12 +197,12 @@ def test_an_isolated_fmu_that_fails_at_the_end_loses_nothing(c_fmu, mark, phase,
 def test_a_value_that_is_not_finite_is_named_with_its_time(c_fmu, act, value, isolation, loop):
     table, experiment = Table(), Experiment(0.5, STEP)
     steps = chosen(loop, experiment, isolation)
-    simulate(foreign_system(c_fmu, act), experiment, [table], isolation, steps)
+    simulate(planned(foreign_system(c_fmu, act), experiment), [table], isolation, steps)
     assert table.failure == f"stopped at t = 0.12 s: bad.y is {value}"
     assert rows_until(table, 0.1)
     assert np.isfinite(table.rows).all()
     with pytest.raises(StartError, match=f"stopped at t = 0 s: bad.y is {value}"):
-        simulate(foreign_system(c_fmu, act, "ENTER"), Experiment(0.5, STEP), (), isolation)
+        simulate(planned(foreign_system(c_fmu, act, "ENTER"), Experiment(0.5, STEP)), (), isolation)
 
 
 def test_a_flood_of_output_and_messages_is_kept_within_bounds(c_fmu, capfd):
@@ -232,7 +236,7 @@ def test_nobody_hangs_where_the_keeper_is_killed(c_fmu: Path, mark: str):
                     os.kill(int(process.name), signal.SIGKILL)
 
     table = Kills()
-    simulate(foreign_system(c_fmu), Experiment(50.0, STEP), [table], Isolation(20.0))
+    simulate(planned(foreign_system(c_fmu), Experiment(50.0, STEP)), [table], Isolation(20.0))
     assert table.failure is not None
     assert "its process was ended by SIGKILL" in table.failure
     assert left_over(mark) == []
@@ -270,7 +274,7 @@ def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path, loop: s
     thread = threading.Thread(target=simulate, args=(system, experiment, [table], None, steps))
     thread.start()
     begun.wait()
-    assert len(simulate(talkative, Experiment(STEP, STEP), loop=steps).messages) == 101
+    assert len(simulate(planned(talkative, Experiment(STEP, STEP)), loop=steps).messages) == 101
     gc.collect()
     go_on.set()
     thread.join()
@@ -306,11 +310,13 @@ def command(*arguments: object, folder: Path) -> subprocess.Popen[str]:
     ("name", "options", "last_time", "words"),
     [
         ("FATAL", ["--loop", "python"], 0.1, "bad: beyond repair"),
-        ("FATAL", ["--loop", "compiled"], 0.1, "bad: beyond repair"),
-        ("raises", ["--loop", "python"], 0.12, "first: Fatal py exception encountered: [doStep] "),
-        ("raises", ["--loop", "compiled"], 0.12, "first: Fatal py exception encountered: [doStep]"),
         ("CRASHES", ["--isolate"], 0.1, "bad: its process was ended by SIGSEGV"),
-        ("HANGS", ["--isolate", "--step-timeout", 1], 0.1, "bad: doStep has not ended within"),
+        *slow(
+            ("FATAL", ["--loop", "compiled"], 0.1, "bad: beyond repair"),
+            ("raises", ["--loop", "python"], 0.12, "first: Fatal py exception encountered: [doSt"),
+            ("raises", ["--loop", "compiled"], 0.12, "first: Fatal py exception encountered: [do"),
+            ("HANGS", ["--isolate", "--step-timeout", 1], 0.1, "bad: doStep has not ended within"),
+        ),
     ],
 )
 def test_command_line_says_what_happened_and_keeps_the_rows(
@@ -342,7 +348,7 @@ def test_command_line_says_what_happened_and_keeps_the_rows(
         (["--isolate"], "csv"),
     ],
 )
-@pytest.mark.parametrize("act", ["FORKS", "MOVES", "CLOSES_FILES"])
+@pytest.mark.parametrize("act", ["CLOSES_FILES", *slow("FORKS", "MOVES")])
 def test_rows_are_kept_whatever_an_fmu_does_to_the_process(
     archives, workplace, mark, act, form, options
 ):
@@ -385,12 +391,14 @@ def test_an_alarm_ends_a_run_with_its_rows(archives, workplace, loop):
 @pytest.mark.parametrize(
     "act",
     [
-        "sys.stdout = sys.stderr = None",
-        "sys.stdout.close(); sys.stderr.close()",
         "json.dumps = builtins.print = None",
-        "[setattr(numpy, name, None) for name in list(vars(numpy))]",
-        "os.chdir('/')",
         "os.fork()",
+        *slow(
+            "sys.stdout = sys.stderr = None",
+            "sys.stdout.close(); sys.stderr.close()",
+            "[setattr(numpy, name, None) for name in list(vars(numpy))]",
+            "os.chdir('/')",
+        ),
     ],
 )
 def test_what_a_python_slave_does_to_the_interpreter_costs_no_rows(workplace, act):
@@ -413,11 +421,15 @@ def test_an_fmu_finds_the_current_folder_that_it_has_left(workplace, loop):
     act = "(current_time < 0.13 and os.chdir('/')) or (os.getcwd() == '/') or 1 / 0"
     system = System("slave", {"a": read_component("a", build_slave(workplace, act))}, ())
     experiment, table = Experiment(0.02 * 2000, STEP), Table()
-    assert simulate(system, experiment, [table], loop=chosen(loop, experiment)).failure is None
+    assert (
+        simulate(planned(system, experiment), [table], loop=chosen(loop, experiment)).failure
+        is None
+    )
     assert len(table) == 2001
     assert Path.cwd() == workplace
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [["--loop", "python"], ["--isolate"]])
 def test_a_current_folder_that_is_gone_is_not_needed(dist, tmp_path, how):
     gone = tmp_path / "gone"
@@ -453,6 +465,7 @@ def test_a_timeout_that_means_nothing_is_bad_usage(options, words, capsys):
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_nothing_is_left_of_a_run_that_hangs_and_is_ended(archives, tmp_path, mark, number):
     """Also not by KILL, which the process itself cannot answer."""

@@ -14,13 +14,14 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
+from fmus.kinds import FMI_VERSIONS, KINDS
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.paper.report import write_report
-from orchestrator.paper.variations import Variation
 from orchestrator.runs import bundle
-from support.instances import NAMES
+from orchestrator.runs.request import Request
 from support.machine import contents
+from support.settings import NAMES
 
 SECOND = ["--stop-time", "1"]
 
@@ -36,6 +37,7 @@ def kinds(folder: Path) -> dict[str, str]:
     return {name: fmu["kind"] for name, fmu in record["fmus"].items()}
 
 
+@pytest.mark.slow
 def test_build_writes_fmus_ssp_checksums_and_bill(workplace, capsys):
     assert main(["build", "--kind", "native"]) == 0
     folder = workplace / "fmus/dist/native"
@@ -52,6 +54,7 @@ def test_build_writes_fmus_ssp_checksums_and_bill(workplace, capsys):
     assert "is up to date" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_kinds_take_each_others_place_in_a_folder(dist: Path, native: Path, workplace: Path):
     shutil.copytree(native, workplace / "here")
     assert main(["build", "--out", "here"]) == 0
@@ -78,13 +81,13 @@ def test_fmu_is_valid_and_small_and_says_who_made_it(native: Path, name: str):
 
 @pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
 def test_run_writes_the_same_table_to_the_bit(workplace: Path, order: str):
-    for kind in bundle.KINDS:
+    for kind in KINDS:
         options = [*SECOND, "--order", order, "--kind", kind, "--no-figures", "--out", kind]
         assert main(["run", "fig4", *options]) == 0
     for name in ("result.csv", "metrics.json", "certificates.csv"):
-        tables = [(workplace / kind / name).read_bytes() for kind in bundle.KINDS]
+        tables = [(workplace / kind / name).read_bytes() for kind in KINDS]
         assert tables[0] == tables[1]
-    assert {kind: {*kinds(workplace / kind).values()} for kind in bundle.KINDS} == {
+    assert {kind: {*kinds(workplace / kind).values()} for kind in KINDS} == {
         "python": {"python"},
         "native": {"native"},
     }
@@ -143,6 +146,7 @@ def test_loaded_system_can_be_run_saved_and_verified(workplace: Path, capsys):
     assert main(["verify", "saved/result.csv", *options]) == 0
 
 
+@pytest.mark.slow
 def test_cache_has_a_folder_a_kind_and_version(workplace: Path):
     folders = {
         (kind, fmi): bundle.current_fmus(kind, fmi)
@@ -178,7 +182,7 @@ def test_export_with_fmi_3_is_an_ssp_2(workplace: Path, capsys):
 
 @pytest.mark.skipif(find_spec("fmu_manipulation_toolbox") is None, reason="no FMU toolbox")
 def test_container_takes_fmus_of_either_version(workplace: Path):
-    for fmi in bundle.FMI:
+    for fmi in FMI_VERSIONS:
         options = ["--kind", "native", "--fmi", fmi, "--format", "container", "--out", fmi]
         assert main(["export", "fig4", *options]) == 0
         with zipfile.ZipFile(workplace / fmi / "fig4.fmu") as archive:
@@ -186,8 +190,9 @@ def test_container_takes_fmus_of_either_version(workplace: Path):
         assert root.get("fmiVersion") == f"{fmi}.0"
 
 
+@pytest.mark.slow
 def test_report_is_made_of_runs_of_the_kind(tmp_path: Path):
-    assert Variation("fig4", kind="native").label == "fig4 --kind native"
+    assert Request("fig4", kind="native").command_line == "fig4 --kind native"
     write_report(tmp_path, ["fig4"], ["auv-fmu", "report"], stop_time=0.1, kind="native")
     runs = json.loads((tmp_path / "run.json").read_text())["runs"]
     assert runs
@@ -229,6 +234,7 @@ def test_system_keeps_the_fmus_it_was_loaded_with():
         simulate(load("fig4"), kind="native")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
 def test_one_archive_has_libraries_for_several_machines(native: Path, workplace: Path):
     options = ["--kind", "native", "--platforms", "linux64,darwin64", "--out", "all"]

@@ -19,6 +19,7 @@ from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.runs.scenario import names, read_scenario
 from support.instances import component
 from support.kinds import Outcome, difference, outcome
+from support.tiers import slow
 
 STEP = 0.02
 
@@ -55,7 +56,7 @@ def both(
     return ours
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order", [ORDERS[0], *slow(ORDERS[1])])
 @pytest.mark.parametrize("scenario", [name for name in names() if not read_scenario(name).events])
 def test_scenario_is_the_same_to_its_end(dist: Path, native: Path, scenario: str, order: str):
     stop_time = read_scenario(scenario).stop_time
@@ -160,13 +161,14 @@ def test_refusals_are_the_same(dist: Path, native: Path, scenario, values, time)
 def build(folder: Path, packages: Path, kind: str) -> Path:
     """Build FMUs of a kind from the sources in a folder, in a process of its own."""
     subprocess.run(
-        [sys.executable, "-m", "fmus.packaging.build", "--kind", kind, "--out", str(folder)],
+        [sys.executable, "-m", "fmus.build", "--kind", kind, "--out", str(folder)],
         env={**os.environ, "PYTHONPATH": str(packages)},
         check=True, capture_output=True, cwd=packages,
     )  # fmt: skip
     return folder
 
 
+@pytest.mark.slow
 def test_constant_that_is_changed_in_one_equation_changes_both_kinds(dist, native, tmp_path):
     packages = tmp_path / "packages"
     for package in (auv_fmu, fmus):

@@ -21,6 +21,7 @@ from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.events import Alter, Event, Events
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import PortName
@@ -28,6 +29,7 @@ from orchestrator.system.structure import System
 from orchestrator.system.units import Linear
 from support.machine import LOOPS
 from support.mixed import ACTS, CALLS, Shape, altered, system_of, systems
+from support.runs import table_of
 
 #: Step [s].
 H = 0.5
@@ -51,9 +53,7 @@ def run(
     events: Sequence[Event] = (),
     isolation: Isolation | None = None,
 ) -> Table:
-    table = Table()
-    steps = chosen(loop, experiment, isolation)
-    simulate(system, experiment, [table], isolation, steps, [Events(events)])
+    table = table_of(system, experiment, loop, isolation, [Events(events)])
     assert table.header.loop == loop
     return table
 
@@ -242,7 +242,7 @@ def test_observers_of_slow_steps_are_told_meanwhile(folder, loop):
 
     table, experiment = Counts(), Experiment(10.0, H)
     system = pair(folder, "BEHAVE", milliseconds=40)
-    simulate(system, experiment, [table], None, chosen(loop, experiment))
+    simulate(planned(system, experiment), [table], None, chosen(loop, experiment))
     assert len(table) == 21
     assert max(told) <= 8
 
@@ -257,7 +257,7 @@ def test_rows_that_cannot_be_kept_end_a_run(folder, loop):
 
     whole, full = Table(), Full()
     system, experiment = pair(folder, "BEHAVE"), Experiment(1000.0, H)
-    ending = simulate(system, experiment, [full, whole], None, chosen(loop, experiment))
+    ending = simulate(planned(system, experiment), [full, whole], None, chosen(loop, experiment))
     assert ending.failure is not None
     assert ending.failure == (
         f"stopped at t = {whole.time[-1]:g} s: [Errno 28] No space left on device"

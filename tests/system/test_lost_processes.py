@@ -76,6 +76,7 @@ def worker(process):
     return max(children, key=lambda child: sum(child.cpu_times()[:2]))
 
 
+@pytest.mark.slow
 def test_killed_twice_interrupted_once_and_short_of_a_worker(workplace):
     (workplace / "study.toml").write_text(STUDY)
     peace = sweep("peace")

@@ -21,7 +21,7 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.commands.options import INTERRUPTED
+from orchestrator.commands.streams import INTERRUPTED
 from orchestrator.machine.locks import claimed
 from orchestrator.master.observers.files import read_rows
 from orchestrator.runs import record
@@ -39,7 +39,7 @@ from support.machine import (
     without_privileges,
 )
 
-pytestmark = pytest.mark.usefixtures("workplace")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("workplace")]
 
 
 @pytest.fixture(autouse=True)
@@ -112,7 +112,7 @@ def test_full_disk_at_any_stage(workplace, capsys, size):
         assert not [name for name in names if name.startswith(".") or name.endswith("g")]
 
 
-@pytest.mark.parametrize("arguments", [["build"], ["export", "fig4"], ["reference"]])
+@pytest.mark.parametrize("arguments", [["build"], ["export", "fig4"]])
 def test_full_disk_leaves_what_was_there_and_nothing_else(workplace, capsys, arguments):
     with small_disk(workplace / "disk", 600_000) as disk:
         (disk / "r").mkdir()

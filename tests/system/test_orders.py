@@ -9,105 +9,32 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
+from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment, decimations
 from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
-from orchestrator.master.schedule import delays, stages
+from orchestrator.master.plan import delays, planned, stages
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.bundle import NATIVE
-from orchestrator.runs.preparation import Request, load, prepare
+from orchestrator.runs.preparation import load, prepare
+from orchestrator.runs.request import Request
 from orchestrator.runs.result import simulate as simulated
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.graph import delayed
-from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from orchestrator.system.units import Linear, Mapped
 from support.machine import LOOPS
-from support.relay import Clock, Wire, expected, relay, system_of
+from support.relay import relay, system_of
+from support.runs import whole as run
 
 #: Step [s], of which all multiples are exact.
 H = 0.125
-
-NAMES = "abcd"
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("relays")
-
-
-def run(
-    system: System, experiment: Experiment, loop: str = "python", isolation: Isolation | None = None
-) -> Table:
-    table = Table()
-    how = chosen(loop, experiment, isolation)
-    simulate(system, experiment, [table], isolation, how)
-    assert table.failure is None
-    return table
-
-
-_TRANSFORMATIONS = st.none() | st.sampled_from(
-    [Linear(-0.5, 0.25), Linear(1.0, 0.0), Mapped(((0.0, 1.0), (1.0, -0.0), (0.5, 0.125)))]
-)
-
-
-@st.composite
-def systems(draw: st.DrawFn) -> dict:
-    """Arguments of :func:`.relay.system_of`, but for the files."""
-    names = list(NAMES[: draw(st.integers(1, 4))])
-    # No gain makes a ring grow.
-    wire = st.builds(
-        Wire,
-        st.sampled_from([f"{name}.{port}" for name in names for port in ("g", "y")]),
-        _TRANSFORMATIONS,
-    )
-    inputs = [f"{name}.{port}" for name in names for port in "uv"]
-    gains = st.sampled_from([0.0, 0.25, -0.5])
-    return {
-        "declares": {name: draw(st.booleans()) for name in names},
-        "wires": draw(st.dictionaries(st.sampled_from(inputs), wire)),
-        "parameters": {f"{name}.a": draw(gains) for name in names}
-        | {f"{name}.c": draw(st.sampled_from([1.0, -2.0])) for name in names},
-        "steps": {name: draw(st.integers(1, 4)) * H for name in names if draw(st.booleans())},
-    }
-
-
-def made(folder: Path, declares: dict[str, bool], **arguments: object) -> System:
-    return system_of({name: relay(folder, d) for name, d in declares.items()}, **arguments)
-
-
-@settings(max_examples=40)
-@given(
-    arguments=systems(),
-    n=st.integers(1, 12),
-    rest=st.sampled_from([0.0, 0.4]),
-    start=st.sampled_from([0.0, -1.0, 2.5]),
-    order=st.sampled_from(ORDERS) | st.permutations(list(NAMES)),
-)
-def test_any_system_in_any_order_is_what_a_few_lines_make(folder, arguments, n, rest, start, order):
-    system = made(folder, **arguments)
-    if not isinstance(order, str):
-        order = [name for name in order if name in system.components]
-    clock = Clock(start, H, n, start + (n + rest) * H if rest else None)
-    experiment = Experiment(start + (n + rest) * H, H, order, start, "delay")
-    table, compiled = (run(system, experiment, loop) for loop in LOOPS)
-    assert compiled.rows.tobytes() == table.rows.tobytes()
-    flat = (
-        None if order == "jacobi" else [name for names in stages(system, order) for name in names]
-    )
-    decimations = {name: round(system.steps.get(name, H) / H) for name in system.components}
-    first = dict(zip(map(port_name, table.columns), table.rows[0, 1:].tolist(), strict=True))
-    rows = expected(system, clock, decimations, flat, first)
-    assert list(table.time) == [clock.time(k) for k in range(clock.steps + 1)]
-    for k, row in enumerate(rows, start=1):
-        got = dict(zip(table.columns, table.rows[k, 1:].tolist(), strict=True))
-        assert got == row
 
 
 #: Each takes what the one before it shows at once; the first takes it from the last.
@@ -123,7 +50,7 @@ def ring(folder: Path, declares: bool = True, gain: float = 0.5, **others: objec
 @pytest.mark.parametrize("declares", [True, False])
 def test_a_ring_is_opened_before_its_first_component_and_one_line_says_so(folder, declares):
     system, table = ring(folder, declares), Table()
-    ending = simulate(system, Experiment(3 * H, H, coupling="delay"), [table])
+    ending = simulate(planned(system, Experiment(3 * H, H, coupling="delay")), [table])
     line = "a takes c.g one step late: direct feedthroughs form a ring"
     assert ending.messages == (line, *(f"{name}: initialises" for name in "abc"))
     assert stages(system, "gauss-seidel") == [["a"], ["b"], ["c"]]
@@ -279,5 +206,7 @@ def test_a_scenario_may_state_order_and_steps(workplace):
 
 @pytest.mark.parametrize("isolation", [None, Isolation(20.0)])
 def test_no_step_is_logged(folder, isolation):
-    ending = simulate(system_of({"a": relay(folder)}), Experiment(10 * H, H), (), isolation)
+    ending = simulate(
+        planned(system_of({"a": relay(folder)}), Experiment(10 * H, H)), (), isolation
+    )
     assert ending.messages == ("a: initialises",)

@@ -21,6 +21,7 @@ from orchestrator.machine.archives import unpacked
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.files import read_columns, read_rows
+from orchestrator.master.plan import planned
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.stored import read_result
@@ -148,13 +149,15 @@ def test_an_fmu_that_has_another_content_is_another_one(workplace: Path):
 def test_who_takes_fmus_along_takes_those_that_were_read(workplace: Path):
     fmu = build(workplace)
     experiment = Experiment(0.2, 0.1)
-    prepared = Prepared(Scenario("s"), system_of(fmu), experiment)
+    prepared = Prepared(Scenario("s"), planned(system_of(fmu), experiment))
     engine, run = FmuEngine({"s": prepared}), Point(0, "s", {}, 0.2, 0.1)
     assert list(pickle.loads(pickle.dumps(engine)).outcomes([run])) == list(engine.outcomes([run]))
     replace_by_another(fmu)
     with pytest.raises(InputError, match=r"plain\.fmu: has changed since it was read"):
         pickle.dumps(engine)
-    assert Prepared(Scenario("s"), system_of(fmu), experiment).identity != prepared.identity
+    assert (
+        Prepared(Scenario("s"), planned(system_of(fmu), experiment)).identity != prepared.identity
+    )
 
 
 def test_stored_result_is_read_again_with_its_parameters():
@@ -194,6 +197,7 @@ def peak_memory(*arguments: str) -> int:
     return usage.ru_maxrss * 1024
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_length_of_a_run():
     """60,000 rows of 95 values are 46 MB: none of it is kept."""
     short = peak_memory("--stop-time", "20", "--no-figures")
@@ -201,6 +205,7 @@ def test_memory_does_not_grow_with_the_length_of_a_run():
     assert long - short < 10e6
 
 
+@pytest.mark.slow
 def test_simulate_again_and_again_in_one_process_in_flat_memory():
     """300 runs; 100 before, in which Python and the FMUs fill their caches."""
 

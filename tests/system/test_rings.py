@@ -14,13 +14,14 @@ from orchestrator.master.fmi.instance import ComponentFailed
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.hook import Run
-from orchestrator.master.loop import PYTHON_LOOP, Stepping, chosen
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.master.stepper import made
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from support.linear import QUARTER_TRUCK, SINE, TWO_MASSES, Model, Part, error, linear, system_of
+from support.runs import whole as run
 
 H = 0.1
 
@@ -35,18 +36,6 @@ def gains(k: float, l: float) -> dict[str, Part]:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("linear")
-
-
-def run(
-    system: System,
-    experiment: Experiment,
-    loop: Stepping = PYTHON_LOOP,
-    isolation: Isolation | None = None,
-) -> Table:
-    table = Table()
-    simulate(system, experiment, [table], isolation, loop)
-    assert table.failure is None
-    return table
 
 
 def ring(folder, k: float, l: float, names: str = "sab", **kind: object) -> System:
@@ -79,7 +68,7 @@ def test_both_loops_and_isolation_make_the_same_rows(folder, coupling):
     made()
     table, *others = (
         run(system, experiment),
-        run(system, experiment, chosen("compiled", experiment)),
+        run(system, experiment, loop="compiled"),
         run(system, experiment, isolation=Isolation()),
     )
     for other in others:
@@ -130,7 +119,7 @@ def test_of_two_solved_rings_neither_is_the_first(folder, names):
 
 def test_fmus_that_compute_outputs_in_steps_only_are_delayed_and_one_line_says_so(folder):
     system, table = ring(folder, 0.5, 0.9, cached=True, can=False), Table()
-    ending = simulate(system, Experiment(2.0, H), [table])
+    ending = simulate(planned(system, Experiment(2.0, H)), [table])
     assert ending.messages == (
         "a takes b.y1 one step late: direct feedthroughs form a ring; no Real output of a "
         "follows a Real input between steps",
@@ -141,13 +130,13 @@ def test_fmus_that_compute_outputs_in_steps_only_are_delayed_and_one_line_says_s
         b = 0.9 * a
         assert table["a.y1"][k] == pytest.approx(a, abs=1e-13)
     with pytest.raises(InputError, match=r"coupling solve: a takes b\.y1 one step late"):
-        simulate(system, Experiment(2.0, H, coupling="solve"))
+        simulate(planned(system, Experiment(2.0, H, coupling="solve")))
 
 
 @pytest.mark.parametrize("k", [-2.0, 1.5, 6.0])
 @pytest.mark.parametrize("stop", [20.0, 200.0])
 def test_a_delayed_ring_that_grows_without_bound_ends_the_run(folder, k, stop):
-    ending = simulate(ring(folder, k, 1.0), Experiment(stop, H, coupling="delay"))
+    ending = simulate(planned(ring(folder, k, 1.0), Experiment(stop, H, coupling="delay")))
     assert ending.failure is not None
     assert "grows without bound" in ending.failure
 
@@ -157,7 +146,7 @@ def test_what_grows_as_it_should_is_let_grow(folder, growth):
     """A ramp, and exponentials of time, on a ring that is delayed."""
     parts = gains(0.5, 0.9) | {"s": Part(A=[[growth, 1.0], [0.0, growth]], C=np.eye(2), x=[0, 1])}
     system = system_of({name: linear(folder) for name in "sab"}, parts, WIRES)
-    assert simulate(system, Experiment(40.0, H, coupling="delay")).failure is None
+    assert simulate(planned(system, Experiment(40.0, H, coupling="delay"))).failure is None
 
 
 class _Broken:
@@ -174,10 +163,10 @@ def test_a_run_with_a_solved_ring_goes_on_where_it_was(folder, tmp_path, couplin
     system, experiment = ring(folder, 1.0, -2.0), Experiment(3.0, H, coupling=coupling)
     whole, again = run(system, experiment), Table()
     kept = Checkpoints(tmp_path, {}, 1.0, resume=False)
-    ending = simulate(system, experiment, [kept], hooks=[kept, _Broken()])
+    ending = simulate(planned(system, experiment), [kept], hooks=[kept, _Broken()])
     assert ending.failure == "stopped at t = 2.1 s: broken off"
     kept = Checkpoints(tmp_path, {}, 1.0, resume=True)
-    simulate(system, experiment, [again, kept], hooks=[kept])
+    simulate(planned(system, experiment), [again, kept], hooks=[kept])
     assert kept.time == 3.0
     assert again.rows.tobytes() == whole.rows.tobytes()
 
@@ -203,10 +192,10 @@ def test_linear_inputs_are_of_second_order_where_held_ones_are_of_first(
 def test_linear_inputs_are_refused_where_an_fmu_cannot_take_them(folder):
     system = ring(folder, 0.5, 0.9, can=False)
     with pytest.raises(InputError, match=r"coupling linear: a cannot go back .*canInterpolateInp"):
-        simulate(system, Experiment(1.0, H, coupling="linear"))
+        simulate(planned(system, Experiment(1.0, H, coupling="linear")))
     system = replace(ring(folder, 0.5, 0.9), steps={"b": 2 * H})
     with pytest.raises(InputError, match="coupling linear: b: takes steps of its own"):
-        simulate(system, Experiment(1.0, H, coupling="linear"))
+        simulate(planned(system, Experiment(1.0, H, coupling="linear")))
     with pytest.raises(InputError, match="leave the order out"):
         Experiment(1.0, H, ("a", "b", "s"), coupling="linear")
     with pytest.raises(InputError, match="coupling 'strong': use one of solve, delay, linear"):

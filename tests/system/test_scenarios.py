@@ -21,12 +21,11 @@ from orchestrator.paper.measures import (
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.certificates import COLUMNS, certificates
 from orchestrator.vehicle.indices import metrics_of
 from orchestrator.vehicle.signals import tracking_error
-from support.runs import final_error
+from support.runs import final_error, system_of
 from support.runs import run as simulated
 
 Runner = Callable[..., Table]
@@ -53,10 +52,6 @@ def run(dist: Path) -> Runner:
         return result
 
     return runner
-
-
-def system_of(name: str, dist: Path) -> System:
-    return closed_loop(dist, read_scenario(name))
 
 
 def variation(result: Table) -> float:
@@ -121,7 +116,7 @@ def test_smallest_turning_radius_is_that_of_the_printed_equations(dist: Path):
         )  # fmt: skip
         u, v, r = np.array([u, v, r]) - np.linalg.solve(jacobian, f)
     torques = {"u": 80.0, "q": 0.0, "r": 80.0}
-    system = system_of("fig3b", dist).with_parameters(
+    system = system_of(dist, "fig3b").with_parameters(
         {PortName("plant", f"tau.{k}"): value for k, value in torques.items()}
     )
     radius = turning_radius(simulated(system, 60.0, 0.02))
@@ -206,16 +201,16 @@ def test_noise_of_1_cm_saturates_and_1_mm_does_not(run: Runner):
 
 @pytest.mark.parametrize("name", ["fig4", "fig5", "fig6", "fig7a", "fig7b", "fig7c"])
 def test_no_velocity_reaches_the_output_feedback_controller(dist: Path, name: str):
-    assert velocities_reaching(system_of(name, dist)) == []
+    assert velocities_reaching(system_of(dist, name)) == []
 
 
 @pytest.mark.parametrize("name", ["fig5-pd", "fig6-pd"])
 def test_velocities_reach_the_pd_controller(dist: Path, name: str):
-    assert velocities_reaching(system_of(name, dist)) == [f"plant.dy.{k}" for k in "xyz"]
+    assert velocities_reaching(system_of(dist, name)) == [f"plant.dy.{k}" for k in "xyz"]
 
 
 def test_velocities_are_found_whatever_the_vehicle_is_called(dist: Path):
-    system = system_of("fig5-pd", dist)
+    system = system_of(dist, "fig5-pd")
 
     def renamed(name: PortName) -> PortName:
         return replace(name, component={"plant": "vehicle"}.get(name.component, name.component))

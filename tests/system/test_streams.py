@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from support.tiers import slow
+
 COMMAND = [sys.executable, "-m", "orchestrator"]
 RUN = ["run", "fig4", "--stop-time", "0.1", "--no-figures", "--out", "o"]
 
@@ -44,6 +46,7 @@ def test_complaint_that_cannot_be_written_leaves_the_status(tmp_path: Path):
     assert shell("$A run nosuch 2>&-", tmp_path, buffered=True).returncode == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("streams", ["> /dev/full", ">&- 2>&- <&-"])
 def test_run_keeps_its_files_whatever_the_streams(tmp_path: Path, streams: str):
     """A closed stream's number went to the next file that was opened, and got what was printed."""
@@ -67,7 +70,7 @@ sys.exit(main(["list"]))
 """
 
 
-@pytest.mark.parametrize("module", ["argparse", "numpy", "fmpy", "matplotlib", "lxml"])
+@pytest.mark.parametrize("module", ["numpy", *slow("argparse", "fmpy", "matplotlib", "lxml")])
 def test_ctrl_c_during_imports_is_one_line(module: str):
     process = subprocess.run(
         [sys.executable, "-c", _INTERRUPTED, module],
@@ -83,12 +86,14 @@ def test_ctrl_c_during_imports_is_one_line(module: str):
 @pytest.mark.parametrize(
     ("arguments", "shown"),
     [
-        (["run", b"a\nb\x1b[31m.toml"], r"a\nb\x1b[31m.toml: no such file"),
-        (["verify", b"\xff.csv"], r"\udcff.csv: no such file"),
-        (["run", "fig4", "--set", b"controller.saturation=\xff"], r"= \udcff: not a text in UTF-8"),
-        (["run", "fig4", "--set", b"plant.m11=\xff"], r"= \udcff: not a real number"),
-        (["run", "fig4", "--set", b"pl\nant.m11=1"], r"no component 'pl\nant'"),
-        (["run", b"fig\xff4"], r"no scenario 'fig\udcff4'"),
+        (["run", b"a\nb\x1b[31m.toml"], r"a\nb\x1b[31m.toml"),
+        (["run", "fig4", "--set", b"controller.saturation=\xff"], r"= \udcff"),
+        *slow(
+            (["verify", b"\xff.csv"], r"\udcff.csv"),
+            (["run", "fig4", "--set", b"plant.m11=\xff"], r"= \udcff"),
+            (["run", "fig4", "--set", b"pl\nant.m11=1"], r"'pl\nant'"),
+            (["run", b"fig\xff4"], r"'fig\udcff4'"),
+        ),
     ],
 )
 def test_names_of_any_bytes_are_shown_in_one_line(tmp_path: Path, arguments, shown):

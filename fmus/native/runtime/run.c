@@ -6,18 +6,8 @@
 #include <math.h>
 #include <string.h>
 
-/* A step may exceed `h_max` by this share without being split: hosts round their time. */
-static const double ROUNDING = 1e-9;
-
 /* Longest step of a component that has no internal steps [s]. */
 static const double NO_LIMIT = 1e300;
-
-/* Largest norm of a state. No vehicle comes near it, and from a state below it a step with sane
- * inputs is always finite: one wild sample must not be the end of a run. */
-static const double LARGEST_STATE = 1e100;
-
-/* More internal steps than this in one communication step are taken for a mistake. */
-static const double MOST_INTERNAL_STEPS = 1e6;
 
 /* A run as it is after instantiation. */
 static run new_run(void) {

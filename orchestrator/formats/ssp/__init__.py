@@ -2,7 +2,7 @@
 
 `reader` and `writer` are the two doors. Reading goes from the elements of a file (`document`,
 `archive`) over the tree of systems (`building`, `hierarchy`) to the output that feeds each input
-(`wires`) and the value of each parameter (`bindings`).
+(`routes`) and the value of each parameter (`bindings`).
 """
 
 #: The file of an archive that says what is in it.

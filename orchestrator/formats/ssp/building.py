@@ -114,7 +114,7 @@ class Builder:
                 absent.append(name)
                 continue
             for what, said, true in (
-                ("kind", stated.kind, own.kind),
+                ("kind", stated.causality, own.causality),
                 ("type", stated.type, own.type),
                 ("unit", stated.unit and stated.unit.name, own.unit and own.unit.name),
             ):
@@ -136,8 +136,10 @@ class Builder:
 
     def _connector(self, connector: Element) -> Connector:
         stated = next((child for child in connector if child.tag not in _NO_TYPES), None)
-        kind = connector.get("kind")
+        causality = connector.get("kind")
         if stated is None:
-            return Connector(kind, None, None, {})
+            return Connector(causality, None, None, {})
         of = _TYPES.get(stated.tag, stated.tag)
-        return Connector(kind, of, self._definitions.unit(stated), self._definitions.items(stated))
+        return Connector(
+            causality, of, self._definitions.unit(stated), self._definitions.items(stated)
+        )

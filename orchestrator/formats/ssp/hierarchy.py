@@ -43,14 +43,14 @@ class Connector:
     """What a system says about one of its connectors, or of those of an element.
 
     Attributes:
-        kind: of the connector; None: it does not say.
+        causality: of the connector; None: it does not say.
         type: as FMI 2.0 calls it, or what FMI 2.0 does not have; None: it does not say.
         unit: None: it names none.
         items: of an enumeration.
 
     """
 
-    kind: str | None
+    causality: str | None
     type: str | None
     unit: Unit | None
     items: Items

@@ -14,7 +14,7 @@ from orchestrator.formats.ssp.bindings import Bindings, Values
 from orchestrator.formats.ssp.building import Builder
 from orchestrator.formats.ssp.definitions import definitions_of
 from orchestrator.formats.ssp.hierarchy import Leaf, Node, Way
-from orchestrator.formats.ssp.wires import Route, Wires
+from orchestrator.formats.ssp.routes import Route, Routes
 from orchestrator.machine.errors import Findings, InputError, shortened
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
@@ -108,7 +108,9 @@ def _read(archive: Archive, root: Element) -> System:
     [content] = root.findall("System")[:1]
     top = Builder(archive, definitions).group(content)
     leaves = {leaf.way: leaf for leaf in top.leaves()}
-    ports = _Ports(archive, leaves, Wires(archive, top), Bindings(archive, definitions).values(top))
+    ports = _Ports(
+        archive, leaves, Routes(archive, top), Bindings(archive, definitions).values(top)
+    )
     components: dict[str, Component] = {}
     for leaf in leaves.values():
         name = ".".join(leaf.way)
@@ -168,7 +170,7 @@ class _Ports:
     """
 
     def __init__(
-        self, archive: Archive, leaves: Mapping[Way, Leaf], wires: Wires, given: Values
+        self, archive: Archive, leaves: Mapping[Way, Leaf], routes: Routes, given: Values
     ) -> None:
         """Follow each port upstream."""
         self.connections: list[Connection] = []
@@ -176,12 +178,12 @@ class _Ports:
         self._archive, self._leaves, self._given = archive, leaves, given
         self._used: set[Node] = set()
         self._arrivals: dict[Node, _Arrival] = {}
-        for node in dict.fromkeys((*wires.targets(), *given)):
+        for node in dict.fromkeys((*routes.targets(), *given)):
             leaf = leaves.get(node.way)
             if leaf is not None and leaf.component is not None:
                 port = PortName(leaf.component.name, node.port)
                 try:
-                    self._enter(port, wires.route(node), leaf)
+                    self._enter(port, routes.route(node), leaf)
                 except InputError as error:
                     archive.problem(error)
         lost = [str(node) for node in given if node not in self._used]
@@ -190,8 +192,8 @@ class _Ports:
 
     def _enter(self, port: PortName, route: Route, leaf: Leaf) -> None:
         """Enter what arrives at a port: another's value, or the outermost that is given."""
-        origin = self._leaves.get(route.origin.way) if route.wire else None
-        arrival = self._arrival(route) if route.wire else self._given_to(route.node)
+        origin = self._leaves.get(route.origin.way) if route.segment else None
+        arrival = self._arrival(route) if route.segment else self._given_to(route.node)
         if origin is None:
             self._set(port, leaf, arrival)
         elif origin.component is not None:
@@ -201,7 +203,7 @@ class _Ports:
             self.connections.append(Connection(source, port, arrival.whole))
 
     def _arrival(self, route: Route) -> _Arrival:
-        """What is known of a value at the end of a course, of which each wire is looked at once."""
+        """What is known of a value at the end of a route; each segment is looked at once."""
         ahead: list[Route] = []
         at: Route | None = route
         while at is not None and at.node not in self._arrivals:
@@ -214,7 +216,7 @@ class _Ports:
     def _arrival_by(self, route: Route) -> _Arrival:
         """The same, where it is known of the course before."""
         origin = self._leaves.get(route.origin.way)
-        if route.before is None or route.wire is None:
+        if route.before is None or route.segment is None:
             if origin is None:
                 return self._given_to(route.node)
             connector = None if origin.component is None else origin.connector(route.node.port)
@@ -231,7 +233,7 @@ class _Ports:
         if before.error is not None or (origin is not None and origin.component is None):
             return before
         try:
-            whole, unit = route.wire.carry(self._archive, before.whole, before.unit)
+            whole, unit = route.segment.carry(self._archive, before.whole, before.unit)
         except InputError as error:
             return _Arrival(before.start, error=error)
         return _Arrival(before.start, whole, unit)
@@ -261,8 +263,8 @@ class _Ports:
             return
         if not component.is_settable(port.port):
             self._archive.note(
-                f"{port}: is of causality {connector.kind} and cannot be set; the value that is "
-                "given to it has no effect"
+                f"{port}: is of causality {connector.causality} and cannot be set; the value that "
+                "is given to it has no effect"
             )
             return
         items = {**connector.items, **given.items}

@@ -72,8 +72,10 @@ def parameter_set_xml(system: System, component: Component) -> bytes:
     parameters = ElementTree.SubElement(root, f"{{{SSV}}}Parameters")
     for name, value in system.parameters_of(component.name).items():
         element = ElementTree.SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
-        kind = component.variable(name).type
-        ElementTree.SubElement(element, f"{{{SSV}}}{kind}", value=_literal(component, name, value))
+        fmi_type = component.variable(name).type
+        ElementTree.SubElement(
+            element, f"{{{SSV}}}{fmi_type}", value=_literal(component, name, value)
+        )
     return _serialised(root)
 
 
@@ -160,8 +162,8 @@ def _add_transformation(
         ElementTree.SubElement(element, _ssc("LinearTransformation"), numbers)
     elif isinstance(made, Mapped):
         source = connection.source
-        kind = type_of(system.component(source.component).variable(source.port))
-        of = bool if kind == "Boolean" else int
+        fmi_type = type_of(system.component(source.component).variable(source.port))
+        of = bool if fmi_type == "Boolean" else int
         # Numbers of an enumeration are integers as well.
         name = "BooleanMapping" if of is bool else "IntegerMapping"
         table = ElementTree.SubElement(element, _ssc(f"{name}Transformation"))

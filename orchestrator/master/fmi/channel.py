@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.master.fmi.transfer import KINDS
+from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.system.component import Component
 
 #: Bytes beyond which a note is none: of one with the state of an FMU, which may be large, and of
@@ -123,7 +123,7 @@ def _from_text(read: dict[str, Any]) -> Any:
 def sizes(component: Component) -> tuple[int, int]:
     """How many inputs and outputs a component has in a row."""
     inputs, outputs = (
-        sum(variable.type in KINDS for variable in component.having(causality))
+        sum(variable.type in FMI_TYPES for variable in component.having(causality))
         for causality in ("input", "output")
     )
     return inputs, outputs

@@ -46,18 +46,18 @@ class Ended(Exception):
 
 
 class Part(NamedTuple):
-    """Ports of one component that have the same causality and kind.
+    """Ports of one component that have the same causality and type.
 
     Attributes:
         causality: `input` or `output`.
-        kind: one of :data:`orchestrator.master.fmi.transfer.KINDS`.
+        fmi_type: one of :data:`orchestrator.master.fmi.transfer.FMI_TYPES`.
         references: value references.
         place: of their values among those of the component.
 
     """
 
     causality: str
-    kind: str
+    fmi_type: str
     references: list[int]
     place: slice
 

@@ -154,13 +154,13 @@ class IsolatedInstance:
         self._inputs, self._outputs = values[:inputs], values[first : first + outputs]
         self._strings = strings
         for part in parts:
-            if part.kind == "String":
+            if part.fmi_type == "String":
                 places = range(part.place.start, part.place.stop)
                 if part.causality == "input":
                     self._text_inputs += places
                 else:
                     self._text_outputs += [place - first for place in places]
-            elif part.kind != "Real" and part.causality == "output":
+            elif part.fmi_type != "Real" and part.causality == "output":
                 self._integer_outputs += range(part.place.start - first, part.place.stop - first)
 
     def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:

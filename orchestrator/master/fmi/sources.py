@@ -30,7 +30,7 @@ _FLAGS = (
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 #: What they are in the user's cache folder.
-_KIND = "sources"
+_CATEGORY = "sources"
 
 
 class Sources(NamedTuple):
@@ -95,12 +95,12 @@ def compile_into(component: Component, sources: Sources, binary: Path) -> None:
     """
     key = _key(component)
     try:
-        with claimed(user_cache.folder_of(_KIND), wait=True):
-            kept = user_cache.kept(_KIND, key)
+        with claimed(user_cache.folder_of(_CATEGORY), wait=True):
+            kept = user_cache.kept(_CATEGORY, key)
             content = next(iter(kept.values())) if kept else _compiled(component, sources)
             if not kept:
                 with suppress(OSError):
-                    user_cache.keep(_KIND, key, {binary.name: content})
+                    user_cache.keep(_CATEGORY, key, {binary.name: content})
         binary.parent.mkdir(parents=True, exist_ok=True)
         # Other processes may be about to load it.
         new = binary.with_name(f"{binary.name}.{os.getpid()}")
@@ -117,7 +117,7 @@ def check_compiler(component: Component) -> None:
         InputError: there is no compiler.
 
     """
-    if compiler() is None and not user_cache.kept(_KIND, _key(component)):
+    if compiler() is None and not user_cache.kept(_CATEGORY, _key(component)):
         raise InputError(
             f"{component.fmu}: has no binary for this machine, {fmpy.platform}, and must be "
             "compiled: install gcc or clang, or `pip install ziglang`"

@@ -23,7 +23,7 @@ from orchestrator.system.values import StringTable
 
 #: Kinds of values that can be connected and recorded, with FMI's functions for them and the types
 #: that they are moved in: for a String moves the number of its text.
-KINDS = {
+FMI_TYPES = {
     "Real": ("Real", fmi2Real),
     "Integer": ("Integer", fmi2Integer),
     "Enumeration": ("Integer", fmi2Integer),
@@ -36,7 +36,7 @@ _CALLBACK = CFUNCTYPE(fmi2Status, fmi2Component, c_void_p, c_size_t, c_void_p)
 
 
 class PortBlock:
-    """Values of one kind, side by side in the row of all values, moved by one FMI call.
+    """Values of one type, side by side in the row of all values, moved by one FMI call.
 
     Attributes:
         function: the one of FMI that moves them, without fmi2.
@@ -46,7 +46,7 @@ class PortBlock:
     def __init__(
         self,
         causality: str,
-        kind: str,
+        fmi_type: str,
         references: Sequence[int],
         row: np.ndarray,
         strings: StringTable,
@@ -55,20 +55,20 @@ class PortBlock:
 
         Args:
             causality: `input` or `output`.
-            kind: one of :data:`KINDS`.
+            kind: one of :data:`FMI_TYPES`.
             references: value references.
             row: the part of the row of all values where the values are, a view.
             texts: whose numbers stand in the row.
 
         """
-        self._kind, c_type = KINDS[kind]
+        self._fmi_type, c_type = FMI_TYPES[fmi_type]
         self._strings = strings
-        self.function = f"{'Set' if causality == 'input' else 'Get'}{self._kind}"
+        self.function = f"{'Set' if causality == 'input' else 'Get'}{self._fmi_type}"
         self._row = row
         n = len(references)
         self._n = c_size_t(n)
         self._references = (fmi2ValueReference * n)(*references)
-        if self._kind == "Real":
+        if self._fmi_type == "Real":
             self._values = (c_type * n).from_buffer(row)
         else:
             self._values = (c_type * n)()
@@ -77,7 +77,7 @@ class PortBlock:
     def setter(self, function: Callable[..., int]) -> Callable[[], int]:
         """A call that hands the values to an FMU, by its function of this block."""
         call = self._call(function)
-        if self._kind == "Real":
+        if self._fmi_type == "Real":
             return call
 
         row, integers = self._row, self._integers
@@ -92,7 +92,7 @@ class PortBlock:
     def getter(self, function: Callable[..., int]) -> Callable[[], int]:
         """A call that takes the values from an FMU, by its function of this block."""
         call = self._call(function)
-        if self._kind == "Real":
+        if self._fmi_type == "Real":
             return call
 
         row, values = self._row, self._values
@@ -112,14 +112,14 @@ class PortBlock:
 
     def move(self, address: int | None) -> CMove:
         """The same for the compiled loop, by the address of the FMU's function of this block."""
-        integers = None if self._kind == "Real" else addressof(self._values)
-        if self._kind == "String":
+        integers = None if self._fmi_type == "Real" else addressof(self._values)
+        if self._fmi_type == "String":
             address = cast(self._called_back, c_void_p).value
         references, row = addressof(self._references), self._row.ctypes.data
         return CMove(address, references, self._n, row, integers)
 
     def _call(self, function: Callable[..., int]) -> Callable[[], int]:
-        if self._kind == "String":
+        if self._fmi_type == "String":
             move = self._set_texts if self.function.startswith("Set") else self._get_texts
             call = partial(move, function)
             # The compiled loop looks for numbers and has an FMU's function move them.

@@ -56,13 +56,13 @@ class Layer(NamedTuple):
 
     Attributes:
         event: its number; that of what was there before any is :data:`_GROUND`.
-        kind: a key of :data:`_KINDS`.
-        value: of that kind.
+        effect: a key of :data:`_EFFECTS`.
+        value: that goes with it.
 
     """
 
     event: int
-    kind: str
+    effect: str
     value: Any
 
 
@@ -79,7 +79,7 @@ def _tune(run: Run, target: PortName, value: Value) -> None:
         )
 
 
-_KINDS: Mapping[str, Callable[[Run, PortName, Any], None]] = {
+_EFFECTS: Mapping[str, Callable[[Run, PortName, Any], None]] = {
     "override": lambda run, target, value: run.overrides.override(target, value),
     "bias": lambda run, target, value: run.overrides.bias(target, value),
     "release": lambda run, target, _: run.overrides.release(target),
@@ -100,18 +100,18 @@ class Layers:
 
     def put(self, run: Run, target: PortName, layer: Layer) -> None:
         """Lay something upon whatever acts at a place."""
-        place = target, layer.kind in _SETTING
+        place = target, layer.effect in _SETTING
         layers = self._at.setdefault(place, [])
         if not layers:
-            layers.append(_ground(run, target, layer.kind))
+            layers.append(_ground(run, target, layer.effect))
         layers[:] = [other for other in layers if other.event != layer.event] + [layer]
-        _KINDS[layer.kind](run, target, layer.value)
+        _EFFECTS[layer.effect](run, target, layer.value)
 
     def take(self, run: Run, event: int) -> None:
         """Take away what an event does."""
         for (target, _), layers in self._at.items():
             if layers[-1].event == event:
-                _KINDS[layers[-2].kind](run, target, layers[-2].value)
+                _EFFECTS[layers[-2].effect](run, target, layers[-2].value)
             layers[:] = [layer for layer in layers if layer.event != event]
 
     def release(self, run: Run, target: PortName) -> None:
@@ -124,7 +124,7 @@ class Layers:
         return {
             target.port: layers[-1].value
             for (target, _), layers in self._at.items()
-            if target.component == component and layers[-1].kind == "tune"
+            if target.component == component and layers[-1].effect == "tune"
         }
 
     def state(self) -> list[Any]:
@@ -141,14 +141,14 @@ class Layers:
         }
 
 
-def _ground(run: Run, target: PortName, kind: str) -> Layer:
+def _ground(run: Run, target: PortName, effect: str) -> Layer:
     """What there is where no event acts."""
-    if kind == "tune":
+    if effect == "tune":
         return Layer(
-            _GROUND, kind, run.instances[target.component].read([target.port])[target.port]
+            _GROUND, effect, run.instances[target.component].read([target.port])[target.port]
         )
-    if kind == "supply":
-        return Layer(_GROUND, kind, run.overrides.supplied(target))
+    if effect == "supply":
+        return Layer(_GROUND, effect, run.overrides.supplied(target))
     return Layer(_GROUND, "release", None)
 
 
@@ -171,18 +171,18 @@ class Alter:
     """Override or bias inputs.
 
     Attributes:
-        kind: `override` or `bias`.
+        effect: `override` or `bias`.
         values: for each input.
 
     """
 
-    kind: str
+    effect: str
     values: tuple[tuple[PortName, float], ...]
 
     def act(self, run: Run, event: int, layers: Layers) -> None:
         """Do it."""
         for target, value in self.values:
-            layers.put(run, target, Layer(event, self.kind, value))
+            layers.put(run, target, Layer(event, self.effect, value))
 
 
 @dataclass(frozen=True)

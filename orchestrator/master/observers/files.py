@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.reading import lines_of
+from orchestrator.machine.user_files import lines_of
 from orchestrator.master.observers.observer import Ending, Header
 
 #: Rows that are written to Parquet, or read, at once.

@@ -20,8 +20,8 @@ import numba
 from numba import types
 from numba.extending import intrinsic
 
-from orchestrator.studies.batch import kernel, tally
-from orchestrator.studies.batch.flat import overload_all
+from orchestrator.studies.batch import accumulator, kernel
+from orchestrator.studies.batch.numbers import overload_all
 
 #: Where a number is not finite, Python raises in some places; here it is found afterwards.
 OPTIONS: Any = {"nogil": True, "error_model": "numpy"}
@@ -31,7 +31,7 @@ OPTIONS: Any = {"nogil": True, "error_model": "numpy"}
 _WITHIN: Any = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 #: What is compiled besides the package of the equations.
-_PACKAGE, _MODULES = "auv_fmu", (kernel.__name__, tally.__name__)
+_PACKAGE, _MODULES = "auv_fmu", (kernel.__name__, accumulator.__name__)
 
 overload_all()
 

@@ -13,20 +13,39 @@ import numpy as np
 
 from auv_fmu import closed_loop, plant
 from auv_fmu.attitude import rotation_from_euler
-from auv_fmu.closed_loop import LAWS, Law, Scene, Setting, Splits, Vehicles
+from auv_fmu.closed_loop import LAWS, Instant, Law, Moment, Setting, Splits
 from auv_fmu.control_point import control_point
 from auv_fmu.euler import LARGEST_STATE
 from auv_fmu.output_feedback import Gains
 from auv_fmu.types import Vector3, Vector6
 from auv_fmu.vectors import difference
-from orchestrator.studies.batch.flat import flat, nought, square
-from orchestrator.studies.batch.tally import Row, Step, take_row, take_step
+from orchestrator.studies.batch.accumulator import RowSignals, StepSignals, take_row, take_step
+from orchestrator.studies.batch.numbers import flat, nought, square
+from orchestrator.vehicle.signals import AXES, DIRECTIONS, STANDARD
 
 #: The controller's part of the loop: whoever compiles this module for another one puts it here.
 law: Law = LAWS[Gains]
 
 
-class Plan(NamedTuple):
+#: Of the rows, after the time: the names of their columns.
+COLUMNS: tuple[str, ...] = (
+    *STANDARD.posture,
+    *STANDARD.nu,
+    *(f"plant.y.{axis}" for axis in AXES),
+    *STANDARD.dy,
+    *STANDARD.y_d,
+    *STANDARD.dy_d,
+    *(f"planner.ddy_d.{axis}" for axis in AXES),
+    *STANDARD.dy_hat,
+    *STANDARD.theta_hat,
+    *STANDARD.tau,
+    *STANDARD.commanded,
+    *STANDARD.applied,
+    *(f"plant.tau_w.{direction}" for direction in DIRECTIONS),
+)
+
+
+class RunSteps(NamedTuple):
     """The steps of a run."""
 
     steps: int  #: how many
@@ -36,15 +55,6 @@ class Plan(NamedTuple):
     parts: Splits  #: of a step of the whole length
     last_parts: Splits  #: of the shorter one
     delayed: bool  #: command and disturbance act one step late: Jacobi order
-
-
-class Moment(NamedTuple):
-    """All that the rest of a run depends on."""
-
-    vehicles: Vehicles
-    scene: Scene
-    control: Any  #: state of the controller
-    before: tuple[Vector3, Vector6]  #: command and disturbance of the step before
 
 
 class Done(NamedTuple):
@@ -60,10 +70,10 @@ class Done(NamedTuple):
 
 def run(
     setting: Setting,
-    plan: Plan,
+    plan: RunSteps,
     generator: np.random.Generator,
     ends: np.ndarray,
-    tallies: np.ndarray,
+    accumulators: np.ndarray,
     rows: np.ndarray,
     progress: np.ndarray,
 ) -> Moment:
@@ -73,8 +83,8 @@ def run(
         setting: of the loop.
         plan: its steps.
         generator: of uniform numbers.
-        ends: of the tallies, as :data:`.tally.END` says.
-        tallies: to be filled.
+        ends: of the accumulators, as :data:`.accumulator.END` says.
+        accumulators: to be filled.
         rows: to be filled, one more than steps; or none.
         progress: of which the first element becomes the number of steps taken. The next one is
             refused if there are fewer than planned; -1: already the start is.
@@ -86,95 +96,53 @@ def run(
     noisy = setting.plant.noise.std > 0.0
     progress[0] = -1
     n, spare = normals(generator, noisy, (False, 0.0))
-    moment, done = begin(setting, n)
-    if not is_sound(moment):
+    moment = closed_loop.begin(setting, law, n)
+    first = closed_loop.act(setting, law, moment, plan.h, plan.parts, plan.delayed)
+    driven, _ = plant.begin(setting.plant, first.tau, setting.plant.current)
+    done = done_in(first, driven.tau)
+    if not (is_sound(moment) and nought(done) == 0.0):
         return moment
-    gains = law.sampled(setting.controller, plan.h / plan.parts.controller)
-    k, t = 0, 0.0
+    k = 0
     while True:
         # Here, where the controller is about to need the sines of the same attitude.
-        row = row_of(setting, t, moment, done)
-        for j in range(len(tallies)):
+        row = row_of(setting, moment, done)
+        for j in range(len(accumulators)):
             if k <= ends[j].steps:
-                take_row(tallies[j], row, ends[j])
+                take_row(accumulators[j], row, ends[j])
         if len(rows):
-            fill(rows[k], t, moment, done)
+            fill(rows[k], moment, done)
         progress[0] = k
         if k == plan.steps:
             break
-        whole = k < plan.full
-        end = (k + 1) * plan.h if whole else plan.stop
-        h, parts = (plan.h, plan.parts) if whole else (end - t, plan.last_parts)
-        if not whole:
-            gains = law.sampled(setting.controller, h / parts.controller)
+        h, parts, end = part_of(plan, k)
         n, spare = normals(generator, noisy, spare)
-        tau, dy = done.tau, moment.scene.plant.dy
-        moment, done = step(setting, gains, moment, plan.delayed, end, h, parts, n)
+        instant = closed_loop.act(setting, law, moment, h, parts, plan.delayed)
+        begun, before = moment, done.tau
+        moment = closed_loop.step(setting, law, instant, h, parts, end, n)
+        done = done_in(instant, moment.vehicles.plant.tau)
         if not is_sound(moment):
             break
-        miss = difference(done.velocity, dy)
-        one = Step(t, end, done.told, done.tau, tau, miss, k == 0)
-        for j in range(len(tallies)):
+        miss = difference(done.velocity, begun.scene.plant.dy)
+        one = StepSignals(begun.t, end, done.told, done.tau, before, miss, k == 0)
+        for j in range(len(accumulators)):
             if k < ends[j].steps:
-                take_step(tallies[j], one, setting.plant.limits, ends[j])
-        k, t = k + 1, end
+                take_step(accumulators[j], one, setting.plant.limits, ends[j])
+        k += 1
     return moment
 
 
-def begin(setting: Setting, n: Vector3) -> tuple[Moment, Done]:
-    """The start, and what is computed there already."""
-    gains = setting.controller
-    vehicles = closed_loop.begin(setting)
-    scene = closed_loop.scene(setting, vehicles, 0.0, n)
-    measured = law.measurement(scene)
-    control = law.start(gains, measured)
-    state, signals = law.command(gains, control, measured)
-    velocity, theta_hat = law.estimates(state, signals, measured)
-    driven, _ = plant.begin(
-        setting.plant, plant.applied(setting.plant, signals.tau), setting.plant.current
-    )
-    return (
-        Moment(vehicles, scene, control, (signals.tau, scene.tau_w)),
-        Done(velocity, theta_hat, signals.tau, signals.tau, driven.tau, scene.tau_w),
-    )
+def part_of(plan: RunSteps, k: int) -> tuple[float, Splits, float]:
+    """Length of step k of a run [s], what it is split into, and when it ends [s]."""
+    if k < plan.full:
+        return plan.h, plan.parts, (k + 1) * plan.h
+    return plan.stop - k * plan.h, plan.last_parts, plan.stop
 
 
-def step(
-    setting: Setting,
-    gains: Any,
-    moment: Moment,
-    delayed: bool,
-    end: float,
-    h: float,
-    parts: Splits,
-    n: Vector3,
-) -> tuple[Moment, Done]:
-    """One step.
-
-    Args:
-        setting: of the loop.
-        gains: of the controller, for steps of this length.
-        moment: that it begins with.
-        delayed: whether what acts is that of the step before.
-        end: when it ends [s].
-        h: how long it takes [s].
-        parts: that it is split into.
-        n: three independent standard normal numbers.
-
-    """
-    measured = law.measurement(moment.scene)
-    control, signals = law.command(gains, moment.control, measured)
-    velocity, theta_hat = law.estimates(control, signals, measured)
-    now = signals.tau, moment.scene.tau_w
-    told, tau_w = moment.before if delayed else now
-    tau = plant.applied(setting.plant, told)
-    n_c = parts.controller
-    control = law.steps(gains, control, signals, measured, h / n_c, n_c)
-    vehicles = closed_loop.move(setting, moment.vehicles, tau, tau_w, h, parts)
-    return (
-        Moment(vehicles, closed_loop.scene(setting, vehicles, end, n), control, now),
-        Done(velocity, theta_hat, signals.tau, told, vehicles.plant.tau, tau_w),
-    )
+def done_in(instant: Instant, tau: Vector3) -> Done:
+    """What was computed in the step that an instant begins, after which tau [N, N.m] acts."""
+    velocity, theta_hat = law.estimates(instant)
+    commanded = instant.signals.tau
+    return Done(velocity, theta_hat, commanded, instant.command, tau, instant.tau_w)
 
 
 def is_sound(moment: Moment) -> bool:
@@ -186,7 +154,7 @@ def is_sound(moment: Moment) -> bool:
     return (
         is_bounded(vehicles.plant)
         and is_bounded(vehicles.planner)
-        and is_bounded(moment.control)
+        and is_bounded(moment.controller_state)
         and nought((scene.y, scene.plant.dy, scene.reference, moment.before)) == 0.0
     )
 
@@ -223,15 +191,15 @@ def gauss(
     return cos(angle) * radius, (True, sin(angle) * radius)
 
 
-def row_of(setting: Setting, t: float, moment: Moment, done: Done) -> Row:
+def row_of(setting: Setting, moment: Moment, done: Done) -> RowSignals:
     """What the indices need of a row, as it follows from the ports."""
     seen = moment.scene.plant
     phi, theta, psi = seen.euler
     rotation = rotation_from_euler(phi, theta, psi)
     y = control_point(moment.vehicles.plant.position, rotation, setting.plant.ell)
     _, v, w, _, _, _ = seen.nu
-    return Row(
-        t,
+    return RowSignals(
+        moment.t,
         difference(y, moment.scene.reference.y_d),
         seen.dy,
         sqrt(v * v + w * w),
@@ -239,10 +207,10 @@ def row_of(setting: Setting, t: float, moment: Moment, done: Done) -> Row:
     )
 
 
-def fill(row: np.ndarray, t: float, moment: Moment, done: Done) -> None:
-    """Fill a row with the time and the values of :data:`.columns.COLUMNS`."""
+def fill(row: np.ndarray, moment: Moment, done: Done) -> None:
+    """Fill a row with the time and the values of :data:`COLUMNS`."""
     scene, seen = moment.scene, moment.scene.plant
     shown = moment.vehicles.plant.position, seen.euler, seen.nu, scene.y, seen.dy
-    values = flat((t, shown, scene.reference, done))
+    values = flat((moment.t, shown, scene.reference, done))
     for i in range(len(values)):
         row[i] = values[i]

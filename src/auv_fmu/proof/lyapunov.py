@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from auv_fmu import observer
 from auv_fmu.control_point import actuated_velocity
-from auv_fmu.output_feedback import virtual_velocity
 from auv_fmu.saturation import Saturation, integral, saturation
 from auv_fmu.types import Rotation, Vector3
-from auv_fmu.vectors import difference
+from auv_fmu.vectors import difference, minus_scaled
 from auv_fmu.vehicle import Vehicle
 
 
@@ -41,8 +39,8 @@ def composite_errors(
         s: saturation function.
 
     """
-    dy_r = virtual_velocity(dy_d, saturation(s, e_z)[0], lambda_)
-    dy_o = observer.dy_o(dy_hat, saturation(s, z)[0], lambda_)
+    dy_r = minus_scaled(dy_d, lambda_, saturation(s, e_z))  # (16)
+    dy_o = minus_scaled(dy_hat, lambda_, saturation(s, z))  # (18)
     return difference(dy, dy_r), difference(dy, dy_o)
 
 

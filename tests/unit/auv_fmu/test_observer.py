@@ -8,15 +8,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_fmu import observer, output_feedback
-from auv_fmu.output_feedback import Gains, virtual_velocity
-from auv_fmu.saturation import hyperbolic_tangent
+from auv_fmu.observer import EULER, EXACT, INTEGRAL
+from auv_fmu.output_feedback import ControllerState, Gains, Measurement
+from auv_fmu.saturation import TANH, saturation
 from support.strategies import speeds, vectors
 
 three = vectors(speeds, 3)
 
 
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+def estimate(dy_hat_o, z, lambda_, k_d, form=EULER, h=0.02):
+    """dy_hat of (23), of a controller that finds y = z where y_hat = 0."""
+    gains = Gains(lambda_=lambda_, k_d=k_d, form=form)
+    measured = Measurement(z, ORIGIN, ORIGIN, ORIGIN, ORIGIN)
+    state = ControllerState(ORIGIN, dy_hat_o, (0.0,) * 4)
+    return output_feedback.evaluate(gains, state, measured, h).dy_hat
+
+
 def s(z):
-    return hyperbolic_tangent(z)[0]
+    return saturation(TANH, z)
 
 
 def test_observer_finds_a_constant_velocity():
@@ -27,18 +39,17 @@ def test_observer_finds_a_constant_velocity():
     y_hat, y = np.zeros(3), z_0
     for _ in range(1000):
         z = y - y_hat
-        rate = observer.dy_hat(dy_hat_o, s(z), z, lambda_, k_d)
+        rate = estimate(dy_hat_o, z, lambda_, k_d)
         y_hat, y = y_hat + h * np.array(rate), y + h * np.array(dy)
     np.testing.assert_allclose(y - y_hat, z_0 * exp(-(k_d + lambda_) * 0.1), rtol=0.02)
-    at_rest = (0.0, 0.0, 0.0)
-    assert observer.dy_hat(dy_hat_o, at_rest, at_rest, lambda_, k_d) == dy
+    assert estimate(dy_hat_o, ORIGIN, lambda_, k_d) == dy
 
 
-@given(s_z=three, z=three, lambda_=speeds, k_d=st.floats(0, 100))
-def test_first_velocity_estimate_is_zero(s_z, z, lambda_, k_d):
+@given(z=three, lambda_=speeds, k_d=st.floats(0, 100))
+def test_first_velocity_estimate_is_zero(z, lambda_, k_d):
     """The initial condition below (24) makes dy_hat(0) = 0."""
-    dy_hat_o = observer.initial_dy_hat_o(s_z, z, lambda_, k_d)
-    first = observer.dy_hat(dy_hat_o, s_z, z, lambda_, k_d)
+    dy_hat_o = observer.initial_dy_hat_o(s(z), z, lambda_, k_d)
+    first = estimate(dy_hat_o, z, lambda_, k_d)
     assert first == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
 
 
@@ -52,13 +63,13 @@ def test_observer_is_the_one_of_the_proof(y, y_hat, dy, dy_hat_o, ddy_r):
     lambda_, k_d, h = 0.7, 50.0, 1e-6
     y, y_hat, dy, dy_hat_o, ddy_r = map(np.array, (y, y_hat, dy, dy_hat_o, ddy_r))
     z = y - y_hat
-    dy_hat = np.array(observer.dy_hat(dy_hat_o, s(z), z, lambda_, k_d))
-    ddy_hat_o = np.array(observer.ddy_hat_o(ddy_r, s(z), lambda_, k_d))
+    dy_hat = np.array(estimate(dy_hat_o, z, lambda_, k_d))
+    ddy_hat_o = np.array(observer.rate(EULER, ddy_r, s(z), lambda_, k_d))
 
     def dy_o(t):
         z = y + t * dy - (y_hat + t * dy_hat)
-        moved = observer.dy_hat(dy_hat_o + t * ddy_hat_o, s(z), z, lambda_, k_d)
-        return np.array(observer.dy_o(moved, s(z), lambda_))
+        moved = estimate(dy_hat_o + t * ddy_hat_o, z, lambda_, k_d)
+        return np.array(moved) - lambda_ * np.array(s(z))
 
     rate = (dy_o(h) - dy_o(-h)) / (2 * h) - ddy_r
     np.testing.assert_allclose(rate, k_d * (dy - dy_o(0.0)), rtol=1e-6, atol=1e-4)
@@ -69,10 +80,11 @@ def test_24_starts_from_dy_r():
 
     Fig. 4 at its start: a reference at rest, and a control point that is 6.6 m away.
     """
-    state, y_d = output_feedback.initial_state(Gains(), (2.35, 6.0, 0.0)), (0.35, 0.0, -2.0)
-    e_z = np.subtract(state.y_hat, y_d)
-    dy_r = virtual_velocity((0.0, 0.0, 0.0), s(e_z), 1.0)
-    assert state.dy_hat_o == (0.0, 0.0, 0.0)
+    gains, y = Gains(form=INTEGRAL), (2.35, 6.0, 0.0)
+    state = output_feedback.initial_state(gains, y)
+    measured = Measurement(y, ORIGIN, (0.35, 0.0, -2.0), ORIGIN, ORIGIN)
+    dy_r = output_feedback.evaluate(gains, state, measured, 0.02).dy_hat
+    assert state.dy_hat_o == ORIGIN
     np.testing.assert_allclose(dy_r, -np.tanh([2.0, 6.0, 2.0]))
 
 
@@ -87,7 +99,7 @@ def test_state_of_the_observer_is_equation_24():
     integral = np.zeros(3)
     for t in (np.arange(n) + 0.5) * h:
         z = np.arctanh(0.9 * np.cos(w * t))
-        integral += h * np.array(observer.ddy_hat_o(w * np.cos(w * t), s(z), lambda_, k_d))
+        integral += h * np.array(observer.rate(EULER, w * np.cos(w * t), s(z), lambda_, k_d))
     expected = np.sin(w * end) + k_d * lambda_ * 0.9 * np.sin(w * end) / w
     np.testing.assert_allclose(integral, expected, rtol=1e-6)
 
@@ -96,7 +108,7 @@ def test_state_of_the_observer_is_equation_24():
 def test_exact_gain_takes_the_error_where_the_continuous_observer_takes_it(k_d, h, z):
     """dz/dt = -k_d z, with a vehicle that moves on as dy_hat_o says: exp(-k_d h) z in any step."""
     dy = (0.4, -0.2, 0.1)
-    rate = observer.dy_hat(dy, (0.0,) * 3, z, 1.0, observer.exact_gain(k_d, h))
+    rate = estimate(dy, z, 0.0, k_d, EXACT, h)
     after = np.array(z) + h * np.array(dy) - h * np.array(rate)
     np.testing.assert_allclose(after, np.array(z) * exp(-k_d * h), rtol=1e-9, atol=1e-15)
 

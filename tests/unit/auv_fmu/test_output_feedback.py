@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from auv_fmu import output_feedback
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import jacobian
-from auv_fmu.observer import EULER, EXACT, INTEGRAL, exact_gain
+from auv_fmu.observer import EULER, EXACT, INTEGRAL, gain
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement
 from auv_fmu.saturation import SATURATIONS
 from support.strategies import angles, speeds, vectors
@@ -66,7 +66,7 @@ def test_law_is_48_to_51_in_matrices(
         form=form,
     )
     state = ControllerState(y_hat, dy_hat_o, theta_hat)
-    signals = output_feedback.evaluate(g, state, Measurement(y, euler, y_d, dy_d, ddy_d))
+    signals = output_feedback.evaluate(g, state, Measurement(y, euler, y_d, dy_d, ddy_d), 0.02)
     moved = output_feedback.step(state, signals, 0.02)
     y, y_d, dy_d, ddy_d, y_hat, dy_hat_o, theta_hat = map(
         np.array, (y, y_d, dy_d, ddy_d, y_hat, dy_hat_o, theta_hat)
@@ -109,6 +109,7 @@ def test_first_three_terms_cannot_exceed_their_gains():
         Gains(),
         ControllerState((1e6,) * 3, (-1e6,) * 3, (0.0,) * 4),
         Measurement((-1e6,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3),
+        0.02,
     )
     assert abs(far.tau[0]) <= 10.0 + 2 * 10.0 + 1e-9
 
@@ -134,7 +135,7 @@ def estimates(gains, h, end, dy_hat_o=ORIGIN):
     for k in range(round(end / h) + 1):
         t = k * h
         y, dy, ddy = (sin(t), 0.0, 0.0), (cos(t), 0.0, 0.0), (-sin(t), 0.0, 0.0)
-        signals = output_feedback.evaluate(gains, state, Measurement(y, ORIGIN, y, dy, ddy))
+        signals = output_feedback.evaluate(gains, state, Measurement(y, ORIGIN, y, dy, ddy), h)
         state = output_feedback.step(state, signals, h)
         found.append(signals.dy_hat[0])
     return np.array(found)
@@ -159,13 +160,12 @@ def test_printed_24_shows_the_desired_velocity_first_and_not_zero():
 @pytest.mark.parametrize("k_d", [50.0, 500.0, 5000.0])
 def test_exact_observer_follows_with_any_gain_in_steps_of_20_ms(k_d):
     """sin t is followed as well as k_d h = 1 is by Euler's scheme, which k_d h = 2 breaks."""
-    gains = output_feedback.sampled(Gains(k_d=k_d, form=EXACT), 0.02)
-    assert gains == Gains(k_d=exact_gain(k_d, 0.02), form=EXACT)
+    gains = Gains(k_d=k_d, form=EXACT)
     late = slice(100, None)
     true = np.cos(np.arange(251) * 0.02)[late]
     assert np.abs(estimates(gains, 0.02, 5.0)[late] - true).max() < 0.02
 
 
-def test_other_forms_take_the_gains_as_they_are():
-    for gains in (Gains(), Gains(form=INTEGRAL)):
-        assert output_feedback.sampled(gains, 0.02) is gains
+def test_other_forms_take_the_gain_as_it_is():
+    assert gain(EULER, 50.0, 0.02) == gain(INTEGRAL, 50.0, 0.02) == 50.0
+    assert gain(EXACT, 50.0, 0.02) < 50.0

@@ -11,11 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
-from fmus.packaging.discovery import components
-from fmus.slave.callbacks import explained
+from fmus.discovery import components
+from fmus.python.callbacks import explained
 from support.equations import WHY, bits, equations, filled, flat, structure
+from support.settings import behaviour_of
 
-PACKAGES = [module.removesuffix(".slave") for module in components().values()]
+PACKAGES = [*components().values()]
 
 #: Where equations live, and where they overflow.
 MAGNITUDES = (1e-3, 1.0, 1.0, 1.0, 10.0, 1e9, 1e100, 1e160, 1e308)
@@ -103,7 +104,7 @@ def test_advance(package, random):
 
 
 @pytest.mark.parametrize(
-    "package", [p for p in PACKAGES if hasattr(equations(p).behaviour, "expected")]
+    "package", [p for name, p in components().items() if behaviour_of(name).hooks["expected"]]
 )
 @given(random=randoms)
 def test_expected(package, random):

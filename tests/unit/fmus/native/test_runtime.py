@@ -15,14 +15,14 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from fmus.native import VERSIONS, sources
-from fmus.packaging.discovery import components
+from fmus.discovery import components
+from fmus.native import MAIN, sources
 
 COMPILERS = [command for command in ("gcc", "clang") if shutil.which(command)]
 
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
 
-PACKAGES = {name: module.rpartition(".")[0] for name, module in components().items()}
+PACKAGES = components()
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-ffp-contract=off")
 
@@ -39,7 +39,7 @@ every_double = st.integers(0, 2**64 - 1).map(
 usual_double = st.floats(-1e7, 1e7) | st.floats(-1e-3, 1e-3) | st.integers(-(10**17), 10**17)
 
 
-def written(folder: Path, name: str, version: int = 2) -> Path:
+def written(folder: Path, name: str, version: str = "2") -> Path:
     """The sources of a component in a folder."""
     folder.mkdir(exist_ok=True)
     identity = f'#define MODEL_NAME "{name}"\n#define MODEL_GUID "{{{name}}}"\n'
@@ -199,11 +199,11 @@ def bits(numbers: list[float]) -> bytes:
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("version", MAIN)
 @pytest.mark.parametrize("name", PACKAGES)
-def test_sources_are_c99_without_a_warning(tmp_path: Path, name: str, version: int, compiler: str):
+def test_sources_are_c99_without_a_warning(tmp_path: Path, name: str, version: str, compiler: str):
     folder = written(tmp_path, name, version)
-    compile_in(folder, "-fsyntax-only", VERSIONS[version], compiler=compiler)
+    compile_in(folder, "-fsyntax-only", MAIN[version], compiler=compiler)
 
 
 LINKED = """

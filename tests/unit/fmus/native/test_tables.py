@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
+from fmus.discovery import components
 from fmus.native.tables import tables
-from fmus.packaging.discovery import components
 from fmus.ports.port import FAULT, H_MAX, Port
 
-PACKAGES = [module.rpartition(".")[0] for module in components().values()]
+PACKAGES = [*components().values()]
 
 ROW = re.compile(
     r'\{"(?P<name>.+?)", (?P<kind>[A-Z]+), (?P<causality>[A-Z]+), (?P<variability>[A-Z]+), '

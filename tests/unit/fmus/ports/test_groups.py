@@ -9,7 +9,7 @@ import pytest
 from fmus.ports.groups import Nothing, ParameterSet, packing, slices, unpacking
 from fmus.ports.port import inputs, outputs, parameter, parameters
 from fmus.ports.quantities import NU, POSITION, TAU, per_axis
-from fmus.slave.component import Component
+from fmus.python.component import Component
 
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]

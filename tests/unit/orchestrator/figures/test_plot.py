@@ -10,6 +10,8 @@ from orchestrator.figures.style import save
 from orchestrator.machine.errors import InputError
 from support.tables import loop_table, table_of
 
+TIME = 0.02 * np.arange(10)
+
 
 def drawn(figure):
     """Lines by the label of their panel and their own."""
@@ -60,7 +62,7 @@ def test_legends_of_many_runs_leave_the_panels_their_room(n, tmp_path):
 
 
 def test_a_signal_that_one_run_lacks_is_drawn_of_the_other():
-    own = table_of(mine__a=np.arange(10.0))
+    own = table_of(TIME, mine__a=np.arange(10.0))
     lines = drawn(plot([("loop", loop_table()), ("own", own)], ["mine.a"]))
     np.testing.assert_array_equal(lines["mine.a", "own"][1], np.arange(10.0))
 
@@ -74,13 +76,11 @@ def test_what_cannot_be_chosen_is_explained():
     with pytest.raises(InputError, match=r"no column matches 'plant.ta'; did you mean plant.ta"):
         plot([("run", loop_table())], ["plant.ta"])
     with pytest.raises(InputError, match=r"name the columns to draw; there are mine.a, mine.b"):
-        plot(
-            [("own", table_of(mine__a__x=np.zeros(3), mine__a__y=np.zeros(3), mine__b=np.ones(3)))]
-        )
+        plot([("own", table_of(TIME[:3], mine__a__x=0.0, mine__a__y=0.0, mine__b=1.0))])
 
 
 def test_values_that_no_axis_can_show_are_refused(tmp_path):
-    figure = plot([("own", table_of(mine__a=np.linspace(-1.7, 1.7, 10) * 1e308))], ["mine.a"])
+    figure = plot([("own", table_of(TIME, mine__a=np.linspace(-1.7, 1.7, 10) * 1e308))], ["mine.a"])
     with pytest.raises(InputError, match="too far apart to be drawn"):
         save(figure, tmp_path / "plot.png")
     assert list(tmp_path.iterdir()) == []

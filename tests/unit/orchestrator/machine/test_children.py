@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.commands.main import main
+from support.tiers import slow
 
 #: Files that change what matplotlib or numba do, or how they end.
 RC = [
@@ -29,7 +30,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     return figures(folder)
 
 
-@pytest.mark.parametrize("content", [*RC, None])
+@pytest.mark.parametrize("content", [RC[0], *slow(RC[1], None)])
 def test_figures_are_the_same_whatever_a_matplotlibrc_says(workplace, plain, content):
     if content is None:
         os.mkfifo("matplotlibrc")
@@ -69,6 +70,7 @@ def test_workers_of_a_report_read_it_no_more(workplace):
     assert said.stdout == "{0: 10.0}\n"
 
 
+@pytest.mark.slow
 def test_numba_takes_nothing_from_the_current_folder(workplace):
     pytest.importorskip("numba", reason="needs the extra `studies`")
     pytest.importorskip("distributed", reason="needs the extra `studies`")

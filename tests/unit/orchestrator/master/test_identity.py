@@ -21,7 +21,8 @@ from orchestrator.master.hooks.events import Event, Stop
 from orchestrator.master.hooks.playback import InputTable
 from orchestrator.master.identity import digest_of
 from orchestrator.master.loop import chosen
-from orchestrator.runs.preparation import Prepared, Request
+from orchestrator.runs.preparation import Prepared
+from orchestrator.runs.request import Request
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.units import Linear
@@ -48,7 +49,7 @@ class Choice:
 def on_system(change: Callable[[System, Choice], System]) -> Callable[[Prepared, Choice], Prepared]:
     @wraps(change)
     def changed(run: Prepared, choice: Choice) -> Prepared:
-        return replace(run, system=change(run.system, choice))
+        return replace(run, plan=replace(run.plan, system=change(run.system, choice)))
 
     return changed
 
@@ -109,7 +110,7 @@ def another_field(run: Prepared, choice: Choice) -> Prepared:
     experiment = copy(run.experiment)
     field = choice.random.choice(fields(Experiment))
     object.__setattr__(experiment, field.name, ("another", choice.number))
-    return replace(run, experiment=experiment)
+    return replace(run, plan=replace(run.plan, experiment=experiment))
 
 
 def an_event(run: Prepared, choice: Choice) -> Prepared:
@@ -213,7 +214,8 @@ def test_the_same_fmus_from_elsewhere_are_the_same_run(tmp_path, native):
 def test_zero_has_a_sign():
     name = PortName("plant", "nu0.u")
     assert base().system.component("plant").start("nu0.u") == 0.0
-    other = replace(base(), system=base().system.with_parameters({name: -0.0}))
+    system = base().system.with_parameters({name: -0.0})
+    other = replace(base(), plan=replace(base().plan, system=system))
     assert other.identity != base().identity
 
 

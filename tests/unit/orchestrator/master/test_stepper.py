@@ -160,6 +160,7 @@ def test_compilers_have_nothing_to_say(tmp_path, command):
     subprocess.run([command, *arguments], check=True)
 
 
+@pytest.mark.slow
 def test_zig_compiles_it_where_there_is_no_other(tmp_path, cache, monkeypatch):
     pytest.importorskip("ziglang")
     monkeypatch.setattr(compiler.shutil, "which", lambda _: None)

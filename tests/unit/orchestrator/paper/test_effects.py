@@ -9,6 +9,7 @@ from orchestrator.master.observers.table import Table
 from orchestrator.paper import effects
 from orchestrator.paper.effects import EFFECTS, LAMBDAS, NOISE_LEVELS, STEPS, show_effect
 from orchestrator.paper.kept_runs import KeptRun, KeptRuns
+from support.texts import tells
 
 
 class Here:
@@ -43,8 +44,7 @@ def test_disturbance(tables):
             ),
         )
     )
-    assert "0.1, 0.2, 0.3 m" in shown.text
-    assert "61, 62, 63 N" in shown.text
+    assert tells(shown.text, (0.1, 0.2, 0.3), (61, 62, 63))
 
 
 def test_jacobian(tables):
@@ -55,15 +55,14 @@ def test_jacobian(tables):
             {"saturated_fraction": (0.1, 0.25, 0.0), "final_error": (4.0, 5.0, 6.0)},
         )
     )
-    assert "25 % of the steps of Fig. 5 saturate and e_f is 4, 5, 6 m" in shown.text
-    assert "0 % and 1, 2, 3 m" in shown.text
+    assert tells(shown.text, (25, 5, 4, 5, 6, 0, 1, 2, 3)), "5 is the figure"
 
 
 def test_order(tables):
     variations = ((1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (3.0, 3.0, 3.0), (4.0, 4.0, 400.0))
     runs = made(tables["effect-order"], *({"total_variation": each} for each in variations))
     shown = effects.order(*runs)
-    assert "proposed 3 in Gauss-Seidel order and 6 in Jacobi order; PD 9 and 408." in shown.text
+    assert tells(shown.text, (3, 6, 9, 408))
 
 
 def test_step(tables):
@@ -72,9 +71,7 @@ def test_step(tables):
     pd = [{"l2_effort": (9.0, 8.0 - i, 7.0)} for i in range(len(STEPS))]
     exact = {"l2_effort": (9.0, 4.25, 7.0)}
     shown = effects.step(*made(tables["effect-step"], *proposed, *pd, exact))
-    assert "with plant.integrator = rk4 it is 4.25 at 20 ms" in shown.text
-    assert "in tau_q is 8, 7, 6, 5 N·m·√s" in shown.text
-    assert "change by 5 % at most" in shown.text
+    assert tells(shown.text, (4.25, 20), (8, 7, 6, 5), (5,))
     [line, *_] = shown.figure.axes[0].lines
     assert dict(zip(*line.get_data(), strict=True)) == {
         0.02: 100.0,
@@ -91,7 +88,7 @@ def test_noise(tables):
         return {"l2_effort": values, "peak_command": values, "saturated_fraction": (0.0, level, 0)}
 
     shown = effects.noise(*made(tables["effect-noise"], *map(metrics, NOISE_LEVELS)))
-    assert "at 1 N; 1, 1 N·m; 1 cm drives them to 10 N; 10, 10 N·m, and 1 %" in shown.text
+    assert tells(shown.text, (1, 1, 1, 1, 10, 10, 10, 1)), "1 cm, and 1 % of the steps"
     [line, *_] = shown.figure.axes[0].lines
     np.testing.assert_allclose(line.get_xdata(), line.get_ydata(), atol=1e-8)
 
@@ -107,8 +104,7 @@ def test_condition_30(tables):
         for value in LAMBDAS
     ]
     shown = effects.condition_30(*made(tables["effect-lambda"], *runs))
-    assert "the peaks are 10 N; 1, 1 N·m at the paper's lambda = 1 and 21 N; 2.1" in shown.text
-    assert "where 2.1 % of the steps saturate; e_f falls from 1, 1, 1 to 0.476" in shown.text
+    assert tells(shown.text, (10, 1, 1, 1, 21, 2.1), (2.1, 1, 1, 1, 0.476))
     [line, *_] = shown.figure.axes[0].lines
     np.testing.assert_allclose(line.get_ydata(), 10.0 * line.get_xdata())
 
@@ -121,8 +117,7 @@ def test_saturation(tables):
             {"l2_effort": (4.0, 5.0, 6.0), "final_error": (0.4, 0.5, 0.6)},
         )
     )
-    assert "1 N·√s; 2, 3 N·m·√s against 4 N·√s; 5, 6 N·m·√s" in shown.text
-    assert "e_f 0.1, 0.2, 0.3 m against 0.4, 0.5, 0.6 m" in shown.text
+    assert tells(shown.text, (1, 2, 3, 4, 5, 6), (0.1, 0.2, 0.3, 0.4, 0.5, 0.6))
 
 
 def test_certificates(tables):
@@ -140,4 +135,4 @@ def test_an_effect_is_drawn_or_says_why_not(tables, tmp_path):
     assert f"({tmp_path.name}/certificates.png)" in text
     assert (tmp_path / "certificates.png").stat().st_size > 10_000
     failed = [KeptRun({"failure": "the sea is dry"}, table)]
-    assert show_effect("certificates", failed, tmp_path) == "A run ended early: the sea is dry"
+    assert show_effect("certificates", failed, tmp_path).endswith("the sea is dry")

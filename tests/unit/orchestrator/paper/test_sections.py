@@ -9,7 +9,7 @@ import pytest
 from orchestrator.master.observers.table import Table
 from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.sections import draw_section, sections, written
-from orchestrator.paper.variations import Variation
+from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.system.names import port_name
 
@@ -35,7 +35,7 @@ class Known:
         return KeptRun(self._metrics[self._runs.index(run)], Table())
 
     def label(self, run):
-        return run.label
+        return run.command_line
 
 
 def stranger(folder: Path, name: str = "mine", **entries: str) -> str:
@@ -47,11 +47,11 @@ def stranger(folder: Path, name: str = "mine", **entries: str) -> str:
 def test_a_scenario_is_drawn_with_its_companion_or_its_twin_without_noise():
     runs = {section.name: section.runs for section in sections(["fig4", "fig5", "fig7a"])}
     assert runs["fig4"] == {
-        "with noise": Variation("fig4"),
-        "without noise": Variation("fig4", {"plant.noise.std": 0.0}),
+        "with noise": Request("fig4"),
+        "without noise": Request("fig4", {"plant.noise.std": 0.0}),
     }
-    assert runs["fig5"] == {"proposed": Variation("fig5"), "PD": Variation("fig5-pd")}
-    assert runs["fig7a"] == {"fig7a": Variation("fig7a")}
+    assert runs["fig5"] == {"proposed": Request("fig5"), "PD": Request("fig5-pd")}
+    assert runs["fig7a"] == {"fig7a": Request("fig7a")}
 
 
 def test_names_of_strangers_do_not_collide(tmp_path):

@@ -7,9 +7,6 @@ import csv
 import numpy as np
 import pytest
 
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.observer import Header
-from orchestrator.master.observers.table import Table
 from orchestrator.paper import choices
 from orchestrator.paper.choices import (
     FIVE,
@@ -25,11 +22,13 @@ from orchestrator.paper.measures import Approach
 from orchestrator.paper.printed_table import section, write_variants
 from orchestrator.paper.sensitivity import PUBLISHED, as_read
 from orchestrator.paper.variants import errors, moved, numbers_of
-from orchestrator.runs.preparation import Request, loaded, prepare
+from orchestrator.runs.preparation import loaded, prepare
+from orchestrator.runs.request import Request
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.system.names import port_name
 from orchestrator.vehicle.signals import STANDARD, tracking_error
+from support.tables import table_of
 from support.variants import (
     APPLIED,
     COMMANDED,
@@ -47,14 +46,11 @@ from support.variants import (
 COLUMNS = (*STANDARD.posture, *STANDARD.y_d, *STANDARD.applied, *STANDARD.commanded)
 
 
-def table_of(rows=10_001, **columns):
+def run_of(rows=10_001, **columns):
     """A run of 200 s in steps of 20 ms; what is not given is zero."""
-    values = np.zeros((rows, 1 + len(COLUMNS)))
-    values[:, 0] = 0.02 * np.arange(rows)
-    for name, column in columns.items():
-        values[:, 1 + COLUMNS.index(name.replace("__", "."))] = column
-    header = Header(COLUMNS, Experiment(200.0, 0.02), {port_name(STANDARD.ell): 0.35})
-    return Table.of(header, values)
+    zeros = dict.fromkeys((name.replace(".", "__") for name in COLUMNS), 0.0)
+    known = {port_name(STANDARD.ell): 0.35}
+    return table_of(0.02 * np.arange(rows), known, **{**zeros, **columns})
 
 
 def test_numbers_are_read_off_rows():
@@ -64,7 +60,7 @@ def test_numbers_are_read_off_rows():
     # The control point is 0.35 m ahead, which is up at a pitch of 90 degrees; and y_d comes nearer.
     y_d = 1.0 + 0.35 + 2.0 / (1.0 + 0.02 * np.arange(10_001))
     found = numbers_of(
-        table_of(
+        run_of(
             plant__tau_applied__u=force,
             plant__tau__q=-2.0 * force,
             plant__eta__x=1.0,
@@ -81,19 +77,19 @@ def test_numbers_are_read_off_rows():
 
 def test_errors_of_all_rows_are_the_tracking_error():
     rng = np.random.default_rng(1)
-    table = table_of(9, **{name.replace(".", "__"): rng.normal(size=9) for name in COLUMNS})
+    table = run_of(9, **{name.replace(".", "__"): rng.normal(size=9) for name in COLUMNS})
     np.testing.assert_allclose(errors(table), tracking_error(table), rtol=1e-13, atol=1e-15)
 
 
 def test_a_run_that_ends_early_has_no_numbers():
-    assert np.isnan(numbers_of(table_of(9_000))).all()
+    assert np.isnan(numbers_of(run_of(9_000))).all()
 
 
 def test_formulas_are_those_that_someone_would_code():
     """By the rows themselves, at every end time."""
     tau = np.random.default_rng(2).uniform(-80.0, 80.0, (10_000, 3))
     columns = zip(STANDARD.applied, np.vstack(([0.0] * 3, tau)).T, strict=True)
-    numbers = numbers_of(table_of(**{name.replace(".", "__"): tau for name, tau in columns}))
+    numbers = numbers_of(run_of(**{name.replace(".", "__"): tau for name, tau in columns}))
     for time in (20.0, 82.0, 200.0):
         taken = tau[: round(time / 0.02)]
         for formula, coded in (

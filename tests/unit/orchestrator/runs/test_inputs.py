@@ -7,7 +7,8 @@ import pytest
 
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.inputs import Inputs, read_inputs
-from orchestrator.runs.preparation import Request, load, loaded, prepare
+from orchestrator.runs.preparation import load, loaded, prepare
+from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.system.names import port_name
 
@@ -79,7 +80,7 @@ def test_a_value_beside_the_table_is_refused(tmp_path):
     with pytest.raises(InputError, match="beside the table"):
         read(tmp_path, "time,plant.tau.u\n0,1\n", given=[U])
     # On the command line it wins over what the scenario has.
-    inputs = Inputs(tmp_path / "inputs.csv")
+    inputs = tmp_path / "inputs.csv"
     prepared = prepare(*loaded("fig3a", "native"), Request(kind="native", inputs=inputs))
     assert prepared.system.parameters[U] == 1.0
     assert np.array_equal(prepared.input_table.values, [[1.0]])
@@ -88,8 +89,8 @@ def test_a_value_beside_the_table_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("entry", "reason"),
     [
-        ("file = 3", "wrong type"),
-        ('between = "linear"', "name a file"),
+        ("file = 3", "file = 3: write a text"),
+        ('between = "linear"', "inputs: lacks file; write file = "),
         ('file = "a.csv"\nform = "x"', "unknown entry 'form'"),
     ],
 )
@@ -103,7 +104,7 @@ def test_an_entry_that_is_none_is_refused(tmp_path, entry, reason):
 def test_an_empty_entry_names_no_file(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text("inputs = {}\n")
-    with pytest.raises(InputError, match=r"mine\.toml: inputs: name a file"):
+    with pytest.raises(InputError, match=r"mine\.toml: inputs: lacks file"):
         read_scenario(str(file))
 
 

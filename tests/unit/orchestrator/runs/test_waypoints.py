@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import pytest
@@ -10,6 +9,7 @@ import pytest
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.waypoints import path_parameters
+from support.texts import mentions
 
 
 def parameters(path: Path, text: str) -> dict[str, object]:
@@ -46,21 +46,22 @@ def test_waypoints_with_times_are_passed_at_them(tmp_path: Path):
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("", "its columns are ; use x, y, z or t, x, y, z"),
-        ("x,y\n1,2\n3,4\n", "its columns are x, y; use x, y, z or t, x, y, z"),
-        ("x,y,z,x\n1,2,3,4\n", "its columns are x, y, z, x"),
-        ("x,y,z\n1,2,3\n", "it has 1 waypoints; a path has 2 to 32"),
-        ("x,y,z\n" + 33 * "1,2,3\n", "it has 33 waypoints; a path has 2 to 32"),
-        ("x,y,z\n1,2,3\n1,2\n", "line 3 has not 3 values"),
-        ("x,y,z\n1,2,3\n1,2,3,4\n", "line 3 has not 3 values"),
-        ("x,y,z\n1,2,3\n1,2,deep\n", "line 3, z: 'deep' is no number"),
-        ("x,y,z\n1,2,3\n1,2,nan\n", "line 3, z: 'nan' is not finite"),
+        ("", "columns t, x, y, z"),
+        ("x,y\n1,2\n3,4\n", "columns t, x, y, z"),
+        ("x,y,z,x\n1,2,3,4\n", "columns x,"),
+        ("x,y,z\n1,2,3\n", "1 2 32"),
+        ("x,y,z\n" + 33 * "1,2,3\n", "33 2 32"),
+        ("x,y,z\n1,2,3\n1,2\n", "line 3 values"),
+        ("x,y,z\n1,2,3\n1,2,3,4\n", "line 3 values"),
+        ("x,y,z\n1,2,3\n1,2,deep\n", "3, z: 'deep'"),
+        ("x,y,z\n1,2,3\n1,2,nan\n", "3, z: 'nan'"),
     ],
 )
 def test_table_that_is_no_path_is_refused_in_one_line(tmp_path: Path, text: str, reason: str):
-    with pytest.raises(InputError, match=re.escape(reason)) as error:
+    with pytest.raises(InputError) as error:
         parameters(tmp_path / "path.csv", text)
     assert str(error.value).startswith(f"{tmp_path / 'path.csv'}: ")
+    assert mentions(str(error.value), reason)
     assert "\n" not in str(error.value)
 
 
@@ -75,17 +76,18 @@ def test_path_of_a_scenario_lies_beside_it_and_goes_to_its_planner(tmp_path: Pat
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ('[path]\nfiel = "path.csv"\n', "path: unknown entry 'fiel'; did you mean file?"),
-        ('[path]\ncomponent = "planner"\n', "path: name a file"),
-        ('[path]\nfile = "none.csv"\n', "none.csv: no such file"),
+        ('[path]\nfiel = "path.csv"\n', "path: 'fiel' file?"),
+        ('[path]\ncomponent = "planner"\n', "path: file"),
+        ('[path]\nfile = "none.csv"\n', "none.csv"),
         (
             '[path]\nfile = "path.csv"\n[parameters]\nplanner.count = 2\n',
-            "planner.count is given by path.csv already",
+            "planner.count path.csv",
         ),
     ],
 )
 def test_scenario_with_a_wrong_path_is_refused(tmp_path: Path, text: str, reason: str):
     (tmp_path / "path.csv").write_text("x,y,z\n0,0,0\n9,0,0\n")
     (tmp_path / "mine.toml").write_text(text)
-    with pytest.raises(InputError, match=re.escape(reason)):
+    with pytest.raises(InputError) as error:
         read_scenario(str(tmp_path / "mine.toml"))
+    assert mentions(str(error.value), reason)

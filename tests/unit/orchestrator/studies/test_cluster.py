@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+from support.tiers import slow
 from support.toy_engine import Toy, outcome, run
 
 pytest.importorskip("distributed", reason="needs the extra `studies`")
@@ -55,6 +56,7 @@ def test_runs_are_taken_as_they_are_needed():
         assert next(taken) < 20
 
 
+@pytest.mark.slow
 def test_runs_that_take_longer_than_those_before_come_in_smaller_blocks(monkeypatch):
     monkeypatch.setattr(cluster, "_SECONDS", 0.2)
     slow, longest = 0.05, 0.4
@@ -66,6 +68,7 @@ def test_runs_that_take_longer_than_those_before_come_in_smaller_blocks(monkeypa
         assert sum(outcome.number >= 300 for outcome in block) <= longest / slow + 1
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_costs_no_run():
     runs = [run(number) for number in range(200)]
     with making(Toy(0.02), runs, workers=2) as blocks:
@@ -74,6 +77,7 @@ def test_a_worker_that_is_killed_costs_no_run():
         assert numbers_and_squares([first, *blocks]) == expected(runs)
 
 
+@pytest.mark.slow
 def test_a_run_that_ends_every_process_is_the_only_one_that_fails():
     runs = [run(number, {"toy.fatal": number == 17}) for number in range(40)]
     with (
@@ -124,6 +128,7 @@ def worker(address, folder):
     return started("worker", address, *one, "--local-directory", folder)
 
 
+@pytest.mark.slow
 def test_a_scheduler_s_workers_come_and_go_while_a_study_is_under_way(scheduler, tmp_path):
     address, _ = scheduler
     runs = [run(number) for number in range(100)]
@@ -138,6 +143,7 @@ def test_a_scheduler_s_workers_come_and_go_while_a_study_is_under_way(scheduler,
     assert made_by - {lost.pid}
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_goes_is_said(scheduler, tmp_path):
     address, process = scheduler
     with (
@@ -169,6 +175,7 @@ def test_who_cannot_make_runs_is_said_in_a_line(means, text):
         pass
 
 
+@pytest.mark.slow
 def test_no_address_leaves_anything_to_wait_for():
     """Whoever waits is patient here: it is said before anybody is asked, and the process ends."""
     addresses = [
@@ -206,7 +213,7 @@ def test_who_answers_and_says_nothing_is_no_scheduler():
             pass
 
 
-@pytest.mark.parametrize("name", ["x" * 150, "a:b [c] %41"])
+@pytest.mark.parametrize("name", ["a:b [c] %41", *slow("x" * 150)])
 def test_temporary_folders_have_any_name(tmp_path, monkeypatch, name):
     folder = tmp_path / name
     folder.mkdir()

@@ -178,6 +178,7 @@ with store(Path(sys.argv[1]), {RECORD!r}, index_columns()) as unfinished:
 """
 
 
+@pytest.mark.slow
 def test_kill_loses_at_most_the_block_under_way(tmp_path):
     done = 0
     for _ in range(3):

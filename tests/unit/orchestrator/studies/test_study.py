@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.machine.errors import InputError
+from orchestrator.machine.errors import InputError, Refused
 from orchestrator.studies.study import (
-    ENTRIES,
     Range,
     Sample,
     StopTime,
@@ -39,7 +38,9 @@ controller.k_d = [1.0, 2]
 controller.gamma = { from = 0.1, to = 10, spacing = "log" }
 
 [figures.map]
+kind = "bands"
 x = "plant.eta0.z"
+show = "lost"
 """
 
 
@@ -59,7 +60,7 @@ def test_file_says_what_varies(tmp_path):
     }
     ranges = {"controller.k_d": Range(1.0, 2.0), "controller.gamma": Range(0.1, 10.0, "log")}
     assert study.sample == Sample(5, ranges, "sobol", 0)
-    assert study.figures == {"map": {"x": "plant.eta0.z"}}
+    assert study.figures == {"map": {"kind": "bands", "x": "plant.eta0.z", "show": "lost"}}
     assert study.varied == (*study.vary, *ranges)
 
 
@@ -69,22 +70,24 @@ def test_quoted_and_dotted_keys_are_the_same():
     assert quoted == dotted
 
 
-def test_every_entry_has_a_meaning():
-    assert all(entry.meaning for entry in ENTRIES.values())
+BANDS = {"kind": "bands", "x": "plant.eta0.z", "show": "late_error"}
 
 
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ({"vary": {}}, 'names no scenario; write scenario = "fig5"'),
-        ({"scenario": []}, "scenario = [] is of the wrong type, not a name, or list of names"),
+        ({"vary": {}}, 'lacks scenario; write scenario = "fig5"'),
+        ({"scenario": []}, "scenario = []: write a name, or list of names"),
         ({"vari": {}}, "unknown entry 'vari'; did you mean vary"),
-        ({"engine": "gpu"}, "engine = 'gpu' is of the wrong type, not a name out of fmu, batch"),
-        ({"order": "random"}, "order = 'random' is of the wrong type"),
+        ({"engine": "gpu"}, "engine = 'gpu': write fmu or batch"),
+        ({"order": "random"}, "order = 'random': write gauss-seidel or jacobi"),
         ({"vary": {"plant.ell": 1.0}}, "vary: plant.ell: write [values], or { from = 1.0"),
         ({"vary": {"plant.ell": []}}, "vary: plant.ell: write [values]"),
         ({"vary": {"plant.ell": {"from": 1, "to": 2}}}, "vary: plant.ell: lacks n"),
-        ({"vary": {"plant.ell": {"from": 1, "to": 2, "n": 2.0}}}, "n = 2.0 is of the wrong type"),
+        (
+            {"vary": {"plant.ell": {"from": 1, "to": 2, "n": 2.0}}},
+            "n = 2.0: write a whole number from 1 to",
+        ),
         ({"vary": {"plant.ell": {"from": 1, "to": 2, "n": 0}}}, "plant.ell: n = 0"),
         (
             {"vary": {"plant.ell": {"from": 0, "to": 2, "n": 2, "spacing": "log"}}},
@@ -92,10 +95,13 @@ def test_every_entry_has_a_meaning():
         ),
         ({"vary": {"plant.ell": {"from": 1, "to": 2, "n": 10**12}}}, "from 1 to 1,000,000"),
         ({"vary": {"plant.ell": {"from": 1, "to": 10**400, "n": 3}}}, "plant.ell: to = 1000"),
-        ({"vary": {"plant.ell": {"from": float("nan"), "to": 1, "n": 3}}}, "from = nan is of"),
+        (
+            {"vary": {"plant.ell": {"from": float("nan"), "to": 1, "n": 3}}},
+            "from = nan: write a finite number",
+        ),
         ({"sample": {"n": 10, "range": {"plant.ell": [1, float("inf")]}}}, "write [low, high]"),
-        ({"stop_time": float("inf")}, "stop_time = inf is of the wrong type"),
-        ({"stop_time": {"base": 1, "per": {"plant.ell": 10**400}}}, "not a number of seconds"),
+        ({"stop_time": float("inf")}, "stop_time = inf: write a number, or table"),
+        ({"stop_time": {"base": 1, "per": {"plant.ell": 10**400}}}, "write a table of numbers"),
         ({"vary": {"ell": [1.0]}}, "'ell': write component.port"),
         ({"parameters": {"step": 0.01}}, "'step': write component.port"),
         (
@@ -107,7 +113,7 @@ def test_every_entry_has_a_meaning():
         ({"sample": {"n": 3}}, "sample: lacks range"),
         ({"sample": {"n": 0, "range": {"plant.ell": [1, 2]}}}, "sample: n = 0"),
         ({"sample": {"n": 1, "range": {}}}, "sample: draws nothing"),
-        ({"sample": {"n": 1, "seed": -1, "range": {}}}, "seed = -1 is of the wrong type"),
+        ({"sample": {"n": 1, "seed": -1, "range": {}}}, "seed = -1: write a whole number from 0"),
         (
             {"sample": {"n": 1, "range": {"plant.ell": [1, 2, 3]}}},
             "sample: plant.ell: write [low, high]",
@@ -129,15 +135,57 @@ def test_every_entry_has_a_meaning():
             {"stop_time": {"base": 1.0, "per": {"plant.ell": 1.0}}},
             "stop_time: plant.ell does not vary",
         ),
-        ({"stop_time": {"base": 1.0, "per": {"plant.ell": "x"}}}, "plant.ell = 'x': not a number"),
+        (
+            {"stop_time": {"base": 1.0, "per": {"plant.ell": "x"}}},
+            "stop_time: per = {'plant.ell': 'x'}: write a table of",
+        ),
+        ({"figures": {"f": 3}}, "figures: f = 3: write a table"),
+        (
+            {"figures": {"f": {"x": "a.b"}}},
+            'figures: f: lacks kind; write kind = "bands" or "maps"',
+        ),
+        (
+            {"figures": {"f": {**BANDS, "kind": "band"}}},
+            "kind = 'band': write bands, maps, front or",
+        ),
+        ({"figures": {"f": {"kind": "maps", "x": "a.b"}}}, "figures: f: lacks y and show"),
+        ({"figures": {"f": {**BANDS, "show": []}}}, "figures: f: lacks show"),
+        ({"figures": {"f": {**BANDS, "y": "lost"}}}, "a figure of kind 'bands' has no y"),
+        ({"figures": {"f": {**BANDS, "colour": "red"}}}, "figures: f: unknown entry 'colour'"),
+        ({"figures": {"f": {**BANDS, "limits": {"lost": "one"}}}}, "write a table of numbers"),
+        (
+            {"figures": {"f": {"kind": "front", "x": ["lost"], "y": "late_error"}}},
+            "x is a list; a figure of kind 'front' has one x",
+        ),
+        ({"figures": {"labels": "late"}}, "figures: labels = 'late': write a table of texts"),
+        ({"figures": {"labels": {"lost": 1}}}, "figures: labels = {'lost': 1}: write a table"),
     ],
 )
 def test_mistakes_are_named_with_their_place(content, words):
-    scenario = {} if words.startswith("names no") else {"scenario": "fig4"}
+    scenario = {} if words.startswith("lacks scenario") else {"scenario": "fig4"}
     with pytest.raises(InputError) as error:
         study_of("mine", scenario | content)
     assert str(error.value).startswith("mine: ")
     assert words in str(error.value)
+
+
+def test_all_mistakes_are_found_at_once():
+    content = {"titel": "", "stop_time": {"bas": 1.0}, "sample": {"n": 0}, "figures": {"f": {}}}
+    with pytest.raises(Refused) as refused:
+        study_of("mine", content)
+    assert {text.partition("; ")[0] for text in refused.value.problems} == {
+        "mine: unknown entry 'titel'",
+        "mine: lacks scenario",
+        "mine: stop_time: unknown entry 'bas'",
+        "mine: stop_time: lacks base and per",
+        "mine: sample: n = 0: write a whole number from 1 to 1,000,000,000",
+        "mine: sample: lacks range",
+        "mine: figures: f: lacks kind",
+    }
+    vary = {"plant.ell": 1.0, "plant.m11": [], "plant.d11": {"from": 1.0}}
+    with pytest.raises(Refused) as refused:
+        study_of("mine", {"scenario": "fig4", "vary": vary})
+    assert [text.split(": ")[2] for text in refused.value.problems] == [*vary]
 
 
 def test_unknown_name_and_missing_file_are_one_line():

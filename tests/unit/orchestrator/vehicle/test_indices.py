@@ -14,6 +14,7 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.preparation import loaded
 from orchestrator.studies.fmu_engine import FmuEngine
@@ -118,7 +119,7 @@ def test_what_is_never_reached_is_not_there():
 def test_closed_loop_has_all_of_them():
     _, system = loaded("fig4", "native")
     experiment, observer = Experiment(4.0, 0.02), Indices()
-    simulate(system, experiment, [observer], loop=chosen("auto", experiment))
+    simulate(planned(system, experiment), [observer], loop=chosen("auto", experiment))
     found = observer.values().keys()
     assert set(index_columns()) - {"time_to_reach"} <= found <= set(index_columns())
 

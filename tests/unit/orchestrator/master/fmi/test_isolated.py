@@ -25,6 +25,7 @@ from orchestrator.master.fmi.loaded import loaded
 from orchestrator.master.fmi.log import Log, MessageQueue
 from orchestrator.master.fmi.worker import _Served
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.system.component import Component
 from orchestrator.system.structure import System
@@ -109,7 +110,7 @@ def run(system: System, n: int, length: float, outputs: list[float], note: bytes
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(placement, "isolated", isolated)
-        simulate(system, Experiment(0.1 * STEPS, 0.1), [table], Isolation())
+        simulate(planned(system, Experiment(0.1 * STEPS, 0.1)), [table], Isolation())
     return table
 
 

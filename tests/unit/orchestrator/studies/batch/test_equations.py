@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("numba", reason="needs numba: the extra `studies`")
 
 from orchestrator.studies.batch.equations import Equations
-from orchestrator.studies.batch.flat import flat
+from orchestrator.studies.batch.numbers import flat
 
 TEXT = '''
 """An equation that refuses."""

@@ -1,0 +1,136 @@
+"""Build the FMU of every component folder: `python -m fmus.build --out DIR`.
+
+Runs in a process of its own, because PythonFMU imports what it builds. Writes a file only if
+the sources have changed since it was written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+from fmus.compilers import compiler_for
+from fmus.discovery import components, fingerprint
+from fmus.kinds import FMI_VERSIONS, KINDS, PYTHON, platforms
+from fmus.native.packaging import NativeKind
+from fmus.python.packaging import LOADERS, PythonKind, best_loader
+
+#: What a folder of built FMUs was built from, and what was built.
+MANIFEST = "build.json"
+
+
+class Kind(Protocol):
+    """How FMUs of one kind are built."""
+
+    @property
+    def name(self) -> str:
+        """One of :data:`fmus.kinds.KINDS`."""
+
+    @property
+    def settings(self) -> Mapping[str, str]:
+        """What they depend on besides their sources."""
+
+    def write(self, component: str, package: str, path: Path) -> None:
+        """Write the FMU of a component, whose folder is a package.
+
+        Raises:
+            OSError: it cannot be built or written.
+
+        """
+
+
+def build(destination: Path, kind: Kind) -> list[Path]:
+    """Bring a folder of FMUs up to date.
+
+    Returns:
+        The files that had to be written.
+
+    Raises:
+        OSError: the folder cannot be written, or the FMUs cannot be built.
+
+    """
+    destination.mkdir(parents=True, exist_ok=True)
+    manifest = destination / MANIFEST
+    made_from = {"fingerprint": fingerprint(kind.name), "settings": dict(kind.settings)}
+    before = built_before(manifest)
+    current = {key: before.get(key) for key in made_from} == made_from
+    digests = before["sha256"] if current else {}
+    written = []
+    for component, package in components().items():
+        path = destination / f"{component}.fmu"
+        if not path.is_file() or digests.get(path.name) != _digest(path):
+            kind.write(component, package, path)
+            digests[path.name] = _digest(path)
+            written.append(path)
+    if written:
+        text = json.dumps({**made_from, "sha256": digests})
+        manifest.write_text(text + "\n", encoding="utf-8")
+    return written
+
+
+def built_before(manifest: Path) -> dict[str, Any]:
+    """What a manifest says; empty if there is none, or it is none of ours."""
+    try:
+        content = json.loads(manifest.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    parts = ("settings", "sha256")
+    ours = isinstance(content, dict) and all(isinstance(content.get(p), dict) for p in parts)
+    return content if ours else {}
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def chosen_loader(destination: Path, wanted: str | None) -> str:
+    """The loader that is wanted; None: what is there, else native where it can be compiled."""
+    before = built_before(destination / MANIFEST)
+    there = before.get("fingerprint") == fingerprint(PYTHON)
+    kept = before["settings"].get("loader") if there else None
+    return wanted or kept or best_loader()
+
+
+def main() -> int:
+    """Command line of the module."""
+    parser = argparse.ArgumentParser(prog="python -m fmus.build", description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("fmus", "dist"), help="folder to write")
+    parser.add_argument("--kind", choices=KINDS, default=KINDS[0])
+    parser.add_argument("--loader", choices=LOADERS, help="default: native if it can")
+    parser.add_argument("--fmi", choices=FMI_VERSIONS, default=FMI_VERSIONS[0])
+    parser.add_argument("--platforms", metavar="NAME,...|all", help="default: this machine")
+    options = parser.parse_args()
+    try:
+        for path in build(options.out, _kind(options)):
+            print(path)
+    except (OSError, ValueError) as error:
+        print(f"cannot build the FMUs: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _kind(options: argparse.Namespace) -> Kind:
+    """The kind that the options ask for.
+
+    Raises:
+        ValueError: they do not go together.
+        OSError: there is no compiler for them.
+
+    """
+    if options.kind == PYTHON:
+        if options.platforms is not None or options.fmi != FMI_VERSIONS[0]:
+            raise ValueError("--platforms and --fmi 3 need --kind native")
+        return PythonKind(chosen_loader(options.out, options.loader))
+    if options.loader is not None:
+        raise ValueError("--loader is for --kind python: the other kind loads no Python")
+    wanted = platforms(options.fmi, options.platforms)
+    return NativeKind(options.fmi, wanted, compiler_for(wanted))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

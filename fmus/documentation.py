@@ -1,0 +1,143 @@
+"""Pages of the components, from their `page.md` and their declared ports.
+
+The build puts them as HTML into each FMU; `tools/pages.py` writes them into docs/components.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from string import Template
+
+from markdown_it import MarkdownIt
+
+from fmus.discovery import components, package_folder, ports_of
+from fmus.kinds import NATIVE, PYTHON
+from fmus.ports.description_fmi3 import TYPES
+from fmus.ports.port import FAULT, Port
+
+#: The picture of every component.
+ICON = Path(__file__).with_name("icon.png")
+
+_HTML = Path(__file__).with_name("page.html")
+
+_REFUSALS = """\
+## What is refused
+
+A value that is not finite, out of its range or no choice, an output, another value for a fixed
+parameter during the run: the call is answered with fmi2Discard, nothing of it is taken, and `fault`
+rises. So is a step whose size is negative or not finite, or whose result would not be finite:
+everything is as it was before, noise included. The run goes on with the next good call; `fault`
+stays true until fmi2Reset, or until a state is restored that had none.
+
+A parameter that cannot be taken before the run, a call in the wrong mode, a value reference that is
+not there or of another type, a state that no run can have led to: the call is answered with
+fmi2Error, and so is every call after it but a get, until fmi2Reset or a good state. The parameter
+raises `fault` as well. A get that is refused has no consequence, and fmi2GetReal gives the numbers
+of Integers and Booleans, too.
+
+The reason is logged, even with logging off. The whole table of calls, states and bad arguments is
+`docs/status.md` of the project."""
+
+#: The place in a list of things that have members.
+_PLACE = re.compile(r"\[\d+\]\.")
+
+_NATIVE = """\
+## What it is made of
+
+This FMU holds libraries and needs nothing but the C library of its platform, no Python. They were
+compiled from the C sources in its folder `sources`, which any importer can compile for another
+platform: one file that includes all others. The equations in them were translated from the Python
+text that the FMU's twin runs, so both give the same numbers."""
+
+_EXAMPLE = """\
+## Example
+
+Alone, with the inputs at zero, for 10 s:
+
+    fmpy simulate {name}.fmu --stop-time 10 --output-interval 0.02 --output-file result.csv
+
+In Python:
+
+    import fmpy
+    result = fmpy.simulate_fmu("{name}.fmu", stop_time=10.0, output_interval=0.02)
+
+A step longer than `h_max`, where there is such a parameter, is split evenly with held inputs."""
+
+
+def page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
+    """The page of a component in Markdown: what it is, its ports, what it refuses, an example."""
+    text = (package_folder(components()[name]) / "page.md").read_text(encoding="utf-8").strip()
+    ports = (*ports_of(name), FAULT)
+    refusals = _REFUSALS
+    if fmi == "3":
+        refusals = refusals.replace("fmi2GetReal", "fmi3GetFloat64").replace("fmi2", "fmi3")
+    made_of = (_NATIVE,) if kind == NATIVE else ()
+    tables = _tables(ports, TYPES if fmi == "3" else {})
+    parts = (text, *made_of, *tables, refusals, _EXAMPLE.format(name=name))
+    return "\n\n".join(parts) + "\n"
+
+
+def _tables(ports: Sequence[Port], types: Mapping[str, str]) -> Iterator[str]:
+    """The tables of inputs, outputs and parameters, with other names for their types."""
+    for causality, heading in (
+        ("input", "Inputs"),
+        ("output", "Outputs"),
+        ("parameter", "Parameters"),
+    ):
+        found = [port for port in ports if port.causality == causality]
+        if not found:
+            continue
+        columns = ["name", "type", "unit", "description"]
+        if causality == "parameter":
+            columns[3:3] = ["start", "range", "variability"]
+        elif causality == "output":
+            columns.append("direct feedthrough from")
+        lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
+        lines += ["| " + " | ".join(_row(ports, types)) + " |" for ports in _alike(found)]
+        yield f"## {heading}\n\n" + "\n".join(lines)
+
+
+def _alike(ports: Sequence[Port]) -> Iterable[list[Port]]:
+    """Ports one by one, but those of a list together, as `waypoint[1].x` to `waypoint[9].x`."""
+    rows: dict[str, list[Port]] = {}
+    for port in ports:
+        rows.setdefault(_PLACE.sub("[].", port.name), []).append(port)
+    return rows.values()
+
+
+def _row(ports: Sequence[Port], types: Mapping[str, str]) -> list[str]:
+    port, last = ports[0], ports[-1]
+    kind = types.get(port.kind, port.kind)
+    name = f"`{port.name}`" if port is last else f"`{port.name}` to `{last.name}`"
+    cells = [name, kind, port.unit or "", port.description]
+    if port.causality == "parameter":
+        starts = [_literal(one.start) for one in ports]
+        while len(starts) > 1 and starts[-1] == starts[-2]:
+            starts.pop()
+        cells[3:3] = [", ".join(starts), _range(port), port.variability]
+    elif port.causality == "output":
+        groups = dict.fromkeys(name.split(".")[0] for name in port.feedthrough)
+        cells.append(", ".join(f"`{group}`" for group in groups))
+    return cells
+
+
+def _literal(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value).lower()
+
+
+def _range(port: Port) -> str:
+    if port.choices:
+        return ", ".join(port.choices)
+    lower = "" if port.minimum is None else f"≥ {port.minimum:g}"
+    upper = "" if port.maximum is None else f"≤ {port.maximum:g}"
+    return " ".join(filter(None, (lower, upper)))
+
+
+def html(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
+    """The page of a component as one HTML file."""
+    body = MarkdownIt("commonmark").enable("table").render(page(name, kind, fmi))
+    body = body.replace("<table>", '<div class="table"><table>')
+    body = body.replace("</table>", "</table></div>")
+    return Template(_HTML.read_text(encoding="utf-8")).substitute(title=name, body=body)

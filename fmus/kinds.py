@@ -1,0 +1,104 @@
+"""What FMUs come as: kinds, versions of FMI, and platforms that have libraries.
+
+This is all that `orchestrator` knows of how they are built, so nothing here imports PythonFMU.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+#: Python sources that PythonFMU runs, or libraries translated from them. The first is the default.
+KINDS = PYTHON, NATIVE = "python", "native"
+
+#: Packages besides ours whose code is in the FMUs of each kind.
+CONTAINED: Mapping[str, Sequence[str]] = {PYTHON: ("pythonfmu",), NATIVE: ()}
+
+#: How FMI 3.0 and the zig compiler call a machine. From that version of glibc on, all have it.
+TARGETS = {
+    "x86_64-linux": "x86_64-linux-gnu.2.17",
+    "aarch64-linux": "aarch64-linux-gnu.2.17",
+    "x86_64-windows": "x86_64-windows-gnu",
+    "x86_64-darwin": "x86_64-macos",
+    "aarch64-darwin": "aarch64-macos",
+}
+
+#: Endings of libraries, by the last part of a machine's name.
+_ENDINGS = {"linux": ".so", "windows": ".dll", "darwin": ".dylib"}
+
+#: The machines that a platform stands for: several share one universal library.
+_MACHINES: Mapping[str, Mapping[str, Sequence[str]]] = {
+    "2": {
+        "linux64": ("x86_64-linux",),
+        "win64": ("x86_64-windows",),
+        "darwin64": ("x86_64-darwin", "aarch64-darwin"),
+    },
+    "3": {machine: (machine,) for machine in TARGETS},
+}
+
+#: The versions of FMI. The Python kind has the first.
+FMI_VERSIONS = tuple(_MACHINES)
+
+#: Other names of processors.
+_PROCESSORS = {"amd64": "x86_64", "arm64": "aarch64"}
+
+
+class Platform(NamedTuple):
+    """Where a library runs.
+
+    Attributes:
+        name: of its folder in `binaries`.
+        machines: keys of :data:`TARGETS`.
+        ending: of its file.
+
+    """
+
+    name: str
+    machines: Sequence[str]
+    ending: str
+
+
+def platforms(fmi: str, names: str | None = None) -> list[Platform]:
+    """The platforms that are asked for, each once, in the order of the standard.
+
+    Args:
+        fmi: version, one of :data:`FMI_VERSIONS`.
+        names: with commas between them, or `all`; None: this machine.
+
+    Raises:
+        ValueError: FMI has no such platform.
+
+    """
+    known = {
+        name: Platform(name, machines, _ENDINGS[machines[0].partition("-")[2]])
+        for name, machines in _MACHINES[fmi].items()
+    }
+    if names is None:
+        machine = this_machine()
+        own = [platform for platform in known.values() if machine in platform.machines]
+        if not own:
+            raise ValueError(
+                f"FMI {fmi}.0 has no name for this machine, {machine}{_other(machine)}"
+            )
+        return own
+    if names == "all":
+        return list(known.values())
+    wanted = {name.strip() for name in names.split(",")}
+    for name in sorted(wanted - known.keys()):
+        raise ValueError(
+            f"FMI {fmi}.0 has no platform {name!r}; there are {', '.join(known)}, or all"
+            f"{_other(name)}"
+        )
+    return [platform for name, platform in known.items() if name in wanted]
+
+
+def _other(name: str) -> str:
+    """A hint, if another version of FMI has a name."""
+    return "".join(f"; try --fmi {fmi}" for fmi, known in _MACHINES.items() if name in known)
+
+
+def this_machine() -> str:
+    """What FMI 3.0 calls the machine that runs this; one it does not know is called alike."""
+    processor = platform.machine().lower()
+    return f"{_PROCESSORS.get(processor, processor)}-{platform.system().lower()}"

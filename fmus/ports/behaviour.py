@@ -1,0 +1,219 @@
+"""What a component's `behaviour.py` may say: the hooks that both kinds of FMU call.
+
+Each public function of a behaviour is one of the :class:`Hooks`. It takes those of the hook's
+arguments that it needs, under their names and in any order; functions that only the behaviour
+itself calls begin with an underscore. All of it is in the language of equations (docs/language.md),
+because the C kind runs its translation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from inspect import signature
+from types import FunctionType, ModuleType
+from typing import Any, NamedTuple, Protocol, get_args, get_type_hints
+
+from fmus.ports.groups import Nothing
+
+
+class Hooks(Protocol):
+    """The hooks. A behaviour has `Outputs`, `begin` and `advance`; all others are optional.
+
+    Args:
+        parameters: what `PARAMETERS` in ports.py makes of the values of the parameters.
+        inputs: NamedTuple with one tuple of numbers for each group of input ports, in their order.
+        state: NamedTuple of all that a step depends on besides inputs and parameters;
+            :class:`~fmus.ports.groups.Nothing` for a component without memory.
+        derived: what `derive` makes of the state.
+        outputs: a dictionary of the type `Outputs`.
+        t: time at the beginning of the step, or of the run [s].
+        h: length of an internal step [s], at most `h_max`.
+        n: how many internal steps a communication step has.
+
+    """
+
+    #: TypedDict with one tuple of numbers for each group of output ports, in their order.
+    Outputs: type
+
+    #: What is logged, once an instance, when `restarted` is called; `{t:g}` is the time.
+    RESTARTED: str
+
+    @staticmethod
+    def check(parameters: Any) -> None:
+        """Refuse parameters, each of which is in its range, that do not fit together.
+
+        Called before `begin`, for each new value of a tunable parameter, and for a state that is
+        restored.
+
+        Raises:
+            Refusal: they do not fit; the text says why.
+
+        """
+
+    @staticmethod
+    def begin(parameters: Any, inputs: Any, t: float) -> tuple[Any, ...]:
+        """Return state and outputs at the start time.
+
+        Called at the end of the initialisation, and during it each time that outputs are read after
+        a value was set.
+
+        Returns:
+            `(state, outputs)`; with a hook `derive`, `(state, derived, outputs)`.
+
+        """
+
+    @staticmethod
+    def derive(parameters: Any, state: Any) -> Any:
+        """Return what a step needs of the state, where outputs at the end of the last needed it.
+
+        It spares computing that twice. Called only for a state that no `begin` or `advance` gave:
+        one that was restored or restarted.
+        """
+
+    @staticmethod
+    def credible(parameters: Any, state: Any, inputs: Any) -> bool:
+        """Return whether a step may go on from the state.
+
+        Called before each `advance`.
+        """
+
+    @staticmethod
+    def restarted(parameters: Any, state: Any, inputs: Any) -> Any:
+        """Return the state that the step begins with instead.
+
+        Called where `credible` says no, after `RESTARTED` was logged.
+        """
+
+    @staticmethod
+    def advance(
+        parameters: Any, state: Any, derived: Any, inputs: Any, t: float, h: float, n: int
+    ) -> tuple[Any, ...]:
+        """Return state and outputs after n internal steps with held inputs.
+
+        Called once a communication step. What is not finite is refused, and with it the step.
+
+        Returns:
+            What `begin` returns.
+
+        """
+
+    @staticmethod
+    def seed(parameters: Any) -> int:
+        """Return the seed of the noise of `measured`.
+
+        Called before `begin`.
+        """
+
+    @staticmethod
+    def measured(parameters: Any, n: Any) -> Any:
+        """Return one group of outputs with noise.
+
+        Called after each `begin` and `advance`. A further argument has the name of the group, and
+        gets it without noise.
+
+        Args:
+            parameters: as above.
+            n: as many independent standard normal numbers as the type of this argument has.
+
+        """
+
+    @staticmethod
+    def expected(parameters: Any, state: Any, outputs: Any) -> Any:
+        """Return the outputs that belong to a state that is restored.
+
+        They are held against the outputs that are restored with it, which are given to tell what
+        else some outputs depend on, such as noise. Without this hook, outputs do not follow from
+        the state alone: a controller's are those of the beginning of its last step.
+
+        Raises:
+            Refusal: no run can have led to the state.
+
+        """
+
+
+#: Arguments of each hook, by its name.
+HOOKS: Mapping[str, tuple[str, ...]] = {
+    name: tuple(signature(hook.__func__).parameters)
+    for name, hook in vars(Hooks).items()
+    if isinstance(hook, staticmethod)
+}
+
+#: What goes together.
+_TOGETHER = (("credible", "restarted", "RESTARTED"), ("seed", "measured"))
+
+
+class Behaviour(NamedTuple):
+    """What a behaviour says.
+
+    Attributes:
+        hooks: all by name; None for one that it does not have.
+        state, derived, inputs, outputs, parameters: types that they take and return; derived is
+            None without `derive`.
+        noisy: the group of outputs that `measured` gives; empty: there is none.
+        draws: how many numbers it takes.
+        restarted: the text `RESTARTED`.
+
+    """
+
+    hooks: Mapping[str, FunctionType | None]
+    state: Any
+    derived: Any
+    inputs: Any
+    outputs: Any
+    parameters: Any
+    noisy: str
+    draws: int
+    restarted: str
+
+    def arguments(self, name: str) -> tuple[str, ...]:
+        """The arguments of a hook that it has, in its own order."""
+        hook = self.hooks[name]
+        assert hook is not None
+        return tuple(signature(hook).parameters)
+
+
+def read_behaviour(module: ModuleType) -> Behaviour:
+    """What the behaviour of a component says.
+
+    Args:
+        module: `behaviour` in the folder of the component.
+
+    Raises:
+        TypeError: it is no behaviour.
+
+    """
+    where, said = module.__name__, vars(module)
+    hooks = {name: said[name] for name in HOOKS if isinstance(said.get(name), FunctionType)}
+    for name in ("begin", "advance", "Outputs"):
+        if name not in said:
+            raise TypeError(f"{where} has no {name}")
+    for together in _TOGETHER:
+        there = [name for name in together if name in said]
+        missing = [name for name in together if name not in said]
+        if there and missing:
+            raise TypeError(f"{where} has {there[0]}, but no {missing[0]}")
+    for name, value in said.items():
+        own = isinstance(value, FunctionType) and value.__module__ == where
+        if own and name not in HOOKS and not name.startswith("_"):
+            raise TypeError(f"{where}.{name} is none of the hooks {', '.join(HOOKS)}")
+    hints = {name: get_type_hints(hook) for name, hook in hooks.items()}
+    types = {**hints["begin"], **hints["advance"]}
+    groups = get_type_hints(said["Outputs"])
+    noisy = [name for name in hints.get("measured", ()) if name in groups]
+    for name, found in hints.items():
+        known = (*HOOKS[name], *noisy, "return")
+        for argument in found.keys() - set(known):
+            raise TypeError(f"{where}.{name} takes {argument}, which is none of {', '.join(known)}")
+    if "measured" in hooks and len(noisy) != 1:
+        raise TypeError(f"{where}.measured takes {len(noisy)} groups of outputs, not one")
+    return Behaviour(
+        {name: hooks.get(name) for name in HOOKS},
+        types["state"],
+        hints["derive"]["return"] if "derive" in hooks else None,
+        types.get("inputs", Nothing),
+        said["Outputs"],
+        types["parameters"],
+        "".join(noisy),
+        len(get_args(hints["measured"]["n"])) if "measured" in hooks else 0,
+        said.get("RESTARTED", ""),
+    )

@@ -1,0 +1,200 @@
+"""What PythonFMU calls to pass values, and how a refusal is told: values, modes and messages.
+
+No exception leaves a callback: PythonFMU would report fmi2Fatal and release its objects twice. Nor
+can PythonFMU be told that a call was refused; it answers fmi2OK. The native loader is told by a log
+entry of its own category, and answers fmi2Discard or fmi2Error to that very call. Without a loader
+every step after a refusal is discarded, until a reset or a state that is restored.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from math import isfinite
+from typing import Any, ClassVar
+
+from pythonfmu import Fmi2Slave
+from pythonfmu.enums import Fmi2Status
+
+from fmus.ports.port import Port, Refusal, Value
+from fmus.python.loading import ANSWER, has_loader
+from fmus.python.scripts import place
+from fmus.python.store import MISSING, Store
+
+INSTANTIATED, INITIALISING, STEPPING, TERMINATED = MODES = (
+    "instantiated",
+    "initialising",
+    "stepping",
+    "terminated",
+)
+
+#: Different messages that an instance logs: a host may step on after a refusal for ever.
+MOST_MESSAGES = 100
+
+#: Characters of a message: some hosts have a buffer of 1 or 2 kB for them.
+LONGEST_MESSAGE = 500
+
+
+class Callbacks(Fmi2Slave):  # type: ignore[misc]
+    """A slave whose values lie in a :class:`~fmus.python.store.Store`."""
+
+    #: Ports without `fault`, inputs first, then outputs, then parameters.
+    ports: ClassVar[tuple[Port, ...]]
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self._store = Store(self.ports)
+        self._mode = INSTANTIATED
+        #: Whether a value has changed that state and outputs at the start time depend on.
+        self._stale = False
+        self._said: set[str] = set()
+        self._has_loader = has_loader(self.resources)
+        #: What no answer has told, where there is no loader.
+        self._untold = ""
+
+    @abstractmethod
+    def _refresh(self) -> str:
+        """Compute state and outputs at the start time, if a value they depend on has changed.
+
+        Returns:
+            Why there are none; empty: there are.
+
+        """
+
+    @abstractmethod
+    def _retune(self, parameters: dict[str, Value]) -> None:
+        """Let parameters act from the next step; raise what speaks against them."""
+
+    # Refusals and messages
+
+    def _fail(self, why: str) -> None:
+        """Answer fmi2Error: the call is not possible now, or not at all."""
+        self._refuse(Fmi2Status.error, why)
+
+    def _refuse(self, status: Fmi2Status, why: str) -> None:
+        self._answer(status, why)
+        if not self._has_loader:
+            self._untold = self._untold or why
+
+    def _answer(self, status: Fmi2Status, why: str, key: str | None = None) -> None:
+        self.say(why, status, key)
+        if self._has_loader:
+            self.log("", status, ANSWER)
+
+    def say(self, message: str, status: Fmi2Status, key: str | None = None) -> None:
+        """Log a message, the first time only that its key, or else its text, comes up.
+
+        The host adds the name of the instance.
+        """
+        said = (key or message)[:LONGEST_MESSAGE]
+        if said in self._said or len(self._said) >= MOST_MESSAGES:
+            return
+        self._said.add(said)
+        if len(self._said) == MOST_MESSAGES:
+            message += "; what comes after this is not logged"
+        # FMI defines a log message as a format: a host would take a % for a directive.
+        self.log(message[:LONGEST_MESSAGE].replace("%", "%%"), status)
+
+    def _follows(self, call: str, mode: str) -> bool:
+        """Whether a call comes in the one mode that it is allowed in; else it fails."""
+        if self._mode != mode:
+            self._fail(f"{call} is not allowed when {self._mode}")
+        return self._mode == mode
+
+    # Values
+
+    def get_real(self, vrs: list[int]) -> list[float]:
+        store = self._store
+        if self._stale:
+            self._refresh_outputs(vrs)
+        # PythonFMU reads the list and lets go of it, so it need not be a copy.
+        return store.outputs if vrs == store.output_references else self._get(vrs, "Real")
+
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        return self._get(vrs, "Integer")
+
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        store = self._store
+        return [store.fault] if vrs == store.fault_references else self._get(vrs, "Boolean")
+
+    def get_string(self, vrs: list[int]) -> list[str]:
+        return self._get(vrs, "String")
+
+    def set_real(self, vrs: list[int], values: list[float]) -> None:
+        store = self._store
+        # A sum is finite only if every value is; _set finds out which one was not.
+        if vrs == store.input_references and self._mode == STEPPING and isfinite(sum(values)):
+            store.inputs = values
+        else:
+            self._set(vrs, values, "Real")
+
+    def set_integer(self, vrs: list[int], values: list[int]) -> None:
+        self._set(vrs, values, "Integer")
+
+    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
+        self._set(vrs, values, "Boolean")
+
+    def set_string(self, vrs: list[int], values: list[str]) -> None:
+        self._set(vrs, values, "String")
+
+    def _refresh_outputs(self, vrs: list[int]) -> None:
+        if not set(self._store.output_references).isdisjoint(vrs):
+            why = self._refresh()
+            if why:
+                self._answer(Fmi2Status.error, why)
+
+    def _get(self, vrs: list[int], kind: str) -> list[Any]:
+        values: list[Value] = []
+        for reference in vrs:
+            try:
+                values.append(self._store.get(reference, kind))
+            except Refusal as refusal:
+                self._answer(Fmi2Status.error, str(refusal))
+                values.append(MISSING[kind])
+        return values
+
+    def _set(self, vrs: list[int], values: Sequence[Value], kind: str) -> None:
+        """Take all values of a call, or none."""
+        if self._mode == TERMINATED:
+            self._follows(f"fmi2Set{kind}", STEPPING)
+            return
+        try:
+            ports = [self._store.port(reference, kind) for reference in vrs]
+        except Refusal as refusal:
+            self._fail(str(refusal))
+            return
+        try:
+            self._take(ports, vrs, values)
+        except BaseException as error:
+            # A run with another parameter than the host asked for must not begin.
+            begins = self._mode != STEPPING and any(p.causality == "parameter" for p in ports)
+            self._store.fault = True
+            self._refuse(Fmi2Status.error if begins else Fmi2Status.discard, explained(error))
+        else:
+            self._stale = self._stale or self._mode == INITIALISING
+
+    def _take(self, ports: list[Port], vrs: list[int], values: Sequence[Value]) -> None:
+        store = self._store
+        inputs, parameters = list(store.inputs), store.parameters
+        for port, reference, value in zip(ports, vrs, values):
+            if port.causality == "output":
+                raise Refusal(f"{port.name} is an output and cannot be set")
+            if port.variability == "fixed" and self._mode == STEPPING:
+                if value != parameters[port.name]:
+                    raise Refusal(f"{port.name} is fixed and cannot change after initialisation")
+                continue
+            port.checked(value)
+            if port.causality == "input":
+                inputs[store.input_references.index(reference)] = float(value)
+            else:
+                parameters = {**parameters, port.name: value}
+        if parameters is not store.parameters and self._mode == STEPPING:
+            self._retune(parameters)
+        store.inputs, store.parameters = inputs, parameters
+
+
+def explained(error: BaseException) -> str:
+    """What speaks against something; what is no refusal of ours is named as what it is."""
+    if isinstance(error, Refusal):
+        return str(error)
+    return f"{place(error)}{type(error).__name__}: {error}"

@@ -1,0 +1,144 @@
+"""The slave of a component, made from its ports and its behaviour.
+
+Its methods are written out and compiled, because they run once a step: `advance` of a component
+that derives something of its state and may restart becomes
+
+    def advance(self, state, inputs, t, h, n):
+        if not credible(self.parameters, state, inputs):
+            self.say(RESTARTED.format(t=t), warning, RESTARTED)
+            state = restarted(self.parameters, state, inputs)
+        derived = self._derived if state is self._latest else derive(self.parameters, state)
+        self._latest, self._derived, outputs = advance(self.parameters, state, derived, inputs, h)
+        return self._latest, outputs
+
+and that of a simpler one is shorter by what it lacks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from math import isfinite
+from random import Random
+from types import ModuleType, new_class
+from typing import Any
+
+from pythonfmu.enums import Fmi2Status
+
+from fmus.ports.behaviour import HOOKS, Behaviour, read_behaviour
+from fmus.ports.groups import slices
+from fmus.ports.port import Refusal
+from fmus.python.component import Component, Inputs, Outputs, Parameters, State
+
+
+class Noisy(Component[State, Inputs, Outputs, Parameters]):
+    """A component one of whose outputs has noise, which Python's generator makes."""
+
+    _random: Random
+
+    def hidden_state(self) -> Any:
+        return self._random.getstate() if self._state is not None else None
+
+    def restore_hidden_state(self, hidden: Any) -> None:
+        generator = Random()
+        generator.setstate(hidden)
+        # Some of what setstate takes it changes in silence, or only gauss finds out about.
+        *_, following = hidden
+        if generator.getstate() != hidden or type(following) not in (float, type(None)):
+            raise Refusal("its noise generator is in no state that it can be in")
+        if not isfinite(following or 0.0):
+            raise Refusal("its noise is not finite")
+        self._random = generator
+
+
+@cache
+def slave_of(
+    name: str, ports: ModuleType, behaviour: ModuleType
+) -> type[Component[Any, Any, Any, Any]]:
+    """The class of a component, the same each time: an FMU's script asks once an instance.
+
+    Args:
+        name: of the component.
+        ports, behaviour: the modules in its folder.
+
+    Raises:
+        TypeError: they do not go together.
+
+    """
+    said = read_behaviour(behaviour)
+    places = slices([port for port in ports.PORTS if port.causality == "output"])
+    members: dict[str, Any] = {
+        "__module__": ports.__package__,
+        "__doc__": ports.DESCRIPTION,
+        "description": ports.DESCRIPTION,
+        "ports": ports.PORTS,
+        "parameter_set": ports.PARAMETERS,
+        "group_of": getattr(ports, "GROUP_OF", {}),
+        "_latest": None,
+    }
+    scope = {
+        **said.hooks,
+        "Random": Random,
+        "RESTARTED": said.restarted,
+        "warning": Fmi2Status.warning,
+    }
+    for method in (*_steps(said), *_checks(said), *_noise(said, places.get(said.noisy))):
+        exec(method, scope, members)
+    base: Any = Noisy if said.noisy else Component
+    types = (said.state, said.inputs, said.outputs, said.parameters)
+    made: type[Component[Any, Any, Any, Any]]
+    made = new_class(name, (base[types],), {}, lambda namespace: namespace.update(members))
+    return made
+
+
+def _call(said: Behaviour, hook: str, **given: str) -> str:
+    """A call of a hook in a method that has its arguments, and the parameters."""
+    given = {"parameters": "self.parameters", **given}
+    return f"{hook}({', '.join(given.get(name, name) for name in said.arguments(hook))})"
+
+
+def _steps(said: Behaviour) -> Iterator[str]:
+    """How a run begins and goes on."""
+    begin, advance = ["def begin(self, inputs, t):"], ["def advance(self, state, inputs, t, h, n):"]
+    if said.noisy:
+        # Random takes the magnitude of its seed: a negative one is the number 2^32 above it.
+        begin += [f"    self._random = Random({_call(said, 'seed')} % 2**32)"]
+    if said.hooks["credible"]:
+        advance += [
+            f"    if not {_call(said, 'credible')}:",
+            "        self.say(RESTARTED.format(t=t), warning, RESTARTED)",
+            f"        state = {_call(said, 'restarted')}",
+        ]
+    if said.hooks["derive"]:
+        derive = _call(said, "derive")
+        advance += [f"    derived = self._derived if state is self._latest else {derive}"]
+    for lines, hook in ((begin, "begin"), (advance, "advance")):
+        if said.hooks["derive"]:
+            lines += [
+                f"    self._latest, self._derived, outputs = {_call(said, hook)}",
+                "    return self._latest, outputs",
+            ]
+        else:
+            lines += [f"    return {_call(said, hook)}"]
+        yield "\n".join(lines)
+
+
+def _checks(said: Behaviour) -> Iterator[str]:
+    """What is asked of parameters, and of a state that is restored."""
+    for hook in ("check", "expected"):
+        if said.hooks[hook]:
+            arguments = ", ".join(HOOKS[hook])
+            call = _call(said, hook, parameters="parameters")
+            yield f"def {hook}(self, {arguments}):\n    return {call}"
+
+
+def _noise(said: Behaviour, place: slice | None) -> Iterator[str]:
+    """How an output gets its noise."""
+    if place is not None:
+        n = "".join(["gauss(0.0, 1.0), "] * said.draws)
+        values = "".join(f"values[{i}], " for i in range(place.start, place.stop))
+        call = _call(said, "measured", **{"n": f"({n})", said.noisy: f"({values})"})
+        yield (
+            "def sample(self, values):\n    gauss = self._random.gauss\n"
+            f"    values[{place.start}:{place.stop}] = noisy = {call}\n    return noisy"
+        )

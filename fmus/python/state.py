@@ -1,0 +1,134 @@
+"""The state of an FMU: complete, exact, in memory and as bytes, and checked before it is taken."""
+
+from __future__ import annotations
+
+import json
+from binascii import crc32
+from collections.abc import Mapping, Sequence
+from functools import partial
+from math import isclose
+from typing import Any, TypedDict
+
+from fmus.ports.port import Refusal, Value
+from fmus.python.callbacks import INSTANTIATED, MODES, STEPPING
+from fmus.python.shape import frozen, restored
+from fmus.python.store import Store
+
+
+class Snapshot(TypedDict):
+    """Everything that the rest of a run depends on, fit for JSON."""
+
+    identity: str  #: class and version that it is a state of
+    mode: str
+    start_time: float
+    parameters: dict[str, Value]
+    inputs: list[float]
+    outputs: list[float]
+    state: Any  #: NamedTuple of the component, None before the initialisation
+    hidden: Any  #: what the component keeps outside its state
+    fault: bool
+
+
+#: Key of what speaks against bytes or a snapshot: PythonFMU asks for them where nothing can be
+#: reported, so they are refused when they are set.
+_UNUSABLE = "unusable"
+
+#: Difference of what was computed from the same numbers on two machines.
+_ROUNDING = 1e-9
+
+#: Key of the checksum in the bytes of a state.
+_CHECKSUM = "checksum"
+
+
+def unusable(why: str) -> dict[str, Any]:
+    """What stands for a state that there is none of."""
+    return {_UNUSABLE: why}
+
+
+def to_bytes(snapshot: Mapping[str, Any]) -> bytes:
+    """JSON, which gives every float back bit for bit, with a checksum."""
+    try:
+        return _text({**snapshot, _CHECKSUM: _checksum(snapshot)})
+    except (TypeError, ValueError, RecursionError) as error:
+        return _text(unusable(f"it is not fit for JSON: {error}"))
+
+
+def from_bytes(content: bytes) -> dict[str, Any]:
+    """What was made into bytes; what is no state at all is refused when it is set."""
+    try:
+        saved = json.loads(content)
+        if not isinstance(saved, dict):
+            return unusable("the bytes are not those of a state")
+        checksum = saved.pop(_CHECKSUM, None)
+        if _UNUSABLE not in saved and checksum != _checksum(saved):
+            return unusable("the bytes were changed since they were written")
+    except (ValueError, RecursionError):
+        return unusable("the bytes are not those of a state")
+    return saved
+
+
+def _text(value: Mapping[str, Any]) -> bytes:
+    return json.dumps(value).encode("utf-8")
+
+
+def _checksum(snapshot: Mapping[str, Any]) -> int:
+    return crc32(_text(snapshot))
+
+
+def checked(saved: Mapping[str, Any], identity: str, store: Store, kind: type) -> Snapshot:
+    """A copy of what was saved, if it can be a state of this component.
+
+    Args:
+        saved: in memory, or from bytes.
+        identity: of the component.
+        store: of an instance of it.
+        kind: type of its state.
+
+    Raises:
+        Refusal: it belongs to another component or version, or no run can have led to it.
+
+    """
+    if _UNUSABLE in saved:
+        raise Refusal(str(saved[_UNUSABLE]))
+    if saved.get("identity") != identity:
+        raise Refusal(f"not a state of {identity}")
+    if saved.keys() != Snapshot.__annotations__.keys():
+        raise Refusal("it has other parts")
+    mode, state = saved["mode"], saved["state"]
+    if mode not in MODES:
+        raise Refusal(f"no mode is {mode!r:.40}")
+    if not isinstance(saved["fault"], bool):
+        raise Refusal("its fault is neither true nor false")
+    outputs = _values(store, store.output_references, saved["outputs"])
+    if mode == INSTANTIATED and state is not None:
+        raise Refusal("it has a state before the initialisation")
+    if state is None and (mode == STEPPING or any(outputs)):
+        raise Refusal("it has steps, or outputs, without a state")
+    parameters = saved["parameters"]
+    declared = [port for port in store.ports if port.causality == "parameter"]
+    if not isinstance(parameters, dict) or parameters.keys() != store.parameters.keys():
+        raise Refusal("it has other parameters")
+    return Snapshot(
+        identity=identity,
+        mode=mode,
+        start_time=restored(float, saved["start_time"]),
+        parameters={port.name: port.checked(parameters[port.name]) for port in declared},
+        inputs=_values(store, store.input_references, saved["inputs"]),
+        outputs=outputs,
+        state=None if state is None else restored(kind, state),
+        hidden=frozen(saved["hidden"]),
+        fault=saved["fault"],
+    )
+
+
+def _values(store: Store, references: Sequence[int], values: Any) -> list[float]:
+    if not isinstance(values, (list, tuple)) or len(values) != len(references):
+        raise Refusal("it has other ports")
+    for reference, value in zip(references, values):
+        store.ports[reference].checked(value)
+    return [*values]
+
+
+def nearly_equal(one: Sequence[float], other: Sequence[float]) -> bool:
+    """Whether two lists of values differ by no more than what another machine's sine may."""
+    return all(map(partial(isclose, rel_tol=_ROUNDING, abs_tol=_ROUNDING), one, other))

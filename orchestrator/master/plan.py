@@ -1,0 +1,190 @@
+"""What is run, checked before any FMU is loaded: a system, its steps, and the order of stepping.
+
+Every communication step has stages. Before a stage is stepped its inputs are gathered; the
+outputs of a component are read as soon as it was stepped.
+
+- `jacobi`: one stage. All inputs are outputs of t_k.
+- `gauss-seidel`: a component whose output has direct feedthrough is stepped in an earlier
+  stage than those it feeds, so they receive without delay what follows from t_k. Outputs
+  without feedthrough are states: all take them at t_k.
+- the names of all components: the same in the order that they stand in.
+
+A ring of feedthroughs that is not solved is opened before the one of its components that stands
+first in the system, which takes what feeds it at t_k.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import lcm
+
+from orchestrator.machine.errors import InputError, shortened
+from orchestrator.master.experiment import JACOBI, LINEAR, ORDERS, Experiment, Order, decimations
+from orchestrator.system.graph import delayed, derived_order, has_feedthrough, in_stages
+from orchestrator.system.names import PortName
+from orchestrator.system.structure import Connection, System
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What :func:`planned` makes of a system, for :func:`.simulation.simulate` to run.
+
+    Attributes:
+        system: that is run.
+        experiment: until when, in which steps and which order.
+        decimations: how many communication steps one step of each component takes.
+        remarks: what the user is told when it is run, in lines.
+
+    """
+
+    system: System
+    experiment: Experiment
+    decimations: Mapping[str, int]
+    remarks: Sequence[str] = ()
+
+
+def planned(system: System, experiment: Experiment) -> Plan:
+    """Check what can be checked before an FMU is loaded.
+
+    Where an FMU takes steps of one length only, a last, shorter step is left out.
+
+    Raises:
+        InputError: the system or its steps are not usable, or no step is left.
+
+    """
+    system.check()
+    # An order of names must have them all.
+    stages(system, experiment.order)
+    if experiment.coupling == LINEAR:
+        _check_linear(system)
+    found = decimations(system, experiment.step)
+    rigid = [name for name, component in system.components.items() if not component.takes_any_step]
+    period = lcm(*(found[name] for name in rigid))
+    whole = experiment.full_steps // period * period
+    if not rigid or whole == experiment.rows - 1:
+        return Plan(system, experiment, found)
+    why = f"{', '.join(rigid)}: takes steps of one length only, so"
+    if whole == 0:
+        shortest = period * experiment.step
+        raise InputError(f"{why} the run must last at least one step, {shortest:g} s")
+    end = experiment.time(whole)
+    remark = f"{why} the run ends with the last whole step, at t = {end:.12g} s"
+    return Plan(system, replace(experiment, stop_time=end), found, (remark,))
+
+
+def _check_linear(system: System) -> None:
+    """Check that the components of a system can be stepped with linear inputs.
+
+    Raises:
+        InputError: one that others feed cannot go back, or its inputs cannot change in a step; or
+            one takes longer steps.
+
+    """
+    for name, component in system.components.items():
+        if system.feeding[name] and not component.takes_linear_inputs:
+            raise InputError(
+                f"coupling linear: {name} cannot go back to the beginning of a step and let its "
+                "inputs change in it (canGetAndSetFMUstate, canInterpolateInputs)"
+            )
+    if system.steps:
+        raise InputError(
+            f"coupling linear: {', '.join(system.steps)}: takes steps of its own; leave them out"
+        )
+
+
+def stages(system: System, order: Order, solved: Sequence[Sequence[str]] = ()) -> list[list[str]]:
+    """Components in the order in which they are stepped; those of one stage are independent.
+
+    Args:
+        system: that is stepped.
+        order: of its components.
+        solved: rings of them that are stepped as one, in stages of their own.
+
+    Raises:
+        InputError: an order that does not name each component once.
+
+    """
+    if order == JACOBI:
+        ringed = {name for ring in solved for name in ring}
+        others = [name for name in system.components if name not in ringed]
+        return [others, *map(list, solved)] if others else list(map(list, solved))
+    if isinstance(order, str):
+        return in_stages(system, derived_order(system, solved), solved)
+    _check_names(system, order)
+    return in_stages(system, order, solved)
+
+
+def _check_names(system: System, order: Sequence[str]) -> None:
+    for name in order:
+        system.component(name)
+    twice = [name for i, name in enumerate(order) if name in order[:i]]
+    missing = [name for name in system.components if name not in order]
+    for names, what in ((twice, "twice"), (missing, "not at all")):
+        if names:
+            raise InputError(
+                f"order {','.join(order)}: names {', '.join(names)} {what}; it takes every "
+                "component once"
+            )
+
+
+def delays(
+    system: System,
+    order: Order,
+    solved: Sequence[Sequence[str]] = (),
+    reasons: Mapping[str, str] | None = None,
+) -> list[str]:
+    """Where an order that follows from the feedthroughs opens a ring of them, in words.
+
+    Args:
+        system: that is stepped.
+        order: of its components.
+        solved: rings that are solved.
+        reasons: why components are in none of these.
+
+    """
+    if not isinstance(order, str) or order == JACOBI:
+        return []
+    late: dict[str, list[PortName]] = {}
+    for connection in delayed(system, derived_order(system, solved), solved):
+        late.setdefault(connection.target.component, []).append(connection.source)
+    found = []
+    for name, sources in late.items():
+        text = f"{name} takes {shortened(', '.join(map(str, sources)))} one step late: "
+        concerned = (name, *(source.component for source in sources))
+        why = next((reasons[one] for one in concerned if one in reasons), "") if reasons else ""
+        found.append(f"{text}direct feedthroughs form a ring{why and f'; {why}'}")
+    return found
+
+
+def gathered(
+    system: System,
+    sequence: Sequence[Sequence[str]],
+    solved: Sequence[Sequence[str]] = (),
+    order: Order = ORDERS[0],
+    *,
+    latest: bool = False,
+) -> list[list[Connection]]:
+    """The connections along which values are gathered before each stage.
+
+    Args:
+        system: whose connections say what feeds what.
+        sequence: its components in :func:`stages`.
+        solved: rings among them, which gather by themselves what they feed themselves.
+        order: of the stages.
+        latest: whether stages take all that those before them have computed.
+
+    """
+    stage_of = {name: i for i, names in enumerate(sequence) for name in names}
+    ring_of = {name: i for i, ring in enumerate(solved) for name in ring}
+    found: list[list[Connection]] = [[] for _ in sequence]
+    for connection in system.connections:
+        start, end = connection.source.component, connection.target.component
+        if start in ring_of and ring_of[start] == ring_of.get(end):
+            continue
+        source, target = stage_of[start], stage_of[end]
+        # What is no feedthrough is a state, and must be taken before anybody advances.
+        at_once = latest or (order != JACOBI and has_feedthrough(system, connection))
+        late = at_once and source < target
+        found[target if late else 0].append(connection)
+    return found

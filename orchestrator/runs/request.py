@@ -1,0 +1,191 @@
+"""What a user asks for when making a run: each option is declared once.
+
+The command line makes its options of these fields (`commands/options.py`), `simulate` its keywords,
+and the report writes a request down as the command line that has it made.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, get_type_hints
+
+from fmus.kinds import KINDS, PYTHON
+from orchestrator.master.experiment import COUPLINGS, ORDERS, Order, order_of, written_order
+from orchestrator.master.fmi.isolated import STEP_TIMEOUT
+from orchestrator.master.loop import LOOPS
+from orchestrator.system.names import PortName, port_name
+from orchestrator.system.values import literal
+
+
+class CliOption:
+    """What the command line says of a field that is an option there, and how it reads it."""
+
+    def __init__(self, help: str, **how: Any) -> None:  # noqa: A002
+        """Take the help, and what else `argparse` needs."""
+        self.help, self.how = help, how
+
+
+def options_of(declared: type[Any]) -> dict[str, CliOption]:
+    """The fields of a dataclass that are options."""
+    hints = get_type_hints(declared, include_extras=True)
+    return {
+        name: one
+        for name, hint in hints.items()
+        for one in getattr(hint, "__metadata__", ())
+        if isinstance(one, CliOption)
+    }
+
+
+def flag(name: str) -> str:
+    """The option of the command line that a field is."""
+    return "--" + name.replace("_", "-")
+
+
+#: Which FMUs of the bundle.
+Kind = Annotated[
+    str,
+    CliOption(
+        "of the bundle's FMUs: Python sources, or their translation to C, with the same numbers; "
+        f"default: {PYTHON}",
+        choices=KINDS,
+    ),
+]
+
+#: What makes the steps.
+LoopName = Annotated[
+    str,
+    CliOption(
+        "what makes the steps: Python, or a loop in C; the rows are the same; default: auto, the "
+        "compiled one where it is to be had",
+        choices=LOOPS,
+    ),
+]
+
+#: What becomes of files of the user's that are in the way.
+Force = Annotated[
+    bool,
+    CliOption(
+        "move files of yours aside that have names of files that are written, to NAME.~1~; "
+        "otherwise they stay, and nothing is written",
+        action="store_true",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Request:
+    """A scenario and what the user changes of it; None: as the scenario has it.
+
+    Attributes:
+        scenario: its name, or the path of a file; empty where a system is given instead.
+        parameters: values that win over the scenario's, by `component.parameter`.
+        events: another scenario that has them, or tables as a scenario file has them.
+        steps: of components that take longer ones of their own [s]; they win over the scenario's.
+
+    """
+
+    scenario: str = ""
+    parameters: Mapping[Any, Any] = field(default_factory=dict, hash=False)
+    stop_time: Annotated[
+        float | None,
+        CliOption("end of the run [s]; default: the scenario's", type=float, metavar="S"),
+    ] = None
+    step: Annotated[
+        float | None,
+        CliOption(
+            "communication step [s]; default: the scenario's, else 0.02", type=float, metavar="S"
+        ),
+    ] = None
+    order: Annotated[
+        Order | None,
+        CliOption(
+            "order in which the components are stepped, or the names of all of them; default: "
+            f"the scenario's, else {ORDERS[0]}",
+            type=order_of,
+            metavar=f"{'|'.join(ORDERS)}|NAME,...",
+        ),
+    ] = None
+    coupling: Annotated[
+        str | None,
+        CliOption(
+            "how rings of direct feedthroughs are closed: solved, delayed by a step, or solved "
+            "with inputs that change linearly during a step; default: the scenario's, else solved "
+            "where the FMUs allow it",
+            choices=COUPLINGS,
+        ),
+    ] = None
+    kind: Kind = PYTHON
+    events: Annotated[
+        str | Sequence[Mapping[str, Any]] | None,
+        CliOption(
+            "what happens during the run: the events of another scenario, for this one or an SSP",
+            metavar="SCENARIO|FILE.toml",
+        ),
+    ] = field(default=None, hash=False)
+    inputs: Annotated[
+        str | Path | None,
+        CliOption(
+            "a table in CSV or Parquet of inputs that nothing feeds, over time",
+            type=Path,
+            metavar="FILE",
+        ),
+    ] = None
+    loop: LoopName = LOOPS[0]
+    isolate: Annotated[
+        bool,
+        CliOption(
+            "run each FMU in a process of its own, where it can crash or hang",
+            action="store_true",
+        ),
+    ] = False
+    step_timeout: Annotated[
+        float | None,
+        CliOption(
+            "how long an isolated FMU may take for one call [s]; "
+            f"default: {STEP_TIMEOUT:g}; needs --isolate",
+            type=float,
+            metavar="S",
+        ),
+    ] = None
+    real_time: Annotated[
+        float | None,
+        CliOption(
+            "go no faster than FACTOR simulated seconds in a second", type=float, metavar="FACTOR"
+        ),
+    ] = None
+    strict: Annotated[
+        bool, CliOption("refuse what otherwise is a warning", action="store_true")
+    ] = False
+    steps: Mapping[str, float] = field(default_factory=dict, hash=False)
+
+    @property
+    def values(self) -> dict[PortName, object]:
+        """The parameters, by names of ports."""
+        return {port_name(str(name)): value for name, value in self.parameters.items()}
+
+    @property
+    def command_line(self) -> str:
+        """What a user types after `auv-fmu run`."""
+        words, untouched = [self.scenario], Request()
+        for name, one in options_of(Request).items():
+            value = getattr(self, name)
+            if value == getattr(untouched, name):
+                continue
+            words.append(flag(name))
+            if one.how.get("action") != "store_true":
+                words.append(written_order(value) if name == "order" else _text(value))
+        for name, value in self.parameters.items():
+            words += ["--set", f"{name}={_text(value)}"]
+        # There is no option for these.
+        steps = ", ".join(f"{name} = {_text(step)} s" for name, step in self.steps.items())
+        return shlex.join(words) + f" (steps: {steps})" * bool(steps)
+
+
+def _text(value: Any) -> str:
+    """A value that is read back as the same, and no longer than it must be."""
+    if isinstance(value, str | Path):
+        return str(value)
+    return literal(value).removesuffix(".0") if isinstance(value, float) else literal(value)

@@ -1,0 +1,165 @@
+"""What a scenario file may hold; docs/scenarios.md and its JSON schema are made from this."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
+from orchestrator.master.experiment import COUPLINGS
+from orchestrator.runs.inputs import WAYS
+from orchestrator.runs.scenario_events import ACTIONS
+from orchestrator.vehicle.signals import STANDARD
+
+#: Actions of an event after which there is nothing left that could end.
+_AT_ONCE = ("release", "reset", "stop")
+
+
+class PathTable(TomlTable):
+    """Waypoints from a table: `[path]`."""
+
+    file: str = needed(
+        "A table in CSV, its path relative to this file, with the columns `x,y,z` [m] or `t,x,y,z` "
+        "and a line for each waypoint.",
+        '"path.csv"',
+    )
+    component: str = entry(
+        "The [PathPlanner](components/PathPlanner.md) whose parameters they become.",
+        f"`{STANDARD.planner}`",
+    )
+
+
+class InputsTable(TomlTable):
+    """Inputs over time, from a table: `[inputs]`."""
+
+    file: str = needed(
+        "A table in CSV or Parquet, its path relative to this file: `time` [s] first, then inputs "
+        "that nothing feeds, as `component.port`.",
+        '"inputs.csv"',
+    )
+    between: Annotated[str, OneOf(WAYS)] = entry(
+        "What a Real input does between two rows: `linear`, or `hold`, as all others do, and Real "
+        "inputs of variability `discrete`.",
+        f"`{WAYS[0]}`",
+    )
+
+
+class EventTable(TomlTable):
+    """Something that happens during the run: `[[events]]`."""
+
+    at: float = entry("When it happens [s].", "at `when`")
+    when: str = entry(
+        "The condition that it happens at: a signal, one of `< > <= >=`, and a number, such as "
+        '`"plant.eta.z > 5"`. It must have been false before.',
+        "at `at`",
+    )
+    repeat: bool = entry(
+        "Whether it happens each time that `when` becomes true, or only the first time.", "`false`"
+    )
+    duration: Annotated[float, Field(gt=0.0), "positive number"] = entry(
+        "How long it lasts [s].", "for good", key="for"
+    )
+    label: str = entry("Its name in figures.", "what it does")
+    set: dict[str, Any] = entry(
+        "New values of tunable parameters, and of inputs that nothing feeds."
+    )
+    override: dict[str, Any] = entry("Values that signals have from now on.")
+    bias: dict[str, Any] = entry("What is added to signals from now on.")
+    freeze: Names = entry("Signals that keep what they were last.")
+    drop: Names = entry(
+        "Sensors that fail: who listens keeps what it heard last, as with `freeze`."
+    )
+    lose: Names = entry("Actuators that fail: overridden with zero.")
+    release: Names = entry("Signals that are what they are without events again.")
+    reset: Names = entry(
+        "Components that begin anew, with their parameters as they are at that time."
+    )
+    stop: Literal[True] = entry("`true`: the run ends here, and has not failed.")
+
+    @model_validator(mode="after")
+    def _happens_once_and_does_one_thing(self) -> Self:
+        if (self.at is None) == (self.when is None):
+            raise ValueError("write when it happens: either at or when")
+        actions = [action for action in ACTIONS if getattr(self, action) is not None]
+        if len(actions) != 1:
+            said = f"not {' and '.join(actions)}" if actions else f"one of {', '.join(ACTIONS)}"
+            raise ValueError(f"write one thing that it does, {said}")
+        if self.duration is not None and actions[0] in _AT_ONCE:
+            raise ValueError(f"{actions[0]} has no duration: leave `for` out")
+        if self.repeat is not None and self.when is None:
+            raise ValueError("repeat is for events with `when`")
+        return self
+
+
+class ScenarioFile(TomlTable):
+    """A scenario of auv-fmu."""
+
+    title: str = entry(
+        "Heading of the figures and of the section in the report.", "the name of the file"
+    )
+    label: str = entry(
+        "Name of its lines where two runs are drawn together.", "the name of the file"
+    )
+    figure: str = entry("Which figure to draw.", "`tracking`")
+    z_up: bool = entry(
+        "Whether z is up and y west where the path is drawn, as in the paper's words (reading 16).",
+        "`false`: z is down and y east",
+    )
+    compare: str = entry(
+        "A scenario that is run and drawn together with this one: a name, or the path of a .toml "
+        "file, relative to this one. It keeps its controller. Other components, the wires between "
+        "them, `[path]` and the parameters of the planner are this scenario's, so that both follow "
+        "one reference; what else this scenario and the command line set goes for both, as far as "
+        "both have it. Where both have the same controller, it keeps all components but the "
+        "planner.",
+        "none",
+    )
+    stop_time: float = entry("End of the run [s].", "100 s")
+    step: float = entry("Communication step [s].", "0.02 s")
+    steps: dict[str, float] = entry(
+        "Components that take longer steps of their own, as `component = step` [s], a multiple of "
+        "the communication step. Meanwhile they hold their inputs.",
+        "none",
+    )
+    order: Names = entry(
+        "In which components are stepped: `gauss-seidel`, `jacobi`, or the names of all of them.",
+        "`gauss-seidel`",
+    )
+    coupling: Annotated[str, OneOf(COUPLINGS)] = entry(
+        "How rings of direct feedthroughs are closed.",
+        "`solve` where the FMUs allow it, else `delay`",
+    )
+    only: list[Name] = entry(
+        "The components to keep; the wires of the others go with them.", "all of them"
+    )
+    remark: str = entry("What the report says below the figure, in Markdown.", "none")
+    components: dict[str, Name] = entry(
+        "FMUs that take the place of the closed loop's own, or stand beside them, as "
+        '`component = "FMU"`: a name of the bundle\'s, or the path of a .fmu file, relative to '
+        "this file.",
+        "none",
+    )
+    wires: dict[str, Name | Literal[False]] = entry(
+        'Further wires, as `"component.group" = "component.group"`: every input of the group on '
+        "the left takes the output of the same name in the group on the right. Where both sides "
+        'name a port, that one is wired, as `"g.u[1]" = "t.y"`. `false` removes a wire.',
+        "none",
+    )
+    parameters: dict[str, Any] = entry(
+        "Parameters, and inputs that nothing feeds, as `component.parameter = value`. Names with "
+        'brackets are quoted: `"controller.K1[1]" = 12.0`.',
+        "the FMUs' own",
+    )
+    path: PathTable = entry("Waypoints of a PathPlanner, from a table: [see below](#path).", "none")
+    events: list[EventTable] = entry(
+        "What happens during the run, each as `[[events]]`: [see below](#events).", "nothing"
+    )
+    inputs: InputsTable = entry(
+        "A table of inputs over time: [see below](#inputs).", "inputs keep their values"
+    )
+    ours: Annotated[dict[str, Any], "table of texts"] = entry(
+        'Which of the values above are not the paper\'s, and why: `stop_time = "why"`, '
+        '`plant.noise.std = "why"`.',
+        "none",
+    )

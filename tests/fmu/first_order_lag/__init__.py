@@ -1,0 +1,1 @@
+"""A first-order lag, measured with noise."""

@@ -1,0 +1,149 @@
+"""A component is a folder: one that nothing names is built, described, run and tested."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+from reference import STEP, STOP_TIME, write_component_reference
+
+from fmus.compilers import machines_compiler
+from fmus.discovery import components
+
+ROOT = Path(__file__).parents[2]
+NAME, FOLDER = "FirstOrderLag", "first_order_lag"
+
+#: What is in that folder.
+WRITTEN = {"__init__.py", "behaviour.py", "page.md", "ports.py"}
+
+#: The component that stays: the fuzzer needs the states of another one.
+OTHER = "fmus.disturbance_generator"
+
+#: Tests of any component, and what they read.
+TESTS = (
+    "tests/fmu/test_built_fmu.py",
+    "tests/unit/fmus/native/test_equations.py",
+    "tests/unit/fmus/native/test_tables.py",
+)
+READ = ("tests/support", "tests/fuzz", "docs/status.md", "pyproject.toml", *TESTS)
+
+_CONFTEST = """\
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+settings.register_profile("patient", deadline=None, derandomize=True)
+settings.load_profile("patient")
+
+
+@pytest.fixture
+def dist():
+    return Path("dist/python").absolute()
+"""
+
+pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+
+
+def python(tree: Path, *arguments: str) -> str:
+    """Run Python in a tree, whose packages and tests come before all others; what it says."""
+    path = os.pathsep.join(map(str, (tree, tree / "tests")))
+    process = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=tree,
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert process.returncode == 0, process.stdout + process.stderr
+    return process.stdout
+
+
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the tree with another component, and but one of those that it has."""
+    tree = tmp_path_factory.mktemp("tree")
+    left_out = [package.split(".")[1] for package in components().values() if package != OTHER]
+    ignored = shutil.ignore_patterns("__pycache__", "dist", *left_out)
+    shutil.copytree(ROOT / "fmus", tree / "fmus", ignore=ignored)
+    for name in READ:
+        (tree / name).parent.mkdir(parents=True, exist_ok=True)
+        copied = shutil.copytree if (ROOT / name).is_dir() else shutil.copyfile
+        copied(ROOT / name, tree / name)
+    (tree / "tests/conftest.py").write_text(_CONFTEST)
+    shutil.copytree(Path(__file__).parent / FOLDER, tree / "fmus" / FOLDER, ignore=ignored)
+    for kind in ("python", "native"):
+        said = python(tree, "-m", "fmus.build", "--kind", kind, "--out", f"dist/{kind}")
+        assert f"{NAME}.fmu" in said
+    return tree
+
+
+def test_folder_is_all_that_is_written(tree: Path):
+    assert {path.name for path in (tree / "fmus" / FOLDER).glob("*.*")} == WRITTEN
+
+
+@pytest.mark.parametrize("kind", ["python", "native"])
+def test_both_kinds_describe_themselves_well(tree: Path, kind: str):
+    assert validate_fmu(str(tree / f"dist/{kind}/{NAME}.fmu")) == []
+
+
+def test_page_has_the_ports(tree: Path):
+    python(tree, "-m", "fmus.documentation", "--out", "pages")
+    page = (tree / f"pages/{NAME}.md").read_text()
+    assert page.startswith("# FirstOrderLag\n\nT dx/dt = u - x")
+    assert "| `y.x` | Real | m | Its value, measured: x |" in page
+
+
+def test_both_kinds_give_the_same_numbers_and_they_are_right(tree: Path):
+    """Of the exponential, and of the noise: 3,000 numbers deviate by 1 cm, give or take 5 %."""
+    one, other = (
+        fmpy.simulate_fmu(
+            str(tree / f"dist/{kind}/{NAME}.fmu"), stop_time=30.0, step_size=0.01,
+            output_interval=0.01, output=["x.x", "y.x"],
+        )
+        for kind in ("python", "native")
+    )  # fmt: skip
+    assert one.tobytes() == other.tobytes()
+    np.testing.assert_allclose(one["x.x"], np.exp(-one["time"] / 0.5), rtol=1e-10)
+    noise = one["y.x"] - one["x.x"]
+    assert np.std(noise) == pytest.approx(0.01, rel=0.05)
+    assert abs(np.mean(noise)) < 4.0 * 0.01 / np.sqrt(len(noise))
+
+
+def test_reference_is_written_for_it(tree: Path, tmp_path: Path):
+    """With u held through a step, x(t + h) = u + (x(t) - u) exp(-h / T)."""
+    written = write_component_reference(tree / f"dist/native/{NAME}.fmu", tmp_path)
+    assert {p.name for p in written} == {f"{NAME}_{n}" for n in ("in.csv", "ref.csv", "ref.opt")}
+    u, x = (
+        np.genfromtxt(tmp_path / f"{NAME}_{which}.csv", delimiter=",", names=True, deletechars="")
+        for which in ("in", "ref")
+    )
+    assert x["time"][-1] == STOP_TIME
+    held, before = u["u.x"][:-1], x["x.x"][:-1]
+    expected = held + (before - held) * np.exp(-STEP / 0.5)
+    np.testing.assert_allclose(x["x.x"][1:], expected, rtol=1e-9)
+
+
+def test_tests_of_any_component_hold_for_it(tree: Path):
+    chosen = ("-q", "-p", "no:cacheprovider", "-k", f"{NAME} or {FOLDER}")
+    said = python(tree, "-m", "pytest", *chosen, *TESTS)
+    assert "passed" in said
+    assert "failed" not in said
+
+
+@pytest.mark.parametrize(
+    "options",
+    [("--fmus", "dist/native"), ("--fmus", "dist/python", "--twin", "dist/native")],
+    ids=["by itself", "twins"],
+)
+def test_fuzzer_attacks_it(tree: Path, options: tuple[str, ...]):
+    said = python(tree, "-m", "fuzz.sequences", *options, "--only", NAME, "--runs", "10")
+    assert f"{NAME}: 10 " in said

@@ -1,0 +1,44 @@
+"""One word, one thing: names occur once, and the glossary's words are where it says."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+GLOSSARY = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+TERMS = re.findall(r"^\| (.+?) \| (.+?) \| `([\w./-]+)`(?: `(\w+)`)? \|$", GLOSSARY, re.MULTILINE)
+RETIRED = re.findall(r"^\| `(\w+)` \| .+ \|$", GLOSSARY, re.MULTILINE)
+
+
+def test_no_module_and_no_class_of_the_orchestrator_has_the_name_of_another():
+    assert runpy.run_path(str(ROOT / "tools" / "house.py"))["names_that_occur_twice"]() == {}
+
+
+def test_terms_are_told_once_and_in_order():
+    names = [term.casefold() for term, *_ in TERMS]
+    assert len(names) >= 40
+    assert names == sorted(set(names))
+
+
+@pytest.mark.parametrize(("place", "name"), [term[2:] for term in TERMS], ids=str)
+def test_terms_live_where_the_glossary_says(place, name):
+    path = ROOT / place
+    assert path.exists()
+    if name:
+        text = path.read_text(encoding="utf-8")
+        assert re.search(rf"^ *(?:class|def) {name}\b|^{name}\b.* = ", text, re.MULTILINE)
+
+
+def test_words_that_were_retired_name_nothing():
+    """No module, class, function or variable, and no word of a page."""
+    assert RETIRED
+    word = re.compile(rf"\b_?({'|'.join(RETIRED)})s?\b", re.IGNORECASE)
+    for folder in ("src", "fmus", "orchestrator", "docs", "tools"):
+        for path in (ROOT / folder).rglob("*"):
+            if path.suffix in (".py", ".md", ".c", ".h") and path.name != "glossary.md":
+                file = path.relative_to(ROOT)
+                assert not word.search(f"{file}\n{path.read_text(encoding='utf-8')}"), file

@@ -1,0 +1,353 @@
+"""The state of a component: complete, exact, and refused whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from math import inf, nan
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pythonfmu.enums import Fmi2Status
+
+from fmus.python.state import Snapshot, nearly_equal
+from support.instances import ClassInstance
+from support.settings import NAMES, WITH_INPUTS
+
+
+@pytest.fixture(params=NAMES)
+def driver(request: pytest.FixtureRequest) -> ClassInstance:
+    return ClassInstance(request.param)
+
+
+@pytest.fixture(params=WITH_INPUTS)
+def driven(request: pytest.FixtureRequest) -> ClassInstance:
+    return ClassInstance(request.param)
+
+
+def spoiled(saved: Snapshot, key: str, value: Any) -> dict[str, Any]:
+    """A state with one part changed, as its bytes would bring it back if their checksum agreed."""
+    return json.loads(json.dumps({**saved, key: value}))
+
+
+def with_parameter(name: str, value: Any) -> Callable[[Snapshot], Any]:
+    return lambda saved: {**saved["parameters"], name: value}
+
+
+def with_input(value: Any) -> Callable[[Snapshot], Any]:
+    return lambda saved: [value, *saved["inputs"][1:]]
+
+
+def with_generator(place: int, value: Any) -> Callable[[Snapshot], Any]:
+    """The noise generator's version, numbers and kept second number of the pair."""
+
+    def change(saved: Snapshot) -> Any:
+        hidden = [saved["hidden"][0], [*saved["hidden"][1]], saved["hidden"][2]]
+        hidden[place] = value(hidden[place]) if callable(value) else value
+        return hidden
+
+    return change
+
+
+#: Of AuvPlant: key of the state, and what another value of it is made of.
+SPOILED = {
+    "parameter out of range": ("parameters", with_parameter("m11", -25.0)),
+    "parameter not finite": ("parameters", with_parameter("m11", nan)),
+    "parameter infinite": ("parameters", with_parameter("ell", inf)),
+    "parameter too large for a float": ("parameters", with_parameter("ell", 10**400)),
+    "parameter of another type": ("parameters", with_parameter("m11", "25")),
+    "truth value for a number": ("parameters", with_parameter("m11", True)),
+    "number for an integer": ("parameters", with_parameter("noise.seed", 1.5)),
+    "integer of more than 32 bits": ("parameters", with_parameter("noise.seed", 3733856209)),
+    "list for a parameter": ("parameters", with_parameter("m11", [25.0])),
+    "parameter too many": ("parameters", with_parameter("m99", 1.0)),
+    "parameters missing": ("parameters", lambda saved: {"m11": 50.0}),
+    "parameters in a list": ("parameters", lambda saved: [*saved["parameters"].items()]),
+    "limits that do not fit": ("parameters", lambda saved: {
+        **saved["parameters"], "tau_min.u": 0.0, "tau_max.u": 0.0,
+    }),
+    "input not finite": ("inputs", with_input(nan)),
+    "input of another type": ("inputs", with_input(None)),
+    "inputs missing": ("inputs", lambda saved: [1.0]),
+    "inputs no list": ("inputs", lambda saved: 7),
+    "outputs missing": ("outputs", lambda saved: []),
+    "output not finite": ("outputs", lambda saved: [inf, *saved["outputs"][1:]]),
+    "posture of another state": ("outputs", lambda saved: [1.0, *saved["outputs"][1:]]),
+    "measured elsewhere": ("outputs", lambda saved: [
+        *saved["outputs"][:14], saved["outputs"][14] + 0.01, *saved["outputs"][15:],
+    ]),
+    "moment beyond its limit": ("outputs", lambda saved: [*saved["outputs"][:-1], 1e6]),
+    "mode bogus": ("mode", lambda saved: "bogus"),
+    "mode of another type": ("mode", lambda saved: ["stepping"]),
+    "state before the initialisation": ("mode", lambda saved: "instantiated"),
+    "no state after the initialisation": ("state", lambda saved: None),
+    "state of another shape": ("state", lambda saved: [*saved["state"], [0.0]]),
+    "state flat": ("state", lambda saved: [0.0, 0.0, 0.0]),
+    "state not finite": ("state", lambda saved: [[nan, 0.0, 0.0], *saved["state"][1:]]),
+    "state of text": ("state", lambda saved: [["a", "b", "c"], *saved["state"][1:]]),
+    "state of truth values": ("state", lambda saved: [[True] * 3, *saved["state"][1:]]),
+    "state out of bounds": ("state", lambda saved: [[1e120, 0.0, 0.0], *saved["state"][1:]]),
+    "zero quaternion": ("state", lambda saved: [
+        saved["state"][0], [0.0] * 4, *saved["state"][2:],
+    ]),
+    "long quaternion": ("state", lambda saved: [
+        saved["state"][0], [1.0, 0.0, 1.0, 0.0], *saved["state"][2:],
+    ]),
+    "force beyond its limit": ("state", lambda saved: [*saved["state"][:-1], [1e6, 0.0, 0.0]]),
+    "force of another state": ("state", lambda saved: [*saved["state"][:-1], [1.0, 0.0, 0.0]]),
+    "generator of another version": ("hidden", with_generator(0, 2)),
+    "generator of no version": ("hidden", with_generator(0, "three")),
+    "generator too short": ("hidden", with_generator(1, lambda numbers: numbers[:-2])),
+    "generator with a negative number": ("hidden", with_generator(1, lambda n: [-1, *n[1:]])),
+    "generator with a large number": ("hidden", with_generator(1, lambda n: [2**32, *n[1:]])),
+    "generator with a fraction": ("hidden", with_generator(1, lambda n: [0.5, *n[1:]])),
+    "generator with text to come": ("hidden", with_generator(2, "0.5")),
+    "generator with no number to come": ("hidden", with_generator(2, nan)),
+    "no generator": ("hidden", lambda saved: None),
+    "generator of no parts": ("hidden", lambda saved: [1]),
+    "start time not finite": ("start_time", lambda saved: inf),
+    "start time of another type": ("start_time", lambda saved: "0"),
+    "fault of another type": ("fault", lambda saved: 0),
+    "part too many": ("more", lambda saved: 1),
+    "part of an older version": ("refused", lambda saved: {}),
+    "another component": ("identity", lambda saved: "something else"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", SPOILED)
+def test_state_that_no_run_can_have_led_to_is_refused_whole(what: str):
+    plant, untouched = ClassInstance("AuvPlant"), ClassInstance("AuvPlant", m11=50.0)
+    for driver in (plant, untouched):
+        driver.excite(1)
+        driver.step()
+    saved = untouched.slave._get_fmu_state()
+    before = plant.slave._get_fmu_state()
+    key, change = SPOILED[what]
+    plant.slave._set_fmu_state(spoiled(saved, key, change(saved)))
+    assert plant.answers() == [Fmi2Status.error]
+    assert plant.messages()[0].startswith("state refused: ")
+    assert plant.slave._get_fmu_state() == before
+    plant.slave._set_fmu_state(saved)
+    for driver in (plant, untouched):
+        driver.excite(2)
+        assert driver.step()
+    assert plant.outputs() == untouched.outputs(), "a good state is taken after a bad one"
+
+
+@pytest.mark.parametrize("key", Snapshot.__annotations__)
+def test_state_with_a_part_missing_is_refused(driver, key):
+    saved = dict(driver.slave._get_fmu_state())
+    del saved[key]
+    driver.slave._set_fmu_state(saved)
+    assert driver.answers() == [Fmi2Status.error]
+
+
+#: Bytes that are no state at all.
+NO_STATES = {
+    "nothing": b"",
+    "no text": b"\x00 not a state \xff",
+    "a list": b"[1, 2]",
+    "a number": b"1",
+    "two thousand lists": b"[" * 2000,
+    "a hundred thousand objects": b'{"a":' * 100_000,
+    "half a number": b'{"mode": 1e',
+    "a number without end": b'{"start_time": ' + b"9" * 10_000 + b"}",
+    "an empty object": b"{}",
+}
+
+
+@pytest.mark.parametrize("what", NO_STATES)
+def test_bytes_that_are_no_state_are_refused(driver, what):
+    before = driver.slave._get_fmu_state()
+    driver.slave._set_fmu_state(driver.slave._fmu_state_from_bytes(NO_STATES[what]))
+    assert driver.answers() == [Fmi2Status.error]
+    assert driver.slave._get_fmu_state() == before
+    assert driver.get("fault") is False
+
+
+@given(place=st.integers(0), byte=st.integers(0, 255))
+def test_no_changed_byte_of_a_state_is_overlooked(place, byte):
+    """What is accepted is the same state, written in another way; what is not changes nothing."""
+    driver = ClassInstance("ObserverController")
+    driver.excite(1)
+    driver.step()
+    saved = driver.slave._get_fmu_state()
+    content = bytearray(driver.slave._fmu_state_to_bytes(saved))
+    content[place % len(content)] = byte
+    driver.slave._set_fmu_state(driver.slave._fmu_state_from_bytes(bytes(content)))
+    assert driver.answers() in ([], [Fmi2Status.error])
+    assert driver.slave._get_fmu_state() == saved
+
+
+def test_state_that_is_not_fit_for_bytes_says_so():
+    driver = ClassInstance("AuvPlant")
+    content = driver.slave._fmu_state_to_bytes({"hidden": object()})
+    driver.slave._set_fmu_state(driver.slave._fmu_state_from_bytes(content))
+    assert "JSON" in driver.messages()[0]
+
+
+def test_text_of_a_state_is_no_trap_for_the_message(driver):
+    saved = driver.slave._fmu_state_from_bytes(b'{"unusable": "%s' + b"x" * 10_000 + b'"}')
+    driver.slave._set_fmu_state(saved)
+    [message] = driver.messages()
+    assert "%%s" in message
+    assert len(message) < 600
+
+
+@pytest.mark.parametrize("plain", [False, True])
+def test_state_that_is_saved_after_a_refusal_is_a_state_like_any(driver, plain):
+    """Without a loader it leads out of the steps that are discarded."""
+    driver.slave._has_loader = not plain
+    driver.slave._set_fmu_state({})
+    assert driver.step() is not plain
+    saved = driver.slave._get_fmu_state()
+    driver.slave._set_fmu_state(saved)
+    assert driver.slave._get_fmu_state() == saved
+    assert driver.step()
+
+
+def test_fault_is_that_of_the_state_that_is_restored(driver):
+    sound = driver.slave._get_fmu_state()
+    assert not driver.slave.do_step(0.0, -1.0)
+    faulty = driver.slave._get_fmu_state()
+    for saved, fault in ((sound, False), (faulty, True)):
+        driver.slave._set_fmu_state(saved)
+        assert driver.get("fault") is fault
+
+
+def test_outputs_before_the_initialisation_are_refused(driver):
+    fresh = dict(driver.component(instance_name="fresh")._get_fmu_state())
+    driver.slave._set_fmu_state({**fresh, "outputs": [1.0] * len(fresh["outputs"])})
+    assert driver.messages() == ["state refused: it has steps, or outputs, without a state"]
+
+
+def test_state_before_the_first_step_is_that_of_its_parameters_and_inputs(driver):
+    """Whatever else is said of it: it is computed again."""
+    slave = driver.component(instance_name="initialising")
+    slave.setup_experiment(0.0)
+    slave.enter_initialization_mode()
+    true = slave._get_fmu_state()
+    driver.excite(1)
+    driver.step(0.02)
+    driver.slave._set_fmu_state({**driver.slave._get_fmu_state(), "mode": "initialising",
+                                 "inputs": true["inputs"]})  # fmt: skip
+    assert driver.slave._get_fmu_state() == true
+
+
+def test_reference_of_another_state_is_refused():
+    driver = ClassInstance("MotionPlanner")
+    driver.step()
+    saved = driver.slave._get_fmu_state()
+    driver.slave._set_fmu_state({**saved, "outputs": [1.0, *saved["outputs"][1:]]})
+    assert "not those of its state" in driver.messages()[0]
+
+
+def test_state_from_before_the_initialisation_brings_an_instance_back_there(driver):
+    fresh = driver.component(instance_name="fresh")
+    driver.slave._set_fmu_state(fresh._get_fmu_state())
+    assert not driver.slave.do_step(0.0, 0.02)
+    assert driver.answers() == [Fmi2Status.error]
+    driver.slave.enter_initialization_mode()
+    driver.slave.exit_initialization_mode()
+    assert driver.step()
+    other = ClassInstance(driver.component.__name__)
+    other.step()
+    assert driver.outputs() == other.outputs()
+
+
+@pytest.mark.parametrize("serialised", [False, True])
+def test_run_continued_from_a_state_is_the_same_run_bit_for_bit(driver, serialised):
+    driver.run(0, 50)
+    saved, time = driver.slave._get_fmu_state(), driver.time
+    if serialised:
+        saved = driver.component._fmu_state_from_bytes(driver.component._fmu_state_to_bytes(saved))
+    expected = driver.run(50, 100)
+    for other in (driver, ClassInstance(driver.component.__name__)):
+        other.slave._set_fmu_state(saved)
+        other.time = time
+        assert other.run(50, 100) == expected
+
+
+#: What is not in the paper, in a run of AuvPlant.
+ADDITIONS = {"roll": False, "current__x": 0.3, "actuator__T__u": 0.2, "actuator__T__q": 1e-3}
+
+
+def test_state_of_a_vehicle_with_additions_continues_bit_for_bit_too():
+    driver = ClassInstance("AuvPlant", **ADDITIONS)
+    driver.run(0, 50)
+    saved, time = json.loads(json.dumps(driver.slave._get_fmu_state())), driver.time
+    expected = driver.run(50, 100)
+    other = ClassInstance("AuvPlant")
+    other.slave._set_fmu_state(saved)
+    other.time = time
+    assert other.run(50, 100) == expected
+
+
+def test_state_that_rolls_is_none_of_a_vehicle_that_does_not():
+    driver = ClassInstance("AuvPlant")
+    driver.run(0, 50)
+    saved = driver.slave._get_fmu_state()
+    other = ClassInstance("AuvPlant", **ADDITIONS)
+    other.slave._set_fmu_state({**saved, "parameters": {**saved["parameters"], "roll": False}})
+    assert other.answers() == [Fmi2Status.error]
+    assert "its roll, which is held at zero, is not zero" in other.messages()[0]
+
+
+def test_state_holds_parameters_faults_and_inputs(driven):
+    driven.slave.set_real([0], [0.75])
+    driven.slave.set_real([1], [nan])
+    other = ClassInstance(driven.component.__name__)
+    other.slave._set_fmu_state(driven.slave._get_fmu_state())
+    assert other.get("fault") is True
+    assert other.slave.get_real([0]) == [0.75]
+    assert other.messages() == []
+    assert other.step()
+
+
+def test_state_of_another_component_or_version_is_refused(driver):
+    driver.step()
+    before = driver.slave._get_fmu_state()
+    driver.slave._set_fmu_state({**before, "identity": "something else"})
+    driver.slave._set_fmu_state({})
+    driver.slave._set_fmu_state(driver.slave._fmu_state_from_bytes(b"\x00 not a state"))
+    driver.slave._set_fmu_state(driver.slave._fmu_state_from_bytes(b"[1, 2]"))
+    assert driver.answers() == [Fmi2Status.error] * 4
+    assert driver.slave._get_fmu_state() == before
+
+
+def test_state_whose_initialisation_was_refused_is_one_of_an_instance_that_can_go_on():
+    driver = ClassInstance("AuvPlant", nu0__p=1e160)
+    saved = driver.slave._fmu_state_from_bytes(
+        driver.slave._fmu_state_to_bytes(driver.slave._get_fmu_state())
+    )
+    other = ClassInstance("AuvPlant")
+    other.slave._set_fmu_state(saved)
+    assert other.messages() == []
+    outputs = other.outputs()
+    assert outputs == [0.0] * len(outputs)
+    assert other.answers() == [Fmi2Status.error]
+    other.set(nu0__p=0.0)
+    other.slave.exit_initialization_mode()
+    assert other.step()
+    calm = ClassInstance("AuvPlant")
+    calm.step()
+    assert other.outputs() == calm.outputs()
+
+
+def test_saved_state_does_not_change_with_the_run(driver):
+    driver.excite(1)
+    driver.step()
+    saved = driver.slave._get_fmu_state()
+    text = json.dumps(saved)
+    driver.excite(2)
+    driver.step()
+    assert json.dumps(saved) == text
+
+
+@pytest.mark.parametrize("size", [0.0, 1.0, -1e9])
+def test_outputs_of_another_machine_may_differ_in_their_last_digits_alone(size):
+    unit = max(abs(size), 1.0)
+    assert nearly_equal([0.5, size], [0.5, size + 1e-10 * unit])
+    assert not nearly_equal([size, 0.5], [size + 1e-6 * unit, 0.5])

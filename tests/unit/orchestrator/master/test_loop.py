@@ -1,0 +1,96 @@
+"""Which loop makes the steps, and that the one in Python makes them one after the other."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from orchestrator.machine.errors import InputError
+from orchestrator.master import loop
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.gathering import Gathering
+from orchestrator.master.loop import PYTHON_LOOP, chosen, interpreted
+from orchestrator.master.schedule import Decimation, Stage, StageCall
+
+SHORT, LONG = Experiment(10.0, 1.0), Experiment(1e6, 1.0)
+
+
+def made(limit: float, experiment: Experiment) -> SimpleNamespace:
+    """A run of two values: y = t + h, and x, which takes y after it; every third step shows x."""
+    values = np.zeros(3)
+
+    def act(t: float, h: float) -> None:
+        values[0] = t + h if t + h < limit else np.nan
+
+    def moved(target: int, source: int) -> Gathering:
+        return Gathering(np.array([target]), np.array([source]))
+
+    stages = [
+        Stage(moved(1, 0), [StageCall(act).member]),
+        Stage(moved(2, 1), [], Decimation(3, at_end=True)),
+    ]
+    rows: list[list[float]] = []
+    return SimpleNamespace(
+        row=SimpleNamespace(values=values, shown=values),
+        blocks=SimpleNamespace(append=lambda t, shown: rows.append([t, *shown])),
+        rows=rows,
+        experiment=experiment,
+        stages=stages,
+        made=0,
+    )
+
+
+def test_stages_come_one_after_the_other_and_slow_ones_when_they_are_due():
+    run = made(99.0, Experiment(2.0, 0.5))
+    assert len(list(interpreted(run))) == run.made == 4
+    assert run.rows == [[0.5, 0.5, 0, 0], [1, 1, 0.5, 0], [1.5, 1.5, 1, 1], [2, 2, 1.5, 1.5]]
+
+
+def test_a_row_that_is_not_finite_is_not_kept():
+    run = made(1.5, Experiment(2.0, 0.5))
+    list(interpreted(run))
+    assert run.made == len(run.rows) == 2
+    assert np.isnan(run.row.values[0])
+
+
+def test_a_run_goes_on_after_the_steps_that_were_made():
+    run = made(99.0, Experiment(2.0, 0.5))
+    run.made = 2
+    list(interpreted(run))
+    assert [row[0] for row in run.rows] == [1.5, 2.0]
+
+
+@pytest.fixture
+def library(monkeypatch: pytest.MonkeyPatch) -> object:
+    """Compiled already."""
+    found = object()
+    monkeypatch.setattr(loop, "kept", lambda: found)
+    return found
+
+
+def test_the_compiled_loop_is_taken_where_it_pays(library: object):
+    assert chosen("auto", SHORT) == chosen("python", LONG) == PYTHON_LOOP
+    assert chosen("auto", LONG).name == chosen("compiled", SHORT).name == "compiled"
+    assert chosen("auto", LONG, Isolation()) == PYTHON_LOOP
+
+
+def test_a_loop_that_cannot_be_had_is_done_without_unless_it_is_asked_for(monkeypatch):
+    def made(in_no_time: bool = False) -> object:
+        raise InputError("no compiler")
+
+    monkeypatch.setattr(loop, "kept", lambda: None)
+    monkeypatch.setattr(loop, "made", made)
+    assert chosen("auto", LONG) == PYTHON_LOOP
+    with pytest.raises(InputError, match="no compiler"):
+        chosen("compiled", LONG)
+
+
+@pytest.mark.parametrize(
+    ("name", "isolation", "word"), [("fast", None, "'fast'"), ("compiled", Isolation(), "isolated")]
+)
+def test_what_is_no_loop_is_refused(library: object, name, isolation, word):
+    with pytest.raises(InputError, match=word):
+        chosen(name, LONG, isolation)

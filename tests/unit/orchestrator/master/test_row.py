@@ -1,0 +1,115 @@
+"""The row of all values: where each stands, and what is said of values that cannot be."""
+
+from __future__ import annotations
+
+from math import inf, nan
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from orchestrator.master.row import Row
+from orchestrator.system.component import read_component
+from orchestrator.system.names import PortName, port_name
+from orchestrator.system.structure import Connection, System
+from support.archives import fmu, variable
+from support.texts import mentions
+
+
+class Tied(SimpleNamespace):
+    """An instance that remembers what of the row is its own."""
+
+    def tie(self, values, parts, strings) -> None:
+        self.values, self.parts = values, parts
+
+
+@pytest.fixture(scope="module")
+def system(tmp_path_factory: pytest.TempPathFactory) -> System:
+    path = fmu(
+        tmp_path_factory.mktemp("fmu") / "a.fmu",
+        variable("y", "output"), variable("u", "input", start="2"), variable("k", "parameter"),
+        variable("n", "input", "Integer", start="3"), variable("s", "input", "String"),
+        variable("v", "input", start="4"),
+    )  # fmt: skip
+    wire = Connection(PortName("a", "y"), PortName("b", "u"))
+    return System("s", {name: read_component(name, path) for name in "ab"}, (wire,))
+
+
+def made(system: System, hidden: str = "") -> tuple[Row, dict[str, Tied]]:
+    instances = {name: Tied() for name in system.components}
+    return Row(system, instances, hidden), instances
+
+
+def test_ports_of_one_causality_and_type_are_neighbours(system: System):
+    row, instances = made(system)
+    assert [str(port) for port in row.columns] == [
+        f"{component}.{port}" for component in "ab" for port in ("u", "v", "n", "s", "y")
+    ]
+    for k, name in enumerate("ab"):
+        parts = [(part.causality, part.place) for part in instances[name].parts]
+        assert parts == [
+            ("input", slice(0, 2)), ("input", slice(2, 3)), ("input", slice(3, 4)),
+            ("output", slice(4, 5)),
+        ]  # fmt: skip
+        # A view: what an instance writes stands in the row.
+        instances[name].values[4] = 7.0 + k
+    assert [row.values[row.columns[PortName(name, "y")]] for name in "ab"] == [7.0, 8.0]
+
+
+def test_inputs_start_with_what_their_description_says_and_what_is_set(system: System):
+    values = {port_name("a.u"): 5.0, port_name("a.v"): nan, port_name("b.k"): 1.0}
+    row, _ = made(system.with_parameters({port_name("a.u"): 5.0}))
+    row.enter(values)
+    found = {str(port): row.values[column] for port, column in row.columns.items()}
+    assert (found["a.u"], found["a.v"], found["a.n"]) == (5.0, 4.0, 3.0)
+    assert (found["b.u"], found["b.v"], found["b.n"]) == (2.0, 4.0, 3.0)
+
+
+def test_hidden_outputs_are_shown_when_they_are_copied(system: System):
+    row, instances = made(system, "b")
+    assert len(row.values) == len(row.shown) + 1
+    place = instances["b"].parts[-1].place
+    instances["b"].values[place] = 9.0
+    column = row.columns[PortName("b", "y")]
+    assert row.shown[column] == 0.0
+    row.show("a")
+    assert row.shown[column] == 0.0
+    row.show("b")
+    assert row.shown[column] == 9.0
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({}, None),
+        ({"a.y": nan}, "a.y nan"),
+        ({"a.y": inf, "b.u": inf}, "a.y inf"),
+        # Nothing is wrong with what feeds it: it overflows on its way.
+        ({"b.u": -inf}, "b.u -inf a.y"),
+        ({"a.v": nan}, "a.v nan table"),
+        ({"b.n": 2.5}, "b.n 2.5 Integer"),
+        ({"b.n": 2.0**31}, "b.n 2147483648 Integer"),
+    ],
+)
+def test_the_first_value_that_cannot_be_is_named(system: System, values, words):
+    row, _ = made(system)
+    for name, value in values.items():
+        row.values[row.columns[port_name(name)]] = value
+    with np.errstate(all="ignore"):
+        said = row.wrong("ab")
+    assert said is None if words is None else mentions(said, words)
+
+
+def test_ports_that_move_are_those_that_change_by_more_than_rounding(system: System):
+    row, _ = made(system)
+    before = row.values.copy()
+    row.values[row.columns[port_name("a.u")]] *= 1.0 + 1e-15
+    row.values[row.columns[port_name("b.v")]] += 1e-9
+    assert row.moving(before) == [port_name("b.v")]
+
+
+def test_places_are_those_of_both_ends_of_each_connection(system: System):
+    row, _ = made(system)
+    targets, sources = row.places(system.connections)
+    np.testing.assert_array_equal(targets, [row.columns[port_name("b.u")]])
+    np.testing.assert_array_equal(sources, [row.columns[port_name("a.y")]])

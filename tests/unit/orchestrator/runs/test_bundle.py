@@ -1,0 +1,74 @@
+"""The bundle is written where it is missing or stale, and never over what is the user's."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from orchestrator.machine.errors import InputError
+from orchestrator.runs import bundle
+from orchestrator.runs.bundle import build, current_fmus, settings_of
+
+
+@pytest.fixture
+def folder(dist: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A bundle, and a build that finds its FMUs up to date."""
+    monkeypatch.setattr(bundle, "run_fmus", lambda module, folder, *options: [])
+    return shutil.copytree(dist, tmp_path / "bundle")
+
+
+def test_what_is_up_to_date_is_not_written_again(folder: Path):
+    before = {path: path.stat().st_mtime_ns for path in folder.iterdir()}
+    assert build(folder) == []
+    assert {path: path.stat().st_mtime_ns for path in folder.iterdir()} == before
+
+
+def test_what_is_missing_or_stale_is_written(folder: Path):
+    whole = (folder / "auv.ssp").read_bytes()
+    (folder / "auv.ssp").unlink()
+    assert build(folder) == [folder / "auv.ssp"]
+    assert (folder / "auv.ssp").read_bytes() == whole
+
+
+def test_a_file_that_was_changed_since_is_the_users(folder: Path):
+    (folder / "SHA256SUMS").write_text("mine")
+    with pytest.raises(InputError, match="SHA256SUMS"):
+        build(folder)
+    assert (folder / "SHA256SUMS").read_text() == "mine"
+    assert build(folder, force=True) == [folder / "SHA256SUMS"]
+    assert "mine" in {path.read_bytes().decode("latin-1") for path in folder.iterdir()}
+
+
+def test_papers_are_about_the_files_beside_them(dist: Path):
+    sums = dict(line.split()[::-1] for line in (dist / "SHA256SUMS").read_text().splitlines())
+    bill = json.loads((dist / "bom.cdx.json").read_text())
+    assert (bill["bomFormat"], bill["specVersion"]) == ("CycloneDX", "1.5")
+    assert {c["name"] for c in bill["components"]} == {"pythonfmu", *sums}
+    files = {c["name"]: c["hashes"][0]["content"] for c in bill["components"] if "hashes" in c}
+    assert sums == files
+    assert sums.keys() == {path.name for path in (*dist.glob("*.fmu"), dist / "auv.ssp")}
+    for name, digest in sums.items():
+        assert hashlib.sha256((dist / name).read_bytes()).hexdigest() == digest
+    assert settings_of(dist)["kind"] == "python"
+
+
+def test_a_build_that_fails_leaves_what_was_there(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    def fails(*_: object) -> None:
+        raise InputError("no compiler")
+
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    monkeypatch.setattr(bundle, "run_fmus", fails)
+    with pytest.raises(InputError, match="no compiler"):
+        build(folder)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_runs_share_the_fmus_of_a_kind():
+    assert current_fmus() == current_fmus("python", "2")
+    assert {path.suffix for path in current_fmus().iterdir()} == {".fmu", ".json"}
+    with pytest.raises(InputError, match="'c'"):
+        current_fmus("c")

@@ -1,0 +1,76 @@
+"""Print the house: every module with its first line, every room, and the names that occur twice.
+
+`python tools/house.py --rooms` leaves the modules out.
+"""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from statistics import median
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[1]
+
+#: The folders of the packages.
+PACKAGES = ("src/auv_fmu", "fmus", "orchestrator")
+
+
+class Module(NamedTuple):
+    """A module: its path in the repository, its first line, how long it is, and its classes."""
+
+    path: Path
+    first_line: str
+    lines: int
+    classes: Sequence[str]
+
+    @property
+    def room(self) -> str:
+        """The folder below its package that it is in."""
+        package = next(folder for folder in PACKAGES if self.path.is_relative_to(folder))
+        below = self.path.relative_to(package).parts[:-1]
+        return "/".join((package, *below[:1]))
+
+
+def modules(package: str) -> Iterator[Module]:
+    """All modules of a package."""
+    for path in sorted((ROOT / package).rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        tree = ast.parse(text)
+        first_line = (ast.get_docstring(tree) or "").partition("\n")[0]
+        classes = [node.name for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+        yield Module(path.relative_to(ROOT), first_line, len(text.splitlines()), classes)
+
+
+def names_that_occur_twice() -> dict[str, list[str]]:
+    """Names that several modules or classes of the orchestrator have, and where."""
+    places: Mapping[str, list[str]] = defaultdict(list)
+    for module in modules("orchestrator"):
+        own = [] if module.path.stem.startswith("__") else [module.path.stem]
+        for name in (*own, *module.classes):
+            places[name].append(module.path.as_posix())
+    return {name: found for name, found in places.items() if len(found) > 1}
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Print it."""
+    house = [module for package in PACKAGES for module in modules(package)]
+    rooms: Mapping[str, list[Module]] = defaultdict(list)
+    for module in house:
+        rooms[module.room].append(module)
+        if "--rooms" not in arguments:
+            print(f"{module.path.as_posix():50} {module.lines:4}  {module.first_line}")
+    for room, found in {**rooms, "all": house}.items():
+        lines = [module.lines for module in found]
+        print(f"{room:32} {len(found):4} modules {sum(lines):6} lines, median {median(lines):g}")
+    twice = names_that_occur_twice()
+    for name, found in twice.items():
+        print(f"{name}: {', '.join(found)}")
+    print(f"names that occur twice in the orchestrator: {len(twice)}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,253 @@
+"""Fill in what the pages of docs/ take from the code, and write the schemas for editors.
+
+`python tools/pages.py` writes each file anew that is not as it would be written; a test holds them
+against it. Pages are written by hand but for what stands between `<!-- filled: NAME -->` and
+`<!-- / -->`, which this replaces. `docs/components` and `docs/schemas` are written whole.
+
+The other tools compute what takes minutes, and print it: `accuracy.py` the tables of
+docs/accuracy.md, `study_numbers.py` and `best_gains.py` the numbers below the figures of
+docs/ready-studies.md. `study_pictures.py` draws those figures, `reference.py` writes `reference`.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from functools import cache
+from math import cbrt, radians, sqrt, tan
+from pathlib import Path
+from typing import Any
+
+from pydantic.json_schema import GenerateJsonSchema
+
+from auv_fmu.control_point import ELL
+from auv_fmu.output_feedback import Gains
+from auv_fmu.proof.attraction import Theorem, ball, theorem
+from auv_fmu.proof.zetas import at_least, coupling
+from auv_fmu.saturation import MAXIMUM_SLOPE
+from auv_fmu.vehicle import Vehicle
+from fmus.discovery import components
+from fmus.documentation import page as component_page
+from orchestrator.figures import FIGURES
+from orchestrator.figures.style import printed_unit
+from orchestrator.formats.schema import TomlTable, entries
+from orchestrator.paper.page import table
+from orchestrator.runs.scenario import names, read_scenario
+from orchestrator.runs.scenario_file import EventTable, InputsTable, PathTable, ScenarioFile
+from orchestrator.runs.wiring import read_wiring
+from orchestrator.studies.figure_entries import LABELS
+from orchestrator.studies.study import Study, read_study, ready_studies
+from orchestrator.studies.study_file import FigureTable, StudyFile
+from orchestrator.vehicle.gains import stated
+from orchestrator.vehicle.indices import INDICES, Index
+
+DOCS = Path(__file__).parents[1] / "docs"
+
+#: The pictures of the ready studies, below the folder of the pages, small.
+PICTURES = Path("images", "studies")
+
+_PLACE = re.compile(r"(<!-- filled: (\w+) -->).*?(<!-- / -->)", re.DOTALL)
+
+
+def files() -> dict[Path, str]:
+    """The text of every file that this writes, as it is to be."""
+    filled = {
+        "paper.md": paper(),
+        "ready-studies.md": {
+            "studies": "\n\n".join(map(_section, map(read_study, ready_studies())))
+        },
+        "scenarios.md": scenarios(),
+        "studies.md": studies(),
+    }
+    return {
+        **{DOCS / name: filled_in(DOCS / name, values) for name, values in filled.items()},
+        **{DOCS / "components" / f"{name}.md": component_page(name) for name in components()},
+        DOCS / "schemas" / "scenario.json": _json(ScenarioFile),
+        DOCS / "schemas" / "study.json": _json(StudyFile),
+    }
+
+
+def filled_in(page: Path, values: Mapping[str, str]) -> str:
+    """The text of a page with values in their places; those of several lines are paragraphs.
+
+    Raises:
+        ValueError: the page has no place for a value, or a place for none.
+
+    """
+    text = page.read_text(encoding="utf-8")
+    places = {name for _, name, _ in _PLACE.findall(text)}
+    if places != values.keys():
+        raise ValueError(f"{page.name}: {', '.join(sorted(places ^ values.keys()))}")
+
+    def filled(place: re.Match[str]) -> str:
+        begin, name, end = place.groups()
+        value = values[name]
+        return f"{begin}\n\n{value}\n\n{end}" if "\n" in value else f"{begin}{value}{end}"
+
+    return _PLACE.sub(filled, text)
+
+
+def scenarios() -> dict[str, str]:
+    """Tables of docs/scenarios.md."""
+    wiring = read_wiring()
+    drawn: dict[str, list[str]] = {kind: [] for kind in FIGURES}
+    for name in names():
+        drawn[read_scenario(name).figure].append(f"`{name}`")
+    fmus = (
+        (f"`{name}`", f"[{fmu}](components/{fmu}.md)") for name, fmu in wiring["components"].items()
+    )
+    wires = ((f"`{target}`", f"`{source}`") for target, source in wiring["wires"].items() if source)
+    figures = ((f"`{kind}`", ", ".join(used)) for kind, used in drawn.items())
+    return {
+        "entries": _entries(ScenarioFile),
+        "path": _entries(PathTable),
+        "events": _entries(EventTable),
+        "inputs": _entries(InputsTable),
+        "components": _table("component", "FMU", rows=fmus),
+        "wires": _table("inputs", "are fed by", rows=wires),
+        "figures": _table("`figure`", "as drawn for", rows=figures),
+    }
+
+
+def studies() -> dict[str, str]:
+    """Tables of docs/studies.md."""
+    ready = ((f"`{name}`", read_study(name).title) for name in ready_studies())
+    return {
+        "ready": _table("`auv-fmu sweep`", "what it asks", rows=ready),
+        "entries": _entries(StudyFile),
+        "figures": _entries(FigureTable),
+        "indices": _table("index", "meaning", rows=map(_index, INDICES)),
+    }
+
+
+def _index(index: Index) -> tuple[str, str]:
+    first, *rest = index.columns
+    members = "".join(f" `{name.removeprefix(index.name)}`" for name in rest)
+    unit = f" [{printed_unit(index.unit)}]" if index.unit else ""
+    return f"`{first}`{members}", index.meaning.replace("|", r"\|") + unit
+
+
+def _section(study: Study) -> str:
+    pictures = (
+        f"![{study.title}: {figure}]({(PICTURES / f'{study.name}-{figure}.png').as_posix()})"
+        for figure in study.figures
+        if figure != LABELS
+    )
+    command = f"`auv-fmu sweep {study.name}`"
+    return "\n\n".join([f"## {study.title}", command, *pictures, study.remark.strip()])
+
+
+def _entries(schema: type[TomlTable]) -> str:
+    rows = (
+        (f"`{key}`", *(cell.replace("|", r"\|") for cell in declared))
+        for key, declared in entries(schema).items()
+    )
+    return _table("entry", "value", "meaning", "without it", rows=rows)
+
+
+def _table(*header: str, rows: Iterable[tuple[str, ...]]) -> str:
+    return table(header, list(rows))
+
+
+def _json(table: type[TomlTable]) -> str:
+    """The JSON schema of a file, from which an editor completes and explains its entries."""
+    schema = table.model_json_schema(schema_generator=_WithoutNull)
+    for part in (schema, *schema.get("$defs", {}).values()):
+        for declared in part.get("properties", {}).values():
+            declared.pop("example", None)
+            if declared.get("additionalProperties") is True:
+                # Versions of pydantic differ in whether they say so.
+                del declared["additionalProperties"]
+            if default := declared.pop("without", ""):
+                declared["description"] += f" Without it: {default}."
+    schema = {"$schema": GenerateJsonSchema.schema_dialect, **schema}
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+
+
+class _WithoutNull(GenerateJsonSchema):
+    """Leaves out defaults, of which TOML has none to write, and titles that repeat the key."""
+
+    def default_schema(self, schema: Any) -> dict[str, Any]:
+        return self.generate_inner(schema["schema"])
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        return False
+
+
+@cache
+def of_the_paper() -> Theorem:
+    """The theorem for section 4.1."""
+    return theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE["tanh"])
+
+
+def paper() -> dict[str, str]:
+    """Numbers of docs/paper.md."""
+    vehicle, found = Vehicle(), of_the_paper()
+    first, second, third = found.conditions
+    k, there = coupling(vehicle, ELL), found.bounds.lambda_d2
+    speed, power = found.speed_of_any_gains, found.alpha_1_of_any_gains
+    turning = vehicle.m55 / ELL**3
+    skew = (vehicle.m66 / ELL**2 - vehicle.m11) / ELL
+    of_theta = found.bounds.lambda_M2
+    slow = theorem(vehicle, ELL, Gains(lambda_=0.1), MAXIMUM_SLOPE["tanh"], 0.05)
+
+    def radius(theta: float, eps_t: float) -> float:
+        return ball(theta, eps_t, Gains().sigma)
+
+    return {
+        "theorem": "```\n" + "\n".join(stated(found)) + "\n```",
+        "missing_force": f"{0.1 * turning * vehicle.m11 / vehicle.m33:.1f}",
+        "skew_part": f"{0.2 * skew:.0f}",
+        "power_of_p2_2": f"{-0.5 * vehicle.m66 / ELL**3:.0f}",
+        "c_2_at_80_degrees": f"{turning * tan(radians(80.0)):,.0f}",
+        "c_2_at_89_degrees": f"{turning * tan(radians(89.0)):,.0f}",
+        "radius_factor": f"{sqrt(of_theta * Gains().gamma):.1f}",
+        "lambda_d2": f"{there:g}",
+        "lambda_M2": f"{of_theta:.0f}",
+        "zetas_when_slow": f"{slow.conditions[1].least:.1f}",
+        "k_d_when_slow": f"{slow.conditions[2].least:.1f}",
+        "x_when_slow": f"{slow.x_of_any_gains:.2f}",
+        "verdict_of_30": first.verdict,
+        "left_of_30": f"{first.left:g}",
+        "right_of_30": f"{first.right:g}",
+        "verdict_of_31": second.verdict,
+        "left_of_31": f"{second.left:g}",
+        "right_of_31": f"{second.right:g}",
+        "right_of_31_with_zetas": f"{second.right + second.least:.1f}",
+        "verdict_of_32": third.verdict,
+        "left_of_32": f"{third.left:g}",
+        "right_of_32_with_zetas": f"{third.right + third.least:.1f}",
+        "zetas": f"{second.least:.1f}",
+        "zetas_at_lambda_2": f"{0.5 * at_least(vehicle, ELL, 2.0).zeta_1_2:.1f}",
+        "zetas_of_any_gains": f"{found.zeta_of_any_gains:.1f}",
+        "coupling": f"{k:.1f}",
+        "quarter_of_the_coupling": f"{0.25 * k:.1f}",
+        "largest_speed": f"{speed:.2f}",
+        "half_of_the_largest_speed": f"{speed / 2.0:.2f}",
+        "largest_lambda": f"{2.0 * speed:.2f}",
+        # With vanishing gains (31) asks for k / 4 < d11, and k falls with the cube of ell.
+        "least_ell": f"{ELL * cbrt(found.zeta_of_any_gains / there):.2f}",
+        "ball": f"{radius(0.0, 1.0):.1f}",
+        "ball_of_theta": f"{radius(of_theta, 1.0):.0f}",
+        "ball_at_eps_t_10": f"{radius(0.0, 10.0):.0f}",
+        "ball_of_theta_at_eps_t_10": f"{radius(of_theta, 10.0):.0f}",
+        "alpha_1": f"{found.alphas.alpha_1:g}",
+        "largest_alpha_1": f"{power:.3f}",
+        "largest_eps_t": f"{power / 3.0:.2f}",
+        "x_of_any_gains": f"{found.x_of_any_gains:.2f}",
+        "x_at_most": f"{found.x_at_most:.2f}",
+    }
+
+
+def main() -> None:
+    """Write the files that are not as they are to be."""
+    for path, text in files().items():
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+            print(path)
+
+
+if __name__ == "__main__":
+    main()
