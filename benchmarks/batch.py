@@ -34,7 +34,7 @@ from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import read_study, ready_studies
-from orchestrator.vehicle.signals import NU, POSITION, THETA_HAT
+from orchestrator.vehicle.signals import STANDARD
 
 #: Runs that are timed: noise is drawn in the first.
 _SCENARIOS = ("fig4", "fig5", "fig5-pd")
@@ -117,7 +117,7 @@ def is_straight(engine: BatchEngine, run: Point) -> bool:
     state = before.controller_state
     theta_hat = getattr(state, "theta_hat", state)
     ends = (*last.vehicles.plant.position, *last.scene.plant.nu, *theta_hat)
-    return ends == tuple(table.group(*POSITION, *NU, *THETA_HAT)[-1])
+    return ends == tuple(table.group(*STANDARD.position, *STANDARD.nu, *STANDARD.theta_hat)[-1])
 
 
 def main() -> None:

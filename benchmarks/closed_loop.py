@@ -32,7 +32,7 @@ from auv_fmu.euler import STEP
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.instance import Instance
 from orchestrator.master.fmi.loaded import LoadedInstance
-from orchestrator.master.loop import PYTHON_LOOP, Loop, chosen
+from orchestrator.master.loop import PYTHON_LOOP, Stepping, chosen
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
 from orchestrator.master.schedule import Member
@@ -52,7 +52,7 @@ def timed(function: Callable[[], object]) -> float:
     return perf_counter() - start
 
 
-def loop_time(system: System, steps: int, loop: Loop = PYTHON_LOOP) -> float:
+def loop_time(system: System, steps: int, loop: Stepping = PYTHON_LOOP) -> float:
     """Seconds of the steps of a run whose rows are kept in memory, without its set-up."""
 
     def run(n: int) -> float:
@@ -93,7 +93,7 @@ def master_alone(system: System, steps: int) -> float:
         return loop_time(system, steps)
 
 
-def compiled_alone(system: System, steps: int, loop: Loop) -> float:
+def compiled_alone(system: System, steps: int, loop: Stepping) -> float:
     """Seconds of the steps of the compiled loop when every function it calls does nothing."""
     # One, which is FMI's warning, is all that this one has to say.
     nothing = ctypes.cast(ctypes.pythonapi.Py_IsInitialized, ctypes.c_void_p).value

@@ -34,7 +34,7 @@ from orchestrator.master.observers.selection import Selection
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.vehicle.certificates import CertificatesFile
-from orchestrator.vehicle.metrics import Metrics
+from orchestrator.vehicle.indices import Metrics
 
 #: Parts of a run that are compared, and simulated seconds between the rows that are kept.
 _PARTS, _INTERVAL = 10, 1.0

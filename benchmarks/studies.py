@@ -28,11 +28,12 @@ from orchestrator.runs.request import Request
 from orchestrator.studies import blocks as blocks_module
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.blocks import making
-from orchestrator.studies.engine import INDICES, Engine, Outcome, Point
+from orchestrator.studies.engine import Engine, Outcome, Point
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import store
 from orchestrator.studies.study import study_of
+from orchestrator.vehicle.indices import index_columns
 
 SCENARIO = "fig4"
 
@@ -67,7 +68,7 @@ class Idle(NamedTuple):
     def outcomes(self, runs: Sequence[Point]) -> Iterator[Outcome]:
         """Make nothing."""
         for run in runs:
-            yield Outcome(run.number, dict.fromkeys(INDICES, 0.1 * run.number))
+            yield Outcome(run.number, dict.fromkeys(index_columns(), 0.1 * run.number))
 
 
 class Cost(NamedTuple):
@@ -106,7 +107,7 @@ def keeping(n: int) -> tuple[float, float, float]:
     start = process_time()
     with (
         TemporaryDirectory(prefix="auvfmu") as folder,
-        store(Path(folder), {"made_of": {}}) as unfinished,
+        store(Path(folder), {"made_of": {}}, space.indices) as unfinished,
     ):
         assert unfinished is not None
         with making(Idle(), (space[i] for i in range(n)), workers=1) as blocks:

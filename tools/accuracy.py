@@ -24,7 +24,7 @@ from orchestrator.paper.page import table
 from orchestrator.studies.batch.numbers import flat
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
-from orchestrator.vehicle.signals import Y_D, true_control_point
+from orchestrator.vehicle.signals import STANDARD, true_control_point
 
 Values = Mapping[str, Any]
 
@@ -121,8 +121,10 @@ def whole_loop(runs: Runs) -> None:
             limit = runs.path(name, friction, LIMIT)
             paths = (runs.path(name, {**friction, **values}, h) for values, h in WAYS)
             rows.append([f"`{name}`", said, *(distances(path, limit) for path in paths)])
-    limit = runs.table("fig6", step=LIMIT).group(*Y_D)[:: round(STEP / LIMIT)]
-    planned = (runs.table("fig6", *way).group(*Y_D)[:: round(STEP / way[1])] for way in WAYS)
+    limit = runs.table("fig6", step=LIMIT).group(*STANDARD.y_d)[:: round(STEP / LIMIT)]
+    planned = (
+        runs.table("fig6", *way).group(*STANDARD.y_d)[:: round(STEP / way[1])] for way in WAYS
+    )
     reference = ["the reference", "", *(distances(y_d, limit) for y_d in planned)]
     show(["scenario", "`A_f`", *HEADS], [*sorted(rows), reference])
     for name in ("fig4", "fig5", "fig5-pd"):

@@ -30,16 +30,17 @@ from auv_fmu.vehicle import Vehicle
 from fmus.discovery import components
 from fmus.documentation import page as component_page
 from orchestrator.figures import FIGURES
+from orchestrator.figures.style import printed_unit
 from orchestrator.formats.schema import TomlTable, entries
 from orchestrator.paper.page import table
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.scenario_file import EventTable, InputsTable, PathTable, ScenarioFile
 from orchestrator.runs.wiring import read_wiring
-from orchestrator.studies.engine import REACHED
-from orchestrator.studies.figures.figure_entries import LABELS
+from orchestrator.studies.figure_entries import LABELS
 from orchestrator.studies.study import Study, read_study, ready_studies
 from orchestrator.studies.study_file import FigureTable, StudyFile
 from orchestrator.vehicle.gains import stated
+from orchestrator.vehicle.indices import INDICES, Index
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -110,14 +111,21 @@ def scenarios() -> dict[str, str]:
 
 
 def studies() -> dict[str, str]:
-    """Tables of docs/studies.md, and its number."""
+    """Tables of docs/studies.md."""
     ready = ((f"`{name}`", read_study(name).title) for name in ready_studies())
     return {
         "ready": _table("`auv-fmu sweep`", "what it asks", rows=ready),
         "entries": _entries(StudyFile),
         "figures": _entries(FigureTable),
-        "reached": f"{REACHED:g}",
+        "indices": _table("index", "meaning", rows=map(_index, INDICES)),
     }
+
+
+def _index(index: Index) -> tuple[str, str]:
+    first, *rest = index.columns
+    members = "".join(f" `{name.removeprefix(index.name)}`" for name in rest)
+    unit = f" [{printed_unit(index.unit)}]" if index.unit else ""
+    return f"`{first}`{members}", index.meaning.replace("|", r"\|") + unit
 
 
 def _section(study: Study) -> str:

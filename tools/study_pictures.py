@@ -12,9 +12,10 @@ from tempfile import TemporaryDirectory
 
 from PIL import Image
 
+from orchestrator.figures.study_figures import draw_figures
 from orchestrator.figures.style import SETTINGS
 from orchestrator.runs.preparation import loaded
-from orchestrator.studies.figures import draw_figures, read_figures
+from orchestrator.studies.figure_entries import read_figures
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import StudyResult
 from orchestrator.studies.study import read_study

@@ -17,7 +17,7 @@ from orchestrator.commands.options import (
     status,
 )
 from orchestrator.commands.streams import OK, say, show
-from orchestrator.figures import save
+from orchestrator.figures import Drawn, save
 from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
 from orchestrator.figures.plot import plot, wanted
 from orchestrator.figures.view import page
@@ -25,14 +25,13 @@ from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.observer import Observer
 from orchestrator.master.observers.progress import Progress
-from orchestrator.master.observers.table import Table
 from orchestrator.runs.folder import VIEW, replaced
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.run import Files
 from orchestrator.runs.stored import changed_files, read_record, read_result, table_in
 from orchestrator.system.names import PortName
-from orchestrator.vehicle.signals import CONTROL_POINT
+from orchestrator.vehicle.signals import Loop, loops_of, suffixes
 
 #: Runs of one scenario are told apart by so many parameters.
 _FEW = 2
@@ -92,16 +91,17 @@ def _plot(options: argparse.Namespace) -> int:
     for path in paths:
         _warn(table_in(path))
     runs = [read_result(path, lambda columns: wanted(columns, patterns)) for path in paths]
-    figure = plot(list(zip(_labels(runs, paths), (run[1] for run in runs), strict=True)), patterns)
-    with _written(options.out, options.force) as file:
-        save(figure, file)
+    tables = (run.result for run in runs)
+    figure = plot(list(zip(_labels(runs, paths), tables, strict=True)), patterns)
+    with _written([options.out], options.force) as folder:
+        save(figure, folder / options.out.name)
     return OK
 
 
-def _labels(runs: Sequence[tuple[str, Table]], paths: Sequence[Path]) -> list[str]:
+def _labels(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[str]:
     """What tells runs apart: scenarios, or else a few parameters, or else the ends of paths."""
-    names = [name for name, _ in runs]
-    given = [table.header.parameters for _, table in runs]
+    names = [run.label for run in runs]
+    given = [run.result.header.parameters for run in runs]
     differing = [
         name
         for name in dict.fromkeys(name for values in given for name in values)
@@ -141,16 +141,24 @@ def _view(options: argparse.Namespace) -> int:
     if out.suffix != ".html":
         raise InputError(f"{out}: write a .html")
     _warn(file)
-    name, table = read_result(file)
-    record = read_record(file)
-    title = str(record.get("title") or name)
+    run = read_result(file)
+    title = str(read_record(file).get("title") or run.label)
+    shown = list(_of_vehicles(run, out, title))
     try:
-        text = page(title, table, bool(record.get("z_up")))
+        pages = {file.name: page(heading, one) for one, file, heading in shown}
     except InputError as error:
         raise InputError(f"{options.result}: {error}") from error
-    with _written(out, options.force) as unfinished:
-        unfinished.write_text(text, encoding="utf-8")
+    with _written([file for _, file, _ in shown], options.force) as folder:
+        for name, text in pages.items():
+            (folder / name).write_text(text, encoding="utf-8")
     return OK
+
+
+def _of_vehicles(run: Drawn, path: Path, title: str) -> Iterator[tuple[Drawn, Path, str]]:
+    """A run once for each of its vehicles, with the file and the heading of each."""
+    for loop, vehicle in suffixes(run.loops).items():
+        file = path.with_name(f"{path.stem}{vehicle}{path.suffix}")
+        yield run._replace(loops=[loop]), file, f"{title}, {loop.vehicle}" if vehicle else title
 
 
 def _animate(options: argparse.Namespace) -> int:
@@ -158,20 +166,25 @@ def _animate(options: argparse.Namespace) -> int:
     out = options.out or Path("results", f"{scenario.stem}.gif")
     check_film(out, options.fps)
     prepared = prepare(scenario, system, request(options))
-    seen = VisibleRows()
+    loops = loops_of(prepared.system)
+    seen = VisibleRows({name for loop in loops for name in loop.drawn()})
     observers: list[Observer] = [seen, Progress(scenario.name)]
-    title = scenario.title or scenario.name
-    with _written(out, options.force) as file:
+    run = Drawn(scenario.name, seen, scenario.z_up, loops)
+    films = list(_of_vehicles(run, out, scenario.title or scenario.name))
+    with _written([file for _, file, _ in films], options.force) as folder:
         ending = prepared.run(observers)
-        if missing := seen.missing(*CONTROL_POINT):
-            raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
-        animate(title, seen, file, options.fps, scenario.z_up)
+        for one, file, heading in films:
+            if missing := one.lacks(Loop.for_control_point):
+                raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
+            animate(heading, one, folder / file.name, options.fps)
     return status(scenario.name, ending)
 
 
 @contextmanager
-def _written(path: Path, force: bool) -> Iterator[Path]:
-    """A file to write instead of another, whole or not at all; says where that is."""
-    with replaced(path.parent, [path.name], force=force) as unfinished:
-        yield unfinished / path.name
-    show(path)
+def _written(files: Sequence[Path], force: bool) -> Iterator[Path]:
+    """A folder to write files into that then lie in theirs, whole or not at all; says where."""
+    names = [file.name for file in files]
+    with replaced(files[0].parent, names, force=force) as unfinished:
+        yield unfinished
+    for file in files:
+        show(file)

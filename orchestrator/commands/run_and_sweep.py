@@ -29,7 +29,7 @@ from orchestrator.runs.request import Request
 from orchestrator.runs.run import Files, run_into
 from orchestrator.studies.study import read_study, ready_studies
 from orchestrator.studies.sweep import Means, folder_of, swept
-from orchestrator.vehicle.metrics import LAST_SECONDS
+from orchestrator.vehicle.indices import metrics, of_vehicles
 
 
 def add_run(parser: argparse.ArgumentParser) -> None:
@@ -78,19 +78,14 @@ def _answer(interrupts: Interrupts) -> None:
 
 
 def _print_summary(values: Mapping[str, Any]) -> None:
-    last = min(LAST_SECONDS, values["stop_time"])
-    rows = {
-        "l2_effort": "L2 effort u, q, r [N.s^1/2, N.m.s^1/2]",
-        "peak_command": "peak command u, q, r [N, N.m]",
-        "saturated_fraction": "share of saturated steps u, q, r",
-        "total_variation": "total variation u, q, r [N, N.m]",
-        "final_error": f"largest error x, y, z in the last {last:g} s [m]",
-    }
-    shown = {label: values[key] for key, label in rows.items() if key in values}
-    if shown:
-        show(values["scenario"])
-    for label, numbers in shown.items():
-        show(f"  {label:44}" + "".join(f"{_number(number):>11}" for number in numbers))
+    for vehicle, found in of_vehicles(values).items():
+        measured = [index for index in metrics() if index.name in found]
+        if measured:
+            show(", ".join(filter(None, (values["scenario"], vehicle))))
+        for index in measured:
+            title = f"{index.label} {index.members}" + f" [{index.unit}]" * bool(index.unit)
+            numbers = np.atleast_1d(found[index.name]).tolist()
+            show(f"  {title:44}" + "".join(f"{_number(number):>11}" for number in numbers))
 
 
 def _number(value: float) -> str:

@@ -1,8 +1,8 @@
 """Figures of a run, as far as it has what they show."""
 
-from orchestrator.figures.comparison import overlay
-from orchestrator.figures.drawing import FIGURES, check_figure, draw, figure_files
+from orchestrator.figures.drawing import check_figure, draw, figure_files
 from orchestrator.figures.panels import draw_commands, draw_errors
+from orchestrator.figures.run_figures import FIGURES, overlay
 from orchestrator.figures.style import COLOURS, SETTINGS, STYLES, Drawn, save
 
 __all__ = [

@@ -18,25 +18,13 @@ from PIL import Image
 from auv_fmu.attitude import rotation_from_euler
 from orchestrator.figures.body import PAINT, Z_UP, body
 from orchestrator.figures.layout import Cell
-from orchestrator.figures.panels import draw_commands, over_time, title
+from orchestrator.figures.panels import draw_commands, draw_lines, over_time, title
 from orchestrator.figures.signal import moving_mean
-from orchestrator.figures.style import (
-    COLOURS,
-    REFERENCE,
-    Drawn,
-    heading,
-    styled,
-)
-from orchestrator.figures.tracking import draw_lines
+from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, heading, styled
 from orchestrator.machine.errors import InputError
-from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import (
-    ATTITUDE,
     AXES,
-    COMMANDED,
-    ELL,
-    TRACKING,
-    Y_D,
+    Loop,
     parameter,
     tracking_error,
     true_control_point,
@@ -86,24 +74,21 @@ def check_film(path: Path, fps: int) -> None:
         raise InputError(f"--fps {fps}: write a number from 1 to 50")
 
 
-def animate(
-    text: str, table: Table, path: Path, fps: int = FRAMES_PER_SECOND, z_up: bool = False
-) -> None:
+def animate(text: str, run: Drawn, path: Path, fps: int = FRAMES_PER_SECOND) -> None:
     """Write a film of a run.
 
     Args:
         text: heading.
-        table: with the ports of the plant, and of the planner if there is a reference.
+        run: with the ports of the vehicle, and of the planner if there is a reference.
         path: of a .gif, or of an .mp4 where ffmpeg is installed.
         fps: frames per second.
-        z_up: whether z is up and y west, or down and east.
 
     Raises:
         InputError: the file cannot be written.
 
     """
     check_film(path, fps)
-    frames = _frames(text, table, int(_DURATION * fps), z_up)
+    frames = _frames(text, run, int(_DURATION * fps))
     if path.suffix == ".mp4":
         _write_mp4(frames, path, fps)
     else:
@@ -141,9 +126,9 @@ def _write_mp4(frames: Iterator[Image.Image], path: Path, fps: int) -> None:
         raise InputError(f"{path}: ffmpeg could not write it")
 
 
-def _frames(text: str, table: Table, n: int, z_up: bool) -> Iterator[Image.Image]:
+def _frames(text: str, run: Drawn, n: int) -> Iterator[Image.Image]:
     """Pictures of a run: what does not move is drawn once."""
-    run = Drawn("run", table)
+    table = run.result
     instants = np.linspace(table.time[0], table.time[-1], n)
     rows = np.searchsorted(table.time, instants).clip(0, len(table) - 1)
     with styled():
@@ -151,7 +136,7 @@ def _frames(text: str, table: Table, n: int, z_up: bool) -> Iterator[Image.Image
         canvas: Any = FigureCanvasAgg(figure)
         figure.suptitle(heading(text))
         grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1))
-        scene = _Scene(figure.add_subplot(grid[0]), table, z_up)
+        scene = _Scene(figure.add_subplot(grid[0]), run)
         series = _draw_series(Cell(figure, grid[1]), run)
         markers = [
             axes.axvline(0.0, color="black", linewidth=1.0, animated=True) for axes in series
@@ -171,12 +156,12 @@ def _frames(text: str, table: Table, n: int, z_up: bool) -> Iterator[Image.Image
 
 def _draw_series(cell: Cell, run: Drawn) -> list[Any]:
     """Errors and commands over time, as far as they are there."""
-    table = run.result
-    has_errors, has_commands = (not table.missing(*needs) for needs in (TRACKING, (COMMANDED, ())))
+    has_errors, has_commands = not run.lacks(Loop.for_tracking), not run.lacks(Loop.for_commands)
     panels = cell.stack(has_errors + 3 * has_commands)
     if has_errors:
         labels = [f"$e_{k}$" for k in AXES]
-        draw_lines(panels[0], table.time, tracking_error(table), labels)
+        errors = tracking_error(run.result, run.loop)
+        draw_lines(panels[0], run.result.time, errors, labels)
         panels[0].set_ylabel("error [m]")
         title(panels[0], "tracking errors")
     if has_commands:
@@ -188,18 +173,19 @@ def _draw_series(cell: Cell, run: Drawn) -> list[Any]:
 class _Scene:
     """What a camera sees that follows the vehicle."""
 
-    def __init__(self, axes: Any, table: Table, z_up: bool) -> None:
+    def __init__(self, axes: Any, run: Drawn) -> None:
         self.axes = axes
+        table, loop = run.result, run.loop
         # All is seen in axes whose z is down.
-        self._turn = Z_UP if z_up else np.ones(3)
+        self._turn = Z_UP if run.z_up else np.ones(3)
         axes.set(xlim=(-0.5, 0.5), ylim=(-0.56, 0.56), aspect="equal", adjustable="box")
         axes.set_axis_off()
         self._time = table.time
-        self._y = true_control_point(table) * self._turn
-        self._euler = table.group(*ATTITUDE)
-        self._y_d = None if table.missing(Y_D) else table.group(*Y_D) * self._turn
+        self._y = true_control_point(table, loop) * self._turn
+        self._euler = table.group(*loop.attitude)
+        self._y_d = None if table.missing(loop.y_d) else table.group(*loop.y_d) * self._turn
         self._body = body()
-        nearest = _NEAREST * parameter(table, ELL)
+        nearest = _NEAREST * parameter(table, loop.ell)
         middle, width = self._y, np.full(len(self._y), nearest)
         if self._y_d is not None:
             middle = 0.5 * (self._y + self._y_d)

@@ -1,30 +1,17 @@
-"""Figures by the names that scenarios select them with, drawn into files."""
+"""Figures of runs, drawn into files."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from tqdm import tqdm
 
-from orchestrator.figures.comparison import COMPARISON, COMPARISON_ERRORS, OVERLAY
-from orchestrator.figures.layout import Rows, compose
-from orchestrator.figures.open_loop import SURGE, TURN
-from orchestrator.figures.style import Drawn, save
-from orchestrator.figures.tracking import TRACKING
+from orchestrator.figures.layout import compose
+from orchestrator.figures.run_figures import FIGURES
+from orchestrator.figures.style import FORMATS, Drawn, save
 from orchestrator.machine.errors import InputError, did_you_mean
-
-#: Rows of panels by what the names of their files end with, for each name.
-FIGURES: Mapping[str, Mapping[str, Rows]] = {
-    "tracking": TRACKING,
-    "comparison": COMPARISON,
-    "comparison-errors": COMPARISON_ERRORS,
-    "overlay": OVERLAY,
-    "open-loop-surge": SURGE,
-    "open-loop-turn": TURN,
-}
-
-_FORMATS = ("png", "svg")
+from orchestrator.vehicle.signals import STANDARD, Loop, suffixes
 
 #: Seconds before a bar appears on a terminal.
 _PATIENCE = 2.0
@@ -42,15 +29,21 @@ def check_figure(kind: str) -> None:
         raise InputError(f"no figure {kind!r}{hint}")
 
 
-def figure_files(kind: str, stem: str) -> list[str]:
+def figure_files(kind: str, stem: str, loops: Sequence[Loop] = (STANDARD,)) -> list[str]:
     """The files that :func:`draw` may write.
 
     Args:
         kind: key of :data:`FIGURES`.
         stem: of their names.
+        loops: of the vehicles.
 
     """
-    return [f"{stem}{suffix}.{ending}" for suffix in FIGURES[kind] for ending in _FORMATS]
+    return [
+        f"{stem}{vehicle}{suffix}.{ending}"
+        for vehicle in suffixes(loops).values()
+        for suffix in FIGURES[kind]
+        for ending in FORMATS
+    ]
 
 
 def draw(
@@ -62,6 +55,8 @@ def draw(
     stop: Callable[[], bool] = lambda: False,
 ) -> list[str]:
     """Draw the figures of a scenario, as PNG and SVG, as far as the runs have what they show.
+
+    Of several vehicles each has its own, beside that of its name in the runs it is compared with.
 
     Args:
         kind: key of :data:`FIGURES`.
@@ -76,6 +71,29 @@ def draw(
 
     """
     notes: list[str] = []
+    for i, (loop, vehicle) in enumerate(suffixes(runs[0].loops).items()):
+        of_vehicle = [run._replace(loops=[_same(run, loop, i)]) for run in runs]
+        name = ", ".join(filter(None, (title, loop.vehicle if vehicle and title else "")))
+        notes += _drawn(kind, name, of_vehicle, folder, f"{stem}{vehicle}", stop)
+    return notes
+
+
+def _same(run: Drawn, loop: Loop, i: int) -> Loop:
+    """The loop of a run that is drawn beside one of another: that of the vehicle's name."""
+    named = [own for own in run.loops if own.vehicle == loop.vehicle]
+    return next(iter([*named, *run.loops[i : i + 1], *run.loops]))
+
+
+def _drawn(
+    kind: str,
+    title: str,
+    runs: Sequence[Drawn],
+    folder: Path,
+    stem: str,
+    stop: Callable[[], bool],
+) -> list[str]:
+    """Draw the figures of one vehicle, and say what was left out."""
+    notes: list[str] = []
     bar = tqdm(FIGURES[kind].items(), desc="drawing", delay=_PATIENCE, disable=None, leave=False)
     for suffix, rows in bar:
         if stop():
@@ -83,7 +101,7 @@ def draw(
         figure, left_out = compose(title, rows, runs)
         if figure is not None:
             try:
-                save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in _FORMATS))
+                save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in FORMATS))
                 notes += left_out
             except InputError as error:
                 notes.append(f"{stem}{suffix} left out: {error}")

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 from matplotlib.ticker import MaxNLocator
 
-from orchestrator.figures.style import WIDTH, Drawn, Needs, heading, styled
+from orchestrator.figures.style import WIDTH, Drawn, heading, styled
+from orchestrator.vehicle.signals import Loop, Needs
 
 #: Room for a heading [in].
 _HEADING = 0.3
@@ -45,14 +46,14 @@ class Panel(NamedTuple):
 
     Attributes:
         name: what the note calls it.
-        needs: columns and parameters that a run must have.
+        needs: columns and parameters that a run must have, by the loop that is drawn.
         draw: fills a cell with the runs that have them.
         height: of the cell [in].
 
     """
 
     name: str
-    needs: Needs
+    needs: Callable[[Loop], Needs]
     draw: Callable[[Cell, Sequence[Drawn]], None]
     height: float = 2.6
 
@@ -80,7 +81,7 @@ def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | Non
     drawn = [[panel for panel in row if _shows(panel, runs)] for row in rows]
     drawn = [row for row in drawn if row]
     if not drawn:
-        return None, runs[0].result.missing(*panels[0].needs)
+        return None, runs[0].lacks(panels[0].needs)
     heights = [max(panel.height for panel in row) for row in drawn]
     with styled():
         figure = Figure(figsize=(WIDTH, sum(heights) + _HEADING * bool(title)))
@@ -96,12 +97,12 @@ def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | Non
 
 
 def _shows(panel: Panel, runs: Sequence[Drawn]) -> bool:
-    return any(not run.result.missing(*panel.needs) for run in runs)
+    return any(not run.lacks(panel.needs) for run in runs)
 
 
 def _left_out(panel: Panel, runs: Sequence[Drawn]) -> list[str]:
     """What a panel does not show, and why."""
-    missing = {run.label: run.result.missing(*panel.needs) for run in runs}
+    missing = {run.label: run.lacks(panel.needs) for run in runs}
     if all(missing.values()):
         return [f"{panel.name} left out: no {missing[runs[0].label][0]}"]
     return [

@@ -11,26 +11,28 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, MaxNLocator
 from matplotlib.transforms import Transform
 
+from fmus.ports.quantities import TAU
 from orchestrator.figures.layout import Cell, Panel
 from orchestrator.figures.signal import draw_signal, mean_window
-from orchestrator.figures.style import REFERENCE, Drawn, earth_axes, having, plain
+from orchestrator.figures.style import (
+    COLOURS,
+    REFERENCE,
+    STYLES,
+    Drawn,
+    earth_axes,
+    having,
+    plain,
+    printed_unit,
+)
 from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import (
     ACTUATORS,
     AXES,
-    COMMANDED,
-    CONTROL_POINT,
-    LIMITS,
-    LOWER_LIMITS,
-    TRACKING,
-    UPPER_LIMITS,
-    Y_D,
-    parameter,
+    Loop,
+    limits,
     tracking_error,
     true_control_point,
 )
-
-_ACTUATOR_UNITS = ("N", "N·m", "N·m")
 
 #: An axis of a path is at least this share of the longest: a straight line lies in a box.
 _FLATTEST = 0.3
@@ -61,13 +63,13 @@ def _path(cell: Cell, runs: Sequence[Drawn]) -> None:
     """Paths of control points and their reference in three dimensions."""
     axes = cell.axes(projection="3d")
     paths = []
-    for run, _ in list(having(runs, (Y_D, ())))[:1]:
-        paths.append(run.result.group(*Y_D))
+    for run, _ in list(having(runs, Loop.for_reference))[:1]:
+        paths.append(run.result.group(*run.loop.y_d))
         axes.plot(*paths[0].T, color=REFERENCE, linestyle="--", linewidth=1, label="reference")
         axes.scatter(*paths[0][0], color=REFERENCE, marker="s", s=20, label="its start")
-    shown = list(having(runs, CONTROL_POINT))
+    shown = list(having(runs, Loop.for_control_point))
     for i, (run, colour) in enumerate(shown):
-        y = true_control_point(run.result)
+        y = true_control_point(run.result, run.loop)
         paths.append(y)
         label = plain(run.label) if len(shown) > 1 else "control point"
         axes.plot(*y.T, color=colour, linewidth=_THIN if i else _THICK, label=label)
@@ -105,6 +107,27 @@ def _frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
     # Below a flat box the names of the axes would lie upon their numbers, and beside it far away.
     axes.xaxis.labelpad = axes.yaxis.labelpad = 8 * flat - 2
     axes.zaxis.labelpad = 4 - 8 * flat
+
+
+def draw_lines(
+    axes: Axes, time: np.ndarray, values: np.ndarray, labels: Sequence[str], twin: str | None = None
+) -> None:
+    """One line for each column of values.
+
+    Args:
+        axes: to draw into.
+        time: of the rows of values [s].
+        values: (rows, lines).
+        labels: of the lines.
+        twin: the name of a run whose lines are thin and black; None: the run itself.
+
+    """
+    for i, (column, label) in enumerate(zip(values.T, labels, strict=True)):
+        if twin is None:
+            line: Any = {"color": COLOURS[i], "linestyle": STYLES[i], "label": label}
+        else:
+            line = {"color": "black", "linewidth": 0.7, "label": None if i else plain(twin)}
+        axes.plot(time, column, **line)
 
 
 def title(axes: Axes, text: str) -> None:
@@ -167,8 +190,8 @@ def draw_errors(
     logarithmic: bool = False,
 ) -> None:
     """Tracking errors of some runs, an axis a panel."""
-    for i, (run, colour) in enumerate(having(runs, TRACKING)):
-        errors = tracking_error(run.result)
+    for i, (run, colour) in enumerate(having(runs, Loop.for_tracking)):
+        errors = tracking_error(run.result, run.loop)
         for axes, error in zip(panels, (np.abs(errors) if logarithmic else errors).T, strict=True):
             axes.plot(run.result.time, error, **_line(i, run, colour))
     for k, axes in zip(AXES, panels, strict=True):
@@ -191,12 +214,12 @@ def draw_commands(
     panels: Sequence[Axes], runs: Sequence[Drawn], name: str = "commanded control signals"
 ) -> None:
     """Commands of some runs and the limits of (3), an actuator a panel."""
-    shown = list(having(runs, (COMMANDED, ())))
-    limited = [run.result for run, _ in having(runs, ((), LIMITS))]
+    shown = list(having(runs, Loop.for_commands))
+    limited = [run for run, _ in having(runs, Loop.for_limits)]
     has_means = False
-    for k, axes, unit in zip(range(3), panels, _ACTUATOR_UNITS, strict=True):
+    for k, axes, unit in zip(range(3), panels, map(printed_unit, TAU.values()), strict=True):
         for i, (run, colour) in enumerate(shown):
-            command = partial(_command, COMMANDED[k])
+            command = partial(_command, run.loop.commanded[k])
             has_means |= draw_signal(axes, run.result, command, **_line(i, run, colour))
         axes.set_ylabel(rf"$\tau_{ACTUATORS[k]}$ [{unit}]")
         if limited:
@@ -211,13 +234,13 @@ def _command(column: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
     return np.append(table.step_start, table.time[-1]), np.append(command, command[-1])
 
 
-def _show_limits(axes: Axes, k: int, runs: Sequence[Drawn], limited: Table, unit: str) -> None:
+def _show_limits(axes: Axes, k: int, runs: Sequence[Drawn], limited: Drawn, unit: str) -> None:
     """Limits of an actuator, and how far commands go that are cut off."""
-    lower, upper = parameter(limited, LOWER_LIMITS[k]), parameter(limited, UPPER_LIMITS[k])
+    lower, upper = (float(limit[k]) for limit in limits(limited.result, limited.loop))
     words = (
         f"limits ±{upper:g} {unit}" if lower == -upper else f"limits {lower:g}, {upper:g} {unit}"
     )
-    peaks = {run.label: _peak(run.result[COMMANDED[k]]) for run in runs}
+    peaks = {run.label: _peak(run.result[run.loop.commanded[k]]) for run in runs}
     if max(peaks.values()) < _NEAR * min(upper, -lower):
         bottom, top = axes.get_ylim()
         axes.set_ylim(bottom, top + 0.2 * (top - bottom))
@@ -260,7 +283,9 @@ def _commands(cell: Cell, runs: Sequence[Drawn]) -> None:
     draw_commands(cell.stack(3), runs)
 
 
-PATH = Panel("path", CONTROL_POINT, _path, 3.4)
-ERRORS = Panel("tracking errors", TRACKING, _errors, 4.0)
-LOGARITHMIC_ERRORS = Panel("logarithmic tracking errors", TRACKING, _logarithmic_errors, 4.0)
-COMMANDS = Panel("commands", (COMMANDED, ()), _commands, 4.0)
+PATH = Panel("path", Loop.for_control_point, _path, 3.4)
+ERRORS = Panel("tracking errors", Loop.for_tracking, _errors, 4.0)
+LOGARITHMIC_ERRORS = Panel(
+    "logarithmic tracking errors", Loop.for_tracking, _logarithmic_errors, 4.0
+)
+COMMANDS = Panel("commands", Loop.for_commands, _commands, 4.0)

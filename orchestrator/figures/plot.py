@@ -14,11 +14,10 @@ from matplotlib.lines import Line2D
 
 from orchestrator.figures.panels import over_time
 from orchestrator.figures.signal import draw_signal
-from orchestrator.figures.style import COLOURS, STYLES, WIDTH, Drawn, plain, styled
+from orchestrator.figures.style import COLOURS, STYLES, WIDTH, Drawn, plain, printed_unit, styled
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.selection import matches, matching
 from orchestrator.master.observers.table import Table
-from orchestrator.vehicle.signals import unit_of
 
 #: What is drawn where nothing is asked for, as far as it is there.
 DEFAULT = ("controller.e", "plant.tau", "controller.theta_hat")
@@ -67,9 +66,12 @@ def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Fig
     if not patterns:
         groups = dict.fromkeys(map(group_of, names))
         raise InputError(f"name the columns to draw; there are {', '.join(groups)}")
+    units = {name: unit for _, table in runs for name, unit in table.header.units.items()}
     panels: dict[tuple[str, str], list[str]] = {}
     for name in matching(names, patterns):
-        panels.setdefault((group_of(name), unit_of(name)), []).append(name)
+        # The members of a vector share a panel, whatever their units.
+        unit = "" if name.endswith("]") else printed_unit(units.get(name, ""))
+        panels.setdefault((group_of(name), unit), []).append(name)
     with styled():
         figure = Plot(figsize=(WIDTH, _MARGIN + _PANEL * len(panels)))
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import cycle
 from pathlib import Path
@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.table import Table
+from orchestrator.vehicle.signals import STANDARD, Loop, Needs
 
 #: Okabe and Ito's colours, which stay apart for colour-blind eyes, darkest first; every line
 #: also has a style of its own, for print.
@@ -59,8 +60,12 @@ _GREEK = {
     **{name: name for name in ("alpha", "beta", "delta", "eta", "nu", "theta", "epsilon")},
     "eps": "epsilon",
 }
+_RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SYMBOL = re.compile(rf"(?<![\w\\.])({'|'.join(_GREEK)}|[A-Za-z])_([A-Za-z0-9]+)(?!\w)")
 
+
+#: What figures are written as.
+FORMATS = ("png", "svg")
 
 #: What a file would say of its time and tool, by its ending.
 _NO_DATE: dict[str, Any] = {
@@ -77,12 +82,23 @@ class Drawn(NamedTuple):
         label: that tells it from others.
         result: its rows.
         z_up: whether z is up and y west where its path is drawn (reading 16); or down, and east.
+        loops: of its vehicles; the first is the one that is drawn.
 
     """
 
     label: str
     result: Table
     z_up: bool = False
+    loops: Sequence[Loop] = (STANDARD,)
+
+    @property
+    def loop(self) -> Loop:
+        """The loop that is drawn."""
+        return self.loops[0]
+
+    def lacks(self, needs: Callable[[Loop], Needs]) -> list[str]:
+        """What of that which something needs is not there."""
+        return self.result.missing(*needs(self.loop))
 
 
 def earth_axes(z_up: bool) -> tuple[str, str, str]:
@@ -92,15 +108,17 @@ def earth_axes(z_up: bool) -> tuple[str, str, str]:
     return "x north [m]", "y east [m]", "z down [m]"
 
 
-#: Columns, and parameters, that something needs: what :meth:`Table.missing` takes.
-Needs = tuple[Sequence[str], Sequence[str]]
-
-
-def having(runs: Sequence[Drawn], needs: Needs) -> Iterator[tuple[Drawn, str]]:
+def having(runs: Sequence[Drawn], needs: Callable[[Loop], Needs]) -> Iterator[tuple[Drawn, str]]:
     """The runs that have what is needed, each with its own colour whichever others have."""
     for run, colour in zip(runs, cycle(COLOURS), strict=False):
-        if not run.result.missing(*needs):
+        if not run.lacks(needs):
             yield run, colour
+
+
+def printed_unit(unit: str) -> str:
+    """A unit of FMI's as it is printed: N.m as N·m, m/s2 as m/s²."""
+    text = unit.replace("s^1/2", "√s").replace(".", "·")
+    return re.sub(r"(?<=[A-Za-z])\d+", lambda power: power[0].translate(_RAISED), text)
 
 
 def plain(text: str) -> str:

@@ -13,24 +13,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_fmu.attitude import rotation_from_euler
+from fmus.ports.quantities import TAU, THETA
 from orchestrator.figures.body import PAINT, Z_UP, body
-from orchestrator.figures.style import COLOURS, REFERENCE, earth_axes
+from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, earth_axes, printed_unit
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import (
-    ACTUATORS,
-    ATTITUDE,
     AXES,
-    COMMANDED,
-    CONTROL_POINT,
-    DY,
-    DY_HAT,
-    LIMITS,
-    LOWER_LIMITS,
-    THETA_HAT,
-    TRACKING,
-    UPPER_LIMITS,
-    Y_D,
+    Loop,
+    limits,
     parameter,
     tracking_error,
     true_control_point,
@@ -64,13 +55,12 @@ class _Lines(NamedTuple):
     limits: Sequence[float] = ()
 
 
-def page(title: str, table: Table, z_up: bool = False) -> str:
+def page(title: str, run: Drawn) -> str:
     """A page of a run that needs no other file.
 
     Args:
         title: heading.
-        table: of the run.
-        z_up: whether z is up and y west, or down and east.
+        run: that is shown.
 
     Raises:
         InputError: plotly is not installed, or the run has no vehicle.
@@ -78,10 +68,10 @@ def page(title: str, table: Table, z_up: bool = False) -> str:
     """
     if find_spec("plotly") is None:
         raise InputError("view needs plotly: pip install 'auv-fmu[view]'")
-    if missing := table.missing(*CONTROL_POINT):
+    if missing := run.lacks(Loop.for_control_point):
         raise InputError(f"has no vehicle to show: no {missing[0]}")
-    panels, notes = _panels(table)
-    data = _frames(table, z_up) | {"series": _series(panels)}
+    panels, notes = _panels(run)
+    data = _frames(run) | {"series": _series(panels)}
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     fields = {
         "title": html.escape(title),
@@ -96,48 +86,46 @@ def page(title: str, table: Table, z_up: bool = False) -> str:
     )
 
 
-def _panels(table: Table) -> tuple[list[_Lines], list[str]]:
+def _panels(run: Drawn) -> tuple[list[_Lines], list[str]]:
     """What is shown over time, and what is left out, and why."""
     panels: list[_Lines] = []
     notes: list[str] = []
     for name, needs, lines in (
-        ("tracking errors", TRACKING, _errors),
-        ("commands", (COMMANDED, ()), _commands),
-        ("estimated parameters", (THETA_HAT, ()), _estimates),
-        ("velocity", ((*DY, *DY_HAT), ()), _velocities),
+        ("tracking errors", Loop.for_tracking, _errors),
+        ("commands", Loop.for_commands, _commands),
+        ("estimated parameters", Loop.for_parameter_estimates, _estimates),
+        ("velocity", Loop.for_velocity_estimates, _velocities),
     ):
-        if missing := table.missing(*needs):
+        if missing := run.lacks(needs):
             notes.append(f"{name} left out: no {missing[0]}")
         else:
-            panels += lines(table)
+            panels += lines(run.result, run.loop)
     return panels, notes
 
 
-def _errors(table: Table) -> Iterator[_Lines]:
+def _errors(table: Table, loop: Loop) -> Iterator[_Lines]:
     names = [f"e<sub>{k}</sub>" for k in AXES]
-    yield _Lines("tracking errors [m]", names, table.time, tracking_error(table))
+    yield _Lines("tracking errors [m]", names, table.time, tracking_error(table, loop))
 
 
-def _commands(table: Table) -> Iterator[_Lines]:
-    for k, column in enumerate(COMMANDED):
-        bounds = () if table.missing((), LIMITS) else (LOWER_LIMITS[k], UPPER_LIMITS[k])
-        limits = [parameter(table, name) for name in bounds]
-        name = f"τ<sub>{ACTUATORS[k]}</sub>"
-        unit = "N·m" if k else "N"
-        values = table.step_values(column)
-        yield _Lines(f"command {name} [{unit}]", [name], table.step_start, values, limits)
+def _commands(table: Table, loop: Loop) -> Iterator[_Lines]:
+    ends = [] if table.missing(*loop.for_limits()) else limits(table, loop)
+    for k, (column, (actuator, unit)) in enumerate(zip(loop.commanded, TAU.items(), strict=True)):
+        name = f"τ<sub>{actuator}</sub>"
+        values, bounds = table.step_values(column), [float(end[k]) for end in ends]
+        yield _Lines(
+            f"command {name} [{printed_unit(unit)}]", [name], table.step_start, values, bounds
+        )
 
 
-def _estimates(table: Table) -> Iterator[_Lines]:
-    names = [
-        f"θ̂<sub>{i}</sub> [{unit}]" for i, unit in enumerate(("N", "kg/s", "kg/m", "kg"), start=1)
-    ]
-    values = table.step_values(*THETA_HAT)
+def _estimates(table: Table, loop: Loop) -> Iterator[_Lines]:
+    names = [f"θ̂<sub>{i}</sub> [{unit}]" for i, unit in THETA.items()]
+    values = table.step_values(*loop.theta_hat)
     yield _Lines("estimated parameters", names, table.step_start, values)
 
 
-def _velocities(table: Table) -> Iterator[_Lines]:
-    estimates, truth = table.step_values(*DY_HAT), table.start_values(*DY)
+def _velocities(table: Table, loop: Loop) -> Iterator[_Lines]:
+    estimates, truth = table.step_values(*loop.dy_hat), table.start_values(*loop.dy)
     for k, axis in enumerate(AXES):
         values = np.column_stack((estimates[:, k], truth[:, k]))
         yield _Lines(f"velocity in {axis} [m/s]", ["estimated", "true"], table.step_start, values)
@@ -228,14 +216,15 @@ def extremes(values: np.ndarray, divisions: int) -> np.ndarray:
     return rows
 
 
-def _frames(table: Table, z_up: bool) -> dict[str, Any]:
+def _frames(run: Drawn) -> dict[str, Any]:
     """The scene, and what moves in it."""
-    y, time = true_control_point(table), table.time
+    table, loop, z_up = run.result, run.loop, run.z_up
+    y, time = true_control_point(table, loop), table.time
     paths = [y]
-    if not table.missing(Y_D):
-        paths.append(table.group(*Y_D))
+    if not table.missing(loop.y_d):
+        paths.append(table.group(*loop.y_d))
     lower, upper = np.min(np.vstack(paths), axis=0), np.max(np.vstack(paths), axis=0)
-    length = max(_SHARE * float((upper - lower).max()), _LENGTH * parameter(table, "plant.ell"))
+    length = max(_SHARE * float((upper - lower).max()), _LENGTH * parameter(table, loop.ell))
     instants = np.linspace(time[0], time[-1], _FRAMES)
     rows = np.unique(np.searchsorted(time, instants).clip(0, len(time) - 1))
     frames: dict[str, Any] = {
@@ -243,7 +232,7 @@ def _frames(table: Table, z_up: bool) -> dict[str, Any]:
         "position": [_numbers(point) for point in y[rows]],
         "rotation": [
             _numbers(np.ravel(rotation_from_euler(*euler)))
-            for euler in table.group(*ATTITUDE)[rows].tolist()
+            for euler in table.group(*loop.attitude)[rows].tolist()
         ],
     }
     traces = []

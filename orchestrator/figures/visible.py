@@ -10,7 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
-from orchestrator.vehicle.signals import DRAWN
+from orchestrator.vehicle.signals import STANDARD
 
 #: Runs of no more rows than this are kept whole.
 _WHOLE = 20_000
@@ -54,7 +54,7 @@ class VisibleRows(Table):
 
     """
 
-    def __init__(self, watched: Collection[str] = DRAWN) -> None:
+    def __init__(self, watched: Collection[str] = STANDARD.drawn()) -> None:
         """Start without rows.
 
         Args:

@@ -46,8 +46,8 @@ class Steps(Protocol):
         """
 
 
-class Loop(NamedTuple):
-    """A loop, and its name in records."""
+class Stepping(NamedTuple):
+    """A way to make the steps, and its name in records."""
 
     name: str
     steps: Steps
@@ -79,10 +79,10 @@ def interpreted(run: Run) -> Iterator[None]:
 
 
 #: The loop that is always there.
-PYTHON_LOOP = Loop("python", interpreted)
+PYTHON_LOOP = Stepping("python", interpreted)
 
 
-def chosen(wanted: str, experiment: Experiment, isolation: Isolation | None = None) -> Loop:
+def chosen(wanted: str, experiment: Experiment, isolation: Isolation | None = None) -> Stepping:
     """The loop for a run.
 
     Args:
@@ -109,8 +109,8 @@ def chosen(wanted: str, experiment: Experiment, isolation: Isolation | None = No
     return PYTHON_LOOP
 
 
-def _compiled(library: CDLL) -> Loop:
-    return Loop("compiled", partial(stepped, library))
+def _compiled(library: CDLL) -> Stepping:
+    return Stepping("compiled", partial(stepped, library))
 
 
 def to_its_end(steps: Steps, run: Run) -> Iterator[None]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from time import monotonic
 
@@ -19,13 +19,13 @@ from orchestrator.master.fmi.placement import placed
 from orchestrator.master.fmi.surroundings import Surroundings, default_mode
 from orchestrator.master.gathering import Overrides
 from orchestrator.master.hooks.hook import Hook, Hooks, Run
-from orchestrator.master.loop import PYTHON_LOOP, Loop, to_its_end
+from orchestrator.master.loop import PYTHON_LOOP, Stepping, to_its_end
 from orchestrator.master.observers.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.plan import Plan
 from orchestrator.master.row import Row
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from orchestrator.system.values import literal, same
+from orchestrator.system.values import literal, same, unit_of
 
 
 # What overflows on its way is named as the value of a port.
@@ -35,7 +35,7 @@ def simulate(
     plan: Plan,
     observers: Sequence[Observer] = (),
     isolation: Isolation | None = None,
-    loop: Loop = PYTHON_LOOP,
+    loop: Stepping = PYTHON_LOOP,
     hooks: Sequence[Hook] = (),
     exchange: Exchange = OURS,
 ) -> Ending:
@@ -74,7 +74,9 @@ def simulate(
             names = tuple(map(str, row.columns))
             parameters = _parameters(system, instances, log)
             strings = dict.fromkeys(map(str, row.text_ports), row.strings)
-            header = Header(names, experiment, parameters, loop.name, strings)
+            header = Header(
+                names, experiment, parameters, loop.name, strings, _units(system, row.columns)
+            )
         scheduled, gatherings = coupling.schedule()
         if watched := coupling.delayed_ports():
             observers = [*observers, Growth(watched)]
@@ -128,7 +130,7 @@ def completed(plan: Plan, observers: Sequence[Observer] = (), exchange: Exchange
         raise InputError(f"{plan.system.name} {ending.failure}")
 
 
-def _possible_loop(loop: Loop, instances: Mapping[str, Instance], log: Log) -> Loop:
+def _possible_loop(loop: Stepping, instances: Mapping[str, Instance], log: Log) -> Stepping:
     """The loop, or the one in Python where the other has nothing to call."""
     apart = [name for name, instance in instances.items() if not instance.is_here]
     if not apart or loop == PYTHON_LOOP:
@@ -163,6 +165,15 @@ def _parameters(
     return parameters
 
 
+def _units(system: System, columns: Iterable[PortName]) -> dict[str, str]:
+    """The units of columns that have one."""
+    units = {
+        str(name): unit_of(system.components[name.component].variables[name.port])
+        for name in columns
+    }
+    return {name: unit for name, unit in units.items() if unit is not None}
+
+
 def _terminate(instances: Mapping[str, Instance]) -> None:
     """Let FMUs end what they have begun; the rows are there whether they can or not."""
     for instance in instances.values():
@@ -172,7 +183,7 @@ def _terminate(instances: Mapping[str, Instance]) -> None:
 
 def _advance(
     run: Run,
-    loop: Loop,
+    loop: Stepping,
     hooks: Hooks,
     order: Sequence[str],
     surroundings: Surroundings,

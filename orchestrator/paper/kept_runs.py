@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -23,9 +23,9 @@ from orchestrator.master.observers.table import Table
 from orchestrator.runs.folder import opened
 from orchestrator.runs.preparation import Prepared, prepared_of
 from orchestrator.runs.request import Request
-from orchestrator.runs.run import metrics_json
 from orchestrator.system.names import port_name
-from orchestrator.vehicle.metrics import Metrics
+from orchestrator.vehicle.indices import Metrics
+from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,13 @@ class KeptRun:
     Attributes:
         metrics: as in metrics.json; `failure` alone for a run that could not be made.
         table: the rows that can be seen, which are all rows of a run of the paper.
+        loops: of its vehicles.
 
     """
 
     metrics: Mapping[str, Any]
     table: Table
+    loops: Sequence[Loop] = (STANDARD,)
 
     @property
     def failure(self) -> str | None:
@@ -147,11 +149,14 @@ def _make(run: Request, key: str) -> KeptRun:
         prepared = prepared_of(run)
         if key_of(prepared) != key:
             raise InputError("FMUs have changed while the report was made; make it anew")
-        metrics, seen = Metrics(), VisibleRows()
+        loops = loops_of(prepared.system)
+        metrics = Metrics(loops)
+        seen = VisibleRows({name for loop in loops for name in loop.drawn()})
         prepared.run([metrics, seen])
     except InputError as error:
         return KeptRun({"failure": str(error)}, Table())
-    return KeptRun(metrics_json(metrics, prepared), Table.of(seen.header, seen.rows, seen.ending))
+    values = metrics.content(prepared.scenario.name, prepared.system)
+    return KeptRun(values, Table.of(seen.header, seen.rows, seen.ending), loops)
 
 
 def _write(file: Path, kept_run: KeptRun) -> None:
@@ -163,6 +168,7 @@ def _write(file: Path, kept_run: KeptRun) -> None:
         "parameters": {str(name): value for name, value in header.parameters.items()},
         "messages": kept_run.table.ending.messages,
         "events": kept_run.table.ending.events,
+        "loops": [asdict(loop) for loop in kept_run.loops],
     }
     # A column together: one that is constant then takes no room.
     np.savez_compressed(file, text=json.dumps(text), columns=kept_run.table.rows.T)
@@ -178,4 +184,5 @@ def _read(file: Path) -> KeptRun:
     )
     events = tuple(Occurrence(*event) for event in text["events"])
     ending = Ending(messages=tuple(text["messages"]), events=events)
-    return KeptRun(text["metrics"], Table.of(header, rows, ending))
+    loops = tuple(Loop(**names) for names in text["loops"])
+    return KeptRun(text["metrics"], Table.of(header, rows, ending), loops)

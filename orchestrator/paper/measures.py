@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from orchestrator.master.observers.table import Table
-from orchestrator.studies.engine import REACHED
-from orchestrator.vehicle.signals import APPLIED, THETA_HAT, tracking_error
+from orchestrator.vehicle.indices import REACHED
+from orchestrator.vehicle.signals import STANDARD, tracking_error
 
 #: Control efforts of section 4.2, in the order u, q, r.
 EFFORT_PROPOSED, EFFORT_PD = (130.0, 40.0, 53.0), (235.0, 163.0, 172.0)
@@ -77,7 +77,7 @@ def approach_of(table: Table, error: np.ndarray | None = None) -> Approach | Non
     if not near[first] or not first:
         return None
     # A row holds what was applied in the step that ends there: the first one holds none.
-    force = table[APPLIED[0]][1 : first + 1]
+    force = table[STANDARD.applied[0]][1 : first + 1]
     return Approach(float(table.time[first]), float(force @ np.diff(table.time[: first + 1])))
 
 
@@ -89,7 +89,7 @@ def turning_radius(table: Table) -> float:
 
 def total_variation_until(table: Table, stop_time: float) -> float:
     """Sum of |difference| of the three applied signals up to a time."""
-    applied = table.group(*APPLIED)[table.time <= stop_time]
+    applied = table.group(*STANDARD.applied)[table.time <= stop_time]
     return float(np.abs(np.diff(applied[1:], axis=0)).sum())
 
 
@@ -100,4 +100,4 @@ def largest_error_after(table: Table, start: float) -> float:
 
 def largest_estimate(table: Table) -> float:
     """Largest component of theta_hat in a run."""
-    return float(table.group(*THETA_HAT).max())
+    return float(table.group(*STANDARD.theta_hat).max())

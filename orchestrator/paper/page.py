@@ -5,14 +5,18 @@ from __future__ import annotations
 import base64
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby, pairwise
+from operator import itemgetter
 from pathlib import Path
 from string import Template
 from typing import NamedTuple
 
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
+
+from fmus.ports.quantities import TAU
+from orchestrator.figures.style import printed_unit
 
 
 def numbers(values: Sequence[float]) -> str:
@@ -28,7 +32,14 @@ def actuator_values(values: Sequence[float], times: str = "") -> str:
         times: what newtons and newton metres are multiplied by.
 
     """
-    return f"{values[0]:.3g} N{times}; {numbers(values[1:])} N·m{times}"
+    return values_with_units(values, [f"{printed_unit(unit)}{times}" for unit in TAU.values()])
+
+
+def values_with_units(values: Sequence[float], units: Iterable[str]) -> str:
+    """A few values, of which neighbours share their unit."""
+    shared = groupby(zip(values, units, strict=True), key=itemgetter(1))
+    parts = ((numbers([value for value, _ in pairs]), unit) for unit, pairs in shared)
+    return "; ".join(" ".join(filter(None, part)) for part in parts)
 
 
 def plain(text: str) -> str:

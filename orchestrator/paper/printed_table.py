@@ -30,7 +30,7 @@ from orchestrator.paper.sensitivity import (
 from orchestrator.paper.variants import all_variants
 from orchestrator.runs.folder import replaced
 from orchestrator.runs.record import PACKAGES, Stopwatch, write_files
-from orchestrator.studies.engine import REACHED
+from orchestrator.vehicle.indices import REACHED
 from orchestrator.vehicle.signals import ACTUATORS, AXES
 
 #: The score is told of so much less and more than T_f [s], for e_f moves with the waves.

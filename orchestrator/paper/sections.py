@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fmus.kinds import PYTHON
 from orchestrator.figures import FIGURES, Drawn, draw
+from orchestrator.figures.style import printed_unit
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.paper.kept_runs import KeptRun, KeptRuns
-from orchestrator.paper.page import actuator_values, numbers, picture, plain, table
+from orchestrator.paper.page import picture, plain, table, values_with_units
 from orchestrator.runs.folder import inner
 from orchestrator.runs.preparation import Prepared, prepared_of, with_companion
 from orchestrator.runs.request import Request
@@ -22,19 +25,11 @@ from orchestrator.runs.scenario import Scenario, read_scenario
 from orchestrator.studies.study import Study, read_study, ready_studies
 from orchestrator.studies.sweep import Means, swept
 from orchestrator.system.names import file_name, port_name
+from orchestrator.vehicle.indices import metrics as indices
+from orchestrator.vehicle.indices import of_vehicles
 
 #: The parameter that decides whether a run has a twin without noise.
 _NOISE = "plant.noise.std"
-
-#: Rows of the table of indices: keys of metrics.json, what they are, and how they are written.
-_INDICES: Sequence[tuple[str, str, Callable[[Sequence[float]], str]]] = (
-    ("l2_effort", "L2 effort (u; q, r)", lambda values: actuator_values(values, "·√s")),
-    ("rms_effort", "RMS effort (59) (u; q, r)", actuator_values),
-    ("peak_command", "peak command (u; q, r)", actuator_values),
-    ("saturated_fraction", "share of saturated steps (u, q, r)", numbers),
-    ("total_variation", "total variation (u; q, r)", actuator_values),
-    ("final_error", "e_f of the last 5 s (x, y, z)", lambda values: f"{numbers(values)} m"),
-)
 
 
 @dataclass(frozen=True)
@@ -159,7 +154,7 @@ def draw_section(section: Section, kept_runs: Sequence[KeptRun], folder: Path) -
     if kind not in FIGURES:
         return [f"no figure: there is none of the name {kind!r}{did_you_mean(kind, FIGURES)}"]
     runs = [
-        Drawn(label, kept_run.table, section.scenario.z_up)
+        Drawn(label, kept_run.table, section.scenario.z_up, kept_run.loops)
         for label, kept_run in zip(section.runs, kept_runs, strict=True)
         if len(kept_run.table)
     ]
@@ -195,8 +190,13 @@ def written(
     for label, kept_run in made.items():
         if kept_run.failure is not None:
             yield f"**The run {plain(label)} ended early:** {plain(kept_run.failure)}"
-    if rows := list(_indices([kept_run.metrics for kept_run in made.values()])):
-        yield table(["index", *map(plain, made)], rows)
+    of = {
+        ", ".join(filter(None, (label, vehicle))): found
+        for label, kept_run in made.items()
+        for vehicle, found in of_vehicles(kept_run.metrics).items()
+    }
+    if rows := list(_indices(list(of.values()))):
+        yield table(["index", *map(plain, of)], rows)
     reaching = own.metrics.get("velocities_reaching_controller")
     if reaching is not None:
         names = ", ".join(f"`{name}`" for name in reaching) or "none"
@@ -212,9 +212,17 @@ def written(
 
 
 def _indices(metrics: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
-    for key, name, write in _INDICES:
-        if any(key in values for values in metrics):
-            yield [name, *(write(values[key]) if key in values else "" for values in metrics)]
+    for index in indices():
+        if any(index.name in values for values in metrics):
+            units = [printed_unit(unit) for unit in index.units.values()]
+            cells = (
+                values_with_units(np.atleast_1d(values[index.name]).tolist(), units)
+                if index.name in values
+                else ""
+                for values in metrics
+            )
+            members = f" ({index.members})" * (len(index.units) > 1)
+            yield [f"{index.label}{members}", *cells]
 
 
 def _ours(scenario: Scenario) -> Iterator[str]:

@@ -30,7 +30,7 @@ from orchestrator.paper.measures import (
     Approach,
     sum_without_step,
 )
-from orchestrator.studies.engine import REACHED
+from orchestrator.vehicle.indices import REACHED
 
 #: What is printed, by scenario: three efforts and three errors.
 PUBLISHED = {

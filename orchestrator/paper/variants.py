@@ -33,17 +33,8 @@ from orchestrator.runs.preparation import loaded
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.studies.sweep import check_installed
-from orchestrator.vehicle.metrics import LAST_SECONDS
-from orchestrator.vehicle.signals import (
-    APPLIED,
-    ATTITUDE,
-    AXES,
-    COMMANDED,
-    ELL,
-    POSITION,
-    Y_D,
-    parameter,
-)
+from orchestrator.vehicle.indices import LAST_SECONDS
+from orchestrator.vehicle.signals import AXES, STANDARD, parameter
 
 #: Runs that a worker makes at a time.
 _BLOCK = 16
@@ -175,10 +166,10 @@ def moved(engine: BatchEngine, run: Point, starts: Sequence[int]) -> Iterator[Po
 
 def errors(table: Table) -> np.ndarray:
     """e of all rows at once, far sooner than :func:`.tracking_error` and equal up to rounding."""
-    _, theta, psi = table.group(*ATTITUDE).T
+    _, theta, psi = table.group(*STANDARD.attitude).T
     ahead = np.cos(theta) * np.cos(psi), np.cos(theta) * np.sin(psi), -np.sin(theta)
-    y = table.group(*POSITION) + parameter(table, ELL) * np.column_stack(ahead)
-    error: np.ndarray = y - table.group(*Y_D)
+    y = table.group(*STANDARD.position) + parameter(table, STANDARD.ell) * np.column_stack(ahead)
+    error: np.ndarray = y - table.group(*STANDARD.y_d)
     return error
 
 
@@ -200,6 +191,6 @@ def numbers_of(table: Table) -> np.ndarray:
     # A row holds the signal of the step that ends there: the first one holds none.
     efforts = (
         np.sqrt(np.cumsum(table.group(*names)[1:] ** 2 * h, axis=0)[ends - 1])
-        for names in (APPLIED, COMMANDED)
+        for names in (STANDARD.applied, STANDARD.commanded)
     )
     return np.stack([np.hstack((effort, final)) for effort in efforts])

@@ -34,7 +34,7 @@ from orchestrator.master.hooks.events import Alter, Event, Events, Set
 from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.hooks.playback import InputTable, Playback
 from orchestrator.master.identity import Identity, identity
-from orchestrator.master.loop import PYTHON_LOOP, Loop, chosen
+from orchestrator.master.loop import PYTHON_LOOP, Stepping, chosen
 from orchestrator.master.observers.observer import Ending, Observer
 from orchestrator.master.plan import Plan, planned
 from orchestrator.master.simulation import simulate
@@ -48,9 +48,12 @@ from orchestrator.system.component import RUNNABLE, WRITABLE, read_component
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 from orchestrator.vehicle.cautions import differing_vehicle
-from orchestrator.vehicle.signals import CONTROLLER, PLANNER
+from orchestrator.vehicle.signals import STANDARD
 
 T = TypeVar("T")
+
+#: The components that a comparison exchanges, and keeps.
+CONTROLLER, PLANNER = STANDARD.controller, STANDARD.planner
 
 #: Communication step of the paper [s], for systems that name none.
 DEFAULT_STEP = STEP
@@ -77,7 +80,7 @@ class Prepared:
     scenario: Scenario
     plan: Plan
     isolation: Isolation | None = None
-    loop: Loop = PYTHON_LOOP
+    loop: Stepping = PYTHON_LOOP
     real_time: float | None = None
     events: tuple[Event, ...] = ()
     input_table: InputTable | None = None

@@ -6,7 +6,7 @@ import json
 import platform
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import asdict, fields
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -21,6 +21,7 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.runs.preparation import Prepared
 from orchestrator.system.names import port_name
+from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
 
 #: The indices of a run.
 METRICS = "metrics.json"
@@ -85,6 +86,8 @@ def write_record(
         "experiment": {**vars(header.experiment), "steps": dict(prepared.system.steps)},
         "loop": header.loop,
         "texts": sorted(header.strings),
+        "units": dict(header.units),
+        "vehicles": [asdict(loop) for loop in loops_of(prepared.system)],
         **(remarks or {}),
         "events": [occurrence._asdict() for occurrence in ending.events],
         "fmus": {
@@ -129,4 +132,10 @@ def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
         Experiment(**known),
         {port_name(name): value for name, value in record["parameters"].items()},
         record.get("loop", "python"),
+        units=record.get("units", {}),
     )
+
+
+def read_loops(record: dict[str, Any]) -> tuple[Loop, ...]:
+    """The loops of the vehicles of a run, from its record; of one without, the standard one."""
+    return tuple(Loop(**names) for names in record.get("vehicles", ())) or (STANDARD,)

@@ -33,11 +33,11 @@ from orchestrator.runs.preparation import (
 from orchestrator.runs.record import METRICS, Stopwatch, write_metrics, write_record
 from orchestrator.runs.request import Request
 from orchestrator.runs.resume import checkpoints_of, leave
-from orchestrator.runs.run import metrics_json
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from orchestrator.vehicle.metrics import metrics_of
+from orchestrator.vehicle.indices import metrics_of
+from orchestrator.vehicle.signals import loops_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -120,7 +120,8 @@ class Result(Table):
 
     def metrics(self) -> dict[str, Any]:
         """What the command line writes into metrics.json."""
-        return metrics_json(metrics_of(self), self._prepared)
+        found = metrics_of(self, loops_of(self.system))
+        return found.content(self._prepared.scenario.name, self.system)
 
     def to_dataframe(self) -> pd.DataFrame:
         """All columns as a pandas DataFrame, with the time as its index.

@@ -34,22 +34,13 @@ from orchestrator.runs.resume import FOLDER, checkpoints_of, leave
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import file_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.cautions import (
-    WATCHED,
-    cautions,
-    cautions_after,
-    cautions_beside,
-    velocities_reaching,
-)
+from orchestrator.vehicle.cautions import cautions, cautions_after, cautions_beside, watched
 from orchestrator.vehicle.certificates import CertificatesFile
-from orchestrator.vehicle.metrics import Metrics
-from orchestrator.vehicle.signals import CONTROLLER
+from orchestrator.vehicle.indices import Metrics
+from orchestrator.vehicle.signals import Loop, loops_of, suffixes
 
-#: The table of the certificates.
-_CERTIFICATES = "certificates.csv"
-
-#: The files of a run, but for its figures.
-_NAMES = (*(f"result.{ending}" for ending in FORMATS), _CERTIFICATES, METRICS, RECORD)
+#: The files of a run, but for its certificates and figures.
+_NAMES = (*(f"result.{ending}" for ending in FORMATS), METRICS, RECORD)
 
 #: A file that keeps room for what is written last, so that a full disk does not cost the record.
 _SPARE, _SPARE_BYTES = ".spare", 65536
@@ -171,9 +162,15 @@ def run_into(
     np.linalg.inv(np.eye(1))
     clock = Stopwatch()
     done: list[_Done] = []
-    figures = figure_files(runs[0].scenario.figure, runs[0].scenario.stem)
+    loops = loops_of(runs[0].system)
+    figures = figure_files(runs[0].scenario.figure, runs[0].scenario.stem, loops)
     folders = _folders(runs, figures)
     names = [*figures, *(Path(below, name).as_posix() for below in folders for name in _NAMES)]
+    names += [
+        Path(below, _certificates(vehicle)).as_posix()
+        for prepared, below in zip(runs, folders, strict=True)
+        for vehicle in suffixes(loops_of(prepared.system)).values()
+    ]
     with (
         held_interrupts() as interrupts,
         replaced(folder, names, force=files.force, keep=lambda: bool(done)) as unfinished,
@@ -206,8 +203,9 @@ def run_into(
                 done.append(run.ended(ending))
                 missed = [] if ending.failure else prepared.missed(ending)
                 said = [f"did not happen: {event}" for event in missed]
-                said += cautions_beside(done[-1].seen, runs[0].scenario.name, done[0].seen)
-                for caution in (*said, *cautions_after(done[-1].seen)):
+                said += cautions_beside(done[-1].seen, runs[0].scenario.name, done[0].seen, loops)
+                said += cautions_after(done[-1].seen, loops_of(prepared.system))
+                for caution in said:
                     say(f"warning: {prepared.scenario.name}: {caution}")
                 if interrupts:
                     break
@@ -250,13 +248,18 @@ class _Running:
         checkpoints: Checkpoints | None,
     ) -> None:
         self._folder, self._prepared = folder, prepared
-        self._metrics = Metrics()
+        loops = loops_of(prepared.system)
+        self._metrics = Metrics(loops)
         # Without figures the cautions alone look at what was seen.
-        self._seen = VisibleRows(WATCHED) if files.no_figures else VisibleRows()
+        seen = watched if files.no_figures else Loop.drawn
+        self._seen = VisibleRows({name for loop in loops for name in seen(loop)})
         self._table = FORMATS[files.format](folder / f"result.{files.format}")
         self.observers: list[Observer] = [
             Selection(self._table, files.interval, columns),
-            CertificatesFile(folder / _CERTIFICATES, files.interval),
+            *(
+                CertificatesFile(folder / _certificates(vehicle), files.interval, loop)
+                for loop, vehicle in suffixes(loops).items()
+            ),
             self._metrics,
             self._seen,
             Progress(prepared.scenario.name),
@@ -273,7 +276,7 @@ class _Running:
 
     def ended(self, ending: Ending) -> _Done:
         """When its observers have been told the end."""
-        values = metrics_json(self._metrics, self._prepared)
+        values = self._metrics.content(self._prepared.scenario.name, self._prepared.system)
         return self._done(values, ending)
 
     def given_up(self) -> _Done:
@@ -329,7 +332,10 @@ def _draw(
     scenario: Scenario, done: Sequence[_Done], folder: Path, interrupts: Interrupts
 ) -> list[str]:
     """Draw all figures or, where one of them cannot be written, none; notes on what is left out."""
-    drawn = [Drawn(run.prepared.scenario.legend, run.seen, scenario.z_up) for run in done]
+    drawn = [
+        Drawn(run.prepared.scenario.legend, run.seen, scenario.z_up, loops_of(run.prepared.system))
+        for run in done
+    ]
     try:
         return draw(
             scenario.figure,
@@ -340,23 +346,20 @@ def _draw(
             stop=lambda: interrupts.urgent,
         )
     except BaseException:
-        for name in figure_files(scenario.figure, scenario.stem):
+        for name in figure_files(scenario.figure, scenario.stem, drawn[0].loops):
             (folder / name).unlink(missing_ok=True)
         raise
 
 
 def _folders(runs: Sequence[Prepared], figures: Sequence[str]) -> list[str]:
     """The folder of each run, from the first one's on."""
-    taken = [*_NAMES, *figures, FOLDER, INCOMPLETE, LEDGER]
+    taken = [*_NAMES, _certificates(""), *figures, FOLDER, INCOMPLETE, LEDGER]
     return ["", *(file_name(prepared.scenario.name, taken) for prepared in runs[1:])]
 
 
-def metrics_json(metrics: Metrics, prepared: Prepared) -> dict[str, Any]:
-    """What metrics.json holds of a run."""
-    values = metrics.values(prepared.scenario.name, prepared.system)
-    if CONTROLLER in prepared.system.components:
-        values["velocities_reaching_controller"] = velocities_reaching(prepared.system)
-    return values
+def _certificates(vehicle: str) -> str:
+    """The file of the certificates of a loop, whose name ends with what tells it from others."""
+    return f"certificates{vehicle}.csv"
 
 
 def selected_columns(system: System, wanted: str, is_companion: bool = False) -> list[str] | None:

@@ -15,7 +15,7 @@ from orchestrator.master.experiment import Order
 from orchestrator.runs.inputs import Inputs
 from orchestrator.runs.waypoints import path_parameters
 from orchestrator.system.names import PortName, file_name, flattened, port_name
-from orchestrator.vehicle.signals import PLANNER
+from orchestrator.vehicle.signals import STANDARD
 
 #: What a message calls a file that cannot be read.
 _WHAT = "not a scenario"
@@ -113,7 +113,7 @@ def _path_parameters(
     path: Path, said: Mapping[str, str], others: Mapping[PortName, Any]
 ) -> dict[PortName, Any]:
     """What a path comes to, in a scenario with other parameters."""
-    found = path_parameters(path.parent / said["file"], said.get("component", PLANNER))
+    found = path_parameters(path.parent / said["file"], said.get("component", STANDARD.planner))
     for name in found.keys() & others.keys():
         raise InputError(f"{path}: {name} is given by {said['file']} already")
     return found

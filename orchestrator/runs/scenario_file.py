@@ -10,7 +10,7 @@ from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, ne
 from orchestrator.master.experiment import COUPLINGS
 from orchestrator.runs.inputs import WAYS
 from orchestrator.runs.scenario_events import ACTIONS
-from orchestrator.vehicle.signals import PLANNER
+from orchestrator.vehicle.signals import STANDARD
 
 #: Actions of an event after which there is nothing left that could end.
 _AT_ONCE = ("release", "reset", "stop")
@@ -26,7 +26,7 @@ class PathTable(TomlTable):
     )
     component: str = entry(
         "The [PathPlanner](components/PathPlanner.md) whose parameters they become.",
-        f"`{PLANNER}`",
+        f"`{STANDARD.planner}`",
     )
 
 

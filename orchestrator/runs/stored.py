@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.figures import Drawn
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.errors import InputError
@@ -18,8 +19,7 @@ from orchestrator.machine.user_files import explained, text_of
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Header
-from orchestrator.master.observers.table import Table
-from orchestrator.runs.record import read_ending, read_header
+from orchestrator.runs.record import read_ending, read_header, read_loops
 
 #: What a file is not that cannot be read.
 _WHAT = "not the record of a run"
@@ -28,8 +28,8 @@ _WHAT = "not the record of a run"
 Choice = Callable[[Sequence[str]], Collection[str]]
 
 
-def read_result(path: Path, watched: Choice | None = None) -> tuple[str, Table]:
-    """What can be seen of a stored result, and its name.
+def read_result(path: Path, watched: Choice | None = None) -> Drawn:
+    """What can be seen of a stored result, by its name.
 
     Args:
         path: a folder that a run has written, or a table in CSV or Parquet. Of a table without a
@@ -49,13 +49,16 @@ def read_result(path: Path, watched: Choice | None = None) -> tuple[str, Table]:
     first = next(blocks, None)
     if first is None:
         raise InputError(f"{file}: has no rows")
-    table = VisibleRows() if watched is None else VisibleRows(watched(columns))
+    loops = read_loops(record)
+    drawn = {name for loop in loops for name in loop.drawn()}
+    table = VisibleRows(drawn if watched is None else watched(columns))
     table.begin(_header(record, columns, first, file))
     table.take(first)
     for rows in blocks:
         table.take(rows)
     table.end(read_ending(record))
-    return str(record.get("label") or record.get("scenario") or file.stem), table
+    label = str(record.get("label") or record.get("scenario") or file.stem)
+    return Drawn(label, table, bool(record.get("z_up")), loops)
 
 
 def table_in(path: Path) -> Path:
@@ -92,7 +95,7 @@ def read_record(table: Path) -> dict[str, Any]:
         try:
             if table.name not in record["files"]:
                 return {}
-            header, _ = read_header(record, ()), read_ending(record)
+            header, *_ = read_header(record, ()), read_ending(record), read_loops(record)
             frozenset(record.get("texts", []))
         except (KeyError, TypeError, AttributeError):
             raise ValueError("it lacks what a run writes") from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib.metadata import version
-from math import isnan, sqrt
+from math import isnan
 from threading import local
 from typing import NamedTuple
 
@@ -31,13 +31,11 @@ from orchestrator.studies.batch.support import setting_of, unsupported
 from orchestrator.studies.engine import Outcome, Point
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.metrics import LAST_SECONDS
-from orchestrator.vehicle.signals import ACTUATORS, AXES, DY_HAT
+from orchestrator.vehicle.indices import INDICES, LAST_SECONDS
+from orchestrator.vehicle.signals import STANDARD
 
 #: What makes every system.
 _OTHER = "use --engine fmu"
-
-_THETA = range(1, 5)
 
 _NO_ROWS = np.empty((0, 0))
 
@@ -119,7 +117,7 @@ class BatchEngine:
         made, failure = _made(job, np.empty(0, accumulator.END), accumulator.new(0), rows)
         kept = [
             0,
-            *(i for i, name in enumerate(COLUMNS, 1) if job.has_estimate or name not in DY_HAT),
+            *(i for i, name in enumerate(COLUMNS, 1) if job.has((name,))),
         ]
         columns = tuple(COLUMNS[i - 1] for i in kept[1:])
         header = Header(columns, job.experiment, _parameters(job.system))
@@ -134,10 +132,10 @@ class _Job(NamedTuple):
     setting: Setting
     plan: RunSteps
 
-    @property
-    def has_estimate(self) -> bool:
-        """Whether its controller estimates the velocity."""
-        return isinstance(self.setting.controller, Gains)
+    def has(self, columns: Iterable[str]) -> bool:
+        """Whether it has some columns: without an observer there are no estimates of velocity."""
+        is_observed = isinstance(self.setting.controller, Gains)
+        return is_observed or not set(columns) & {*STANDARD.dy_hat}
 
 
 def _job(system: System, run: Point) -> _Job:
@@ -310,30 +308,14 @@ _NOISE = _Noise()
 
 
 def _indices(job: _Job, end: np.void, found: np.void) -> dict[str, float]:
-    """The indices of an accumulator by their names."""
+    """The indices of an accumulator by their columns."""
     steps, t = int(end["steps"]), job.experiment.time(int(end["steps"]))
-    single = {
-        "late_error": found["late"],
-        "largest_speed": found["speed"],
-        "largest_drift": found["drift"],
-    }
-    if not isnan(found["reached"]):
-        single["time_to_reach"] = found["reached"]
-    if job.has_estimate and found["instants"]:
-        x, y, z = found["miss"]
-        single["estimate_error"] = sqrt((x + y + z) / found["instants"])
-    groups = (
-        ("l2_effort.{}", ACTUATORS, np.sqrt(found["square"])),
-        ("rms_effort.{}", ACTUATORS, np.sqrt(found["square"] / t)),
-        ("peak_command.{}", ACTUATORS, found["peak"]),
-        ("saturated_fraction.{}", ACTUATORS, found["outside"] / steps),
-        ("total_variation.{}", ACTUATORS, found["variation"]),
-        ("final_error.{}", AXES, found["final"]),
-        ("theta_hat_half[{}]", _THETA, found["half"]),
-        ("theta_hat_end[{}]", _THETA, found["end"]),
-    )
-    return {
-        name.format(member): float(value)
-        for name, members, values in groups
-        for member, value in zip(members, values, strict=True)
-    } | {name: float(value) for name, value in single.items()}
+    values: dict[str, float] = {}
+    for index in INDICES:
+        n = int(found["instants"]) if index.accumulated == "miss" else steps
+        if not index.accumulated or not n or not job.has(index.needs(STANDARD)[0]):
+            continue
+        members = index.members_of(found[index.accumulated], n, t)
+        values |= dict(zip(index.columns, members, strict=True))
+    # What was never reached is not a number.
+    return {name: value for name, value in values.items() if not isnan(value)}

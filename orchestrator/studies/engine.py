@@ -10,48 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from orchestrator.master.experiment import ORDERS, Order
-from orchestrator.vehicle.signals import ACTUATORS, AXES
-
-#: An error of tracking that counts as having reached the reference [m].
-REACHED = 1.0
-
-
-def _of(name: str, members: Sequence[object]) -> tuple[str, ...]:
-    return tuple(f"{name}.{member}" for member in members)
-
-
-_THETA = range(1, 5)
-
-#: The columns of what comes out of a run, in their order, a number each. Those of metrics.json
-#: come first. The others, from the rows of the table (e is y - y_d with the true control point):
-#:
-#: =====================  ===========================================================
-#: `time_to_reach`        the first time at which |e| is at most :data:`REACHED` [s]
-#: `late_error`           the largest |e| of the second half of the run [m]
-#: `estimate_error`       root mean square of |dy_hat - dy| over the second half, both of
-#:                        the same instant [m/s]
-#: `theta_hat_half[i]`    the estimate when half of the run is over
-#: `theta_hat_end[i]`     and at its end
-#: `largest_speed`        of the control point, |dy| [m/s]
-#: `largest_drift`        of sway and heave, |(v, w)| [m/s]: Assumption 1
-#: =====================  ===========================================================
-#:
-#: What a system has no ports for, and what is never reached, is not there.
-INDICES: tuple[str, ...] = (
-    *_of("l2_effort", ACTUATORS),
-    *_of("rms_effort", ACTUATORS),
-    *_of("peak_command", ACTUATORS),
-    *_of("saturated_fraction", ACTUATORS),
-    *_of("total_variation", ACTUATORS),
-    *_of("final_error", AXES),
-    "time_to_reach",
-    "late_error",
-    "estimate_error",
-    *(f"theta_hat_half[{i}]" for i in _THETA),
-    *(f"theta_hat_end[{i}]" for i in _THETA),
-    "largest_speed",
-    "largest_drift",
-)
 
 
 class Point(NamedTuple):
@@ -79,7 +37,7 @@ class Outcome(NamedTuple):
 
     Attributes:
         number: of the run.
-        indices: by the names of :data:`INDICES`; none of a run that has failed.
+        indices: by their columns, :func:`.index_columns`; none of a run that has failed.
         failure: why the run ended early, or None.
 
     """

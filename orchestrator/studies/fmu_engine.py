@@ -15,8 +15,9 @@ from orchestrator.master.loop import LOOPS, PYTHON_LOOP, chosen
 from orchestrator.master.plan import planned
 from orchestrator.runs.preparation import Prepared
 from orchestrator.studies.engine import Outcome, Point
-from orchestrator.studies.indices import Indices
 from orchestrator.system.names import port_name
+from orchestrator.vehicle.indices import Indices
+from orchestrator.vehicle.signals import loops_of
 
 
 class FmuEngine:
@@ -60,7 +61,7 @@ class FmuEngine:
         experiment = replace(
             prepared.experiment, stop_time=run.stop_time, step=run.step, order=run.order
         )
-        indices = Indices()
+        indices = Indices(loops_of(system))
         plan, loop = planned(system, experiment), chosen(self._loop, experiment)
         ending = replace(prepared, plan=plan, loop=loop).run([indices])
         if ending.signals:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
+from itertools import chain
 from math import ceil, cos, floor, log2, pi, prod, sin, sqrt
 from typing import Any
 
@@ -30,6 +31,8 @@ from orchestrator.studies.study import (
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value, is_finite, type_of, typed
+from orchestrator.vehicle.indices import index_columns
+from orchestrator.vehicle.signals import loops_of
 
 #: Types of values by those of FMI's variables.
 _KINDS = {"Real": float, "Integer": int, "Enumeration": int, "Boolean": bool, "String": str}
@@ -44,6 +47,7 @@ class Space:
     Attributes:
         columns: the types of what varies, by name.
         prepared: the shortest run of each scenario, by its name.
+        indices: the columns of what comes out of the runs.
         has_scenarios: whether there are several.
 
     """
@@ -95,6 +99,8 @@ class Space:
         self.prepared = {
             name: self._prepared(name, study, *system) for name, system in systems.items()
         }
+        columns = (index_columns(loops_of(system)) for _, system in systems.values())
+        self.indices = tuple(dict.fromkeys(chain.from_iterable(columns)))
 
     def _prepared(self, name: str, study: Study, scenario: Scenario, system: System) -> Prepared:
         """The shortest run of a scenario, which can be prepared like any run of it."""

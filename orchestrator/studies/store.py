@@ -26,7 +26,7 @@ import numpy as np
 from orchestrator.machine.errors import InputError, did_you_mean, reason
 from orchestrator.machine.ledger import Ledger, is_changed, located, moved_aside
 from orchestrator.runs.folder import opened
-from orchestrator.studies.engine import INDICES, Outcome
+from orchestrator.studies.engine import Outcome
 from orchestrator.studies.space import Space
 
 if TYPE_CHECKING:
@@ -58,14 +58,19 @@ class Store:
 
     """
 
-    def __init__(self, ledger: Ledger, record: Mapping[str, Any]) -> None:
+    def __init__(self, ledger: Ledger, record: Mapping[str, Any], indices: Sequence[str]) -> None:
         """Look for a study that was begun in a folder, or begin it.
+
+        Args:
+            ledger: of the folder.
+            record: of the study.
+            indices: the columns of what comes out of a run.
 
         Raises:
             InputError: the folder holds another study, or what is there was changed.
 
         """
-        self.ledger, self._folder = ledger, ledger.folder
+        self.ledger, self._folder, self._indices = ledger, ledger.folder, indices
         self._path = self._folder / _DATABASE
         _check_same(ledger, record)
         if not (self._folder / RECORD).exists():
@@ -96,7 +101,7 @@ class Store:
 
     def add(self, outcomes: Sequence[Outcome]) -> None:
         """Keep a block of outcomes: all of them, or none."""
-        rows = ((*row, self._checksum(*row)) for row in map(_row, outcomes))
+        rows = ((*row, self._checksum(*row)) for row in map(self._row, outcomes))
         with written(self._folder), self._database:
             self._database.executemany("INSERT OR IGNORE INTO outcomes VALUES (?, ?, ?, ?)", rows)
 
@@ -111,7 +116,7 @@ class Store:
         if len(self) != len(space):
             raise InputError(f"{self._path}: damaged: it holds {len(self)} of {len(space)} runs")
         rows = self._rows()
-        schema = _schema(arrow, space)
+        schema = _schema(arrow, space, self._indices)
         with (
             written(self._folder),
             self.ledger.changing() as unfinished,
@@ -147,6 +152,10 @@ class Store:
                     )
                 yield row[0], row[1], row[2]
 
+    def _row(self, outcome: Outcome) -> tuple[int, bytes, str | None]:
+        values = [outcome.indices.get(name, np.nan) for name in self._indices]
+        return outcome.number, np.array(values).tobytes(), outcome.failure
+
     def _checksum(self, number: int, indices: bytes, failure: str | None) -> bytes:
         return sha256(f"{self.ledger.identity} {number} {failure!r} {indices!r}".encode()).digest()
 
@@ -178,12 +187,15 @@ def _is_ours(path: Path, identity: str) -> bool:
 
 
 @contextmanager
-def store(folder: Path, record: Mapping[str, Any], force: bool = False) -> Iterator[Store]:
+def store(
+    folder: Path, record: Mapping[str, Any], indices: Sequence[str], force: bool = False
+) -> Iterator[Store]:
     """The outcomes of a study in a folder.
 
     Args:
         folder: of the study, made if it does not exist.
         record: of the study; what it says under `made_of` must be what was done there before.
+        indices: the columns of what comes out of a run.
         force: move aside what is there otherwise, and begin anew.
 
     Raises:
@@ -193,14 +205,14 @@ def store(folder: Path, record: Mapping[str, Any], force: bool = False) -> Itera
     with opened(folder, force) as ledger:
         with written(folder):
             try:
-                found = Store(ledger, record)
+                found = Store(ledger, record, indices)
             except (InputError, sqlite3.Error):
                 if not force:
                     raise
                 for name in (RECORD, TABLE, *(f"{_DATABASE}{end}" for end in _ENDS)):
                     if os.path.lexists(folder / name):
                         moved_aside(folder / name)
-                found = Store(ledger, record)
+                found = Store(ledger, record, indices)
         with closing(found):
             yield found
 
@@ -255,19 +267,14 @@ def _check_same(ledger: Ledger, record: Mapping[str, Any]) -> None:
         )
 
 
-def _row(outcome: Outcome) -> tuple[int, bytes, str | None]:
-    values = [outcome.indices.get(name, np.nan) for name in INDICES]
-    return outcome.number, np.array(values).tobytes(), outcome.failure
-
-
-def _schema(arrow: Any, space: Space) -> Any:
+def _schema(arrow: Any, space: Space, indices: Sequence[str]) -> Any:
     types = {bool: arrow.bool_(), int: arrow.int64(), float: arrow.float64(), str: arrow.string()}
     return arrow.schema(
         [
             (RUN, arrow.int64()),
             *([(SCENARIO, arrow.string())] * space.has_scenarios),
             *((name, types[kind]) for name, kind in space.columns.items()),
-            *((name, arrow.float64()) for name in INDICES),
+            *((name, arrow.float64()) for name in indices),
             (FAILURE, arrow.string()),
         ]
     )
@@ -278,7 +285,7 @@ def _batch(
 ) -> Any:
     numbers, indices, failures = zip(*rows, strict=True)
     scenarios, points = zip(*map(space.point, numbers), strict=True)
-    values = np.frombuffer(b"".join(indices)).reshape(len(rows), len(INDICES))
+    values = np.frombuffer(b"".join(indices)).reshape(len(rows), -1)
     columns = [
         numbers,
         *([scenarios] * space.has_scenarios),

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
+from orchestrator.figures.study_figures import KINDS
 from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.master.experiment import ORDERS
-from orchestrator.studies.figures.figure_entries import BANDS, FRONT, INFLUENCE, MAPS
 from orchestrator.studies.study import ENGINES, METHODS, MOST_RUNS, SPACINGS
 from orchestrator.system.names import flattened
 from orchestrator.system.values import is_finite
@@ -76,27 +76,11 @@ class StopTimeTable(TomlTable):
     per: _Numbers = needed("Seconds for each of a value that varies.", "{ plant.eta0.z = 1.2 }")
 
 
-class _Kind(NamedTuple):
-    """What a figure of a kind needs, and what it may have beside."""
-
-    needs: Sequence[str]
-    may: Sequence[str]
-
-
-#: The kinds of figures, by the names that study files have for them.
-_KINDS: Mapping[str, _Kind] = {
-    BANDS: _Kind(("x", "show"), ("by", "where", "limits")),
-    MAPS: _Kind(("x", "y", "show"), ("by", "where", "limits")),
-    FRONT: _Kind(("x", "y"), ("by", "where")),
-    INFLUENCE: _Kind(("x", "show"), ("by", "where")),
-}
-
-
 class FigureTable(TomlTable):
     """A figure: `[figures.NAME]`."""
 
-    kind: Annotated[str, OneOf(tuple(_KINDS))] = needed(
-        "What it is.", " or ".join(f'"{kind}"' for kind in _KINDS)
+    kind: Annotated[str, OneOf(tuple(KINDS))] = needed(
+        "What it is.", " or ".join(f'"{kind}"' for kind in KINDS)
     )
     x: Names = entry(
         "Value along the horizontal axis; of `bands` also several, a column of panels each; of "
@@ -113,12 +97,12 @@ class FigureTable(TomlTable):
 
     @model_validator(mode="after")
     def _has_what_its_kind_has(self) -> Self:
-        needs, may = _KINDS[self.kind]
+        _, needs, may = KINDS[self.kind]
         if missing := [key for key in needs if not getattr(self, key)]:
             raise ValueError(f"lacks {' and '.join(missing)}")
         if more := self.model_fields_set - {"kind", *needs, *may}:
             raise ValueError(f"a figure of kind {self.kind!r} has no {min(more)}")
-        if self.kind in (MAPS, FRONT) and not isinstance(self.x, str):
+        if self.kind in ("maps", "front") and not isinstance(self.x, str):
             raise ValueError(f"x is a list; a figure of kind {self.kind!r} has one x")
         return self
 

@@ -16,6 +16,7 @@ from typing import Annotated, Any
 from tqdm import tqdm
 
 from fmus.kinds import PYTHON
+from orchestrator.figures.study_figures import draw_figures, figure_files
 from orchestrator.machine.compiler import machines_compiler
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
@@ -27,7 +28,7 @@ from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.blocks import making
 from orchestrator.studies.engine import Engine
-from orchestrator.studies.figures import draw_figures, figure_files, read_figures
+from orchestrator.studies.figure_entries import read_figures
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import Store, StudyResult, read_record, store
@@ -152,10 +153,12 @@ def swept(
     check_installed(_NEEDED if means.scheduler is None else (*_NEEDED, "distributed"))
     systems = {name: loaded(name, means.kind) for name in study.scenario}
     space = Space(study, systems)
-    plans = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
+    plans = read_figures(
+        study.name, study.figures, space.columns, space.has_scenarios, space.indices
+    )
     engine = _engine(means.engine or study.engine, space.prepared, means)
     record = _record(study, means, space, engine, [one for one, _ in systems.values()], command)
-    with store(folder, record, means.force) as kept:
+    with store(folder, record, space.indices, means.force) as kept:
         kept.ledger.check(figure_files(plans))
         if not kept.is_done:
             if not len(kept) and (hint := faster(space, engine, means)):
@@ -166,7 +169,8 @@ def swept(
         kept.write_record({**read_record(folder), "failed": result.failed})
         # All figures or, where one of them cannot be written, none.
         with kept.ledger.changing() as unfinished:
-            notes = list(draw_figures(plans, study.title, result, unfinished))
+            legends = {name: scenario.legend for name, (scenario, _) in systems.items()}
+            notes = list(draw_figures(plans, study.title, result, unfinished, legends))
         for note in notes:
             say(note)
     return result

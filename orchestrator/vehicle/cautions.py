@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from auv_fmu.observer import EXACT, FORMS, exact_gain
@@ -13,26 +15,7 @@ from orchestrator.system.graph import reaching
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import unit_of
-from orchestrator.vehicle.signals import (
-    ATTITUDE,
-    CONTROLLER,
-    ELL,
-    LIMITS,
-    PLANNER,
-    THETA_HAT,
-    VEHICLE,
-    Y_D,
-    parameter,
-    vehicle,
-)
-
-_K_D, _LAMBDA, _EPS_T = "controller.k_d", "controller.lambda", "controller.eps_t"
-_H_MAX, _OBSERVER = "controller.h_max", "controller.observer"
-
-_PITCH, _ROLL = ATTITUDE[1], "plant.roll"
-
-#: Columns whose extremes :func:`cautions_after` looks at.
-WATCHED = (THETA_HAT[0], _PITCH)
+from orchestrator.vehicle.signals import STANDARD, Loop, loops_of, parameter, value_of, vehicle
 
 #: References that are farther apart are not the same [m].
 _SAME = 1e-6
@@ -41,42 +24,55 @@ _SAME = 1e-6
 _REVERSES, _GROWS = 1.0, 2.0
 
 
-def gain_of_a_step(system: System, h: float) -> float:
+def watched(loop: Loop) -> tuple[str, str]:
+    """The columns whose extremes :func:`cautions_after` looks at: theta_hat[1], and the pitch."""
+    return loop.theta_hat[0], loop.attitude[1]
+
+
+def gain_of_a_step(system: System, h: float, controller: str = STANDARD.controller) -> float:
     """k_d as a step of h seconds takes it [1/s]: the form of the observer may change it."""
-    k_d, form = float(system.value(port_name(_K_D)) or 0.0), port_name(_OBSERVER)
+    form = port_name(f"{controller}.observer")
+    k_d = float(system.value(port_name(f"{controller}.k_d")) or 0.0)
     is_exact = system.has(form) and FORMS.get(str(system.value(form))) == EXACT
     return exact_gain(k_d, h) if is_exact else k_d
 
 
 def cautions(system: System, experiment: Experiment) -> list[str]:
     """What can be said before a run, in lines for the user."""
-    if not all(system.has(port_name(name)) for name in (_K_D, _LAMBDA, _H_MAX)):
-        return []
-
-    def value(name: str) -> float:
-        return float(system.value(port_name(name)) or 0.0)
-
-    h = min(experiment.step, value(_H_MAX))
-    h_p = h * observer_rate(value(_LAMBDA), gain_of_a_step(system, h))
-    if h_p <= _GROWS:
-        return []
-    return [
-        f"{_K_D} = {value(_K_D):g} 1/s is unstable with internal steps of {h:g} s: the observer's "
-        f"fastest mode has h p = {h_p:.3g} and grows above {_GROWS:g}; lower k_d or h_max"
-    ]
+    found = []
+    for controller in dict.fromkeys(loop.controller for loop in loops_of(system)):
+        names = [port_name(f"{controller}.{name}") for name in ("k_d", "lambda", "h_max")]
+        if not all(map(system.has, names)):
+            continue
+        k_d, lambda_, h_max = (float(system.value(name) or 0.0) for name in names)
+        h = min(experiment.step, h_max)
+        h_p = h * observer_rate(lambda_, gain_of_a_step(system, h, controller))
+        if h_p > _GROWS:
+            found.append(
+                f"{controller}.k_d = {k_d:g} 1/s is unstable with internal steps of {h:g} s: the "
+                f"observer's fastest mode has h p = {h_p:.3g} and grows above {_GROWS:g}; lower "
+                "k_d or h_max"
+            )
+    return found
 
 
 def differing_vehicle(system: System) -> str | None:
-    """Where controller or planner hold other values of the vehicle than the plant, in words.
+    """Where a controller or planner holds other values of the vehicle than the plant, in words.
 
     Returns:
         One line; None: nowhere.
 
     """
+    found = (_differing(system, loop) for loop in loops_of(system))
+    return "; ".join(filter(None, found)) or None
+
+
+def _differing(system: System, loop: Loop) -> str | None:
     texts, others = [], set()
-    for name in map(port_name, (ELL, *VEHICLE, *LIMITS)):
+    for text in (loop.ell, *loop.vehicle_parameters, *loop.limits):
+        name = system.named(port_name(text))
         true, held = _parameter(system, name), dict[float, list[str]]()
-        for other in (CONTROLLER, PLANNER):
+        for other in (loop.controller, loop.planner):
             same = PortName(other, name.port)
             value = _parameter(system, same)
             if true is not None and value is not None and value != true:
@@ -100,62 +96,76 @@ def _parameter(system: System, name: PortName) -> float | None:
     return None if value is None else float(value)
 
 
-def cautions_after(table: Table) -> list[str]:
+def cautions_after(table: Table, loops: Sequence[Loop] = (STANDARD,)) -> list[str]:
     """What a run has shown, in lines for the user."""
-    return [*_of_the_robust_term(table), *_of_the_vertical(table)]
+    return [
+        line
+        for loop in loops
+        for line in (*_of_the_robust_term(table, loop), *_of_the_vertical(table, loop))
+    ]
 
 
-def _of_the_robust_term(table: Table) -> list[str]:
+def _of_the_robust_term(table: Table, loop: Loop) -> list[str]:
     """Whether it chatters; theta_hat[1] is the part of rho_hat that is there at any speed."""
-    if len(table) < 2 or table.missing(THETA_HAT[:1], (_EPS_T, _H_MAX, ELL, *VEHICLE)):
+    estimate, eps, h_max = loop.theta_hat[0], f"{loop.controller}.eps_t", f"{loop.controller}.h_max"
+    needed = (eps, h_max, loop.ell, *loop.vehicle_parameters)
+    if len(table) < 2 or table.missing((estimate,), needed):
         return []
-    rho_hat, eps_t = float(table[THETA_HAT[0]].max()), parameter(table, _EPS_T)
-    plant = vehicle(lambda name: parameter(table, name))
-    lambda_m2 = bounds(plant, parameter(table, ELL)).lambda_m2
-    h = min(table.header.experiment.step, parameter(table, _H_MAX))
+    rho_hat, eps_t = float(table[estimate].max()), parameter(table, eps)
+    plant = vehicle(lambda name: parameter(table, name), loop)
+    lambda_m2 = bounds(plant, parameter(table, loop.ell)).lambda_m2
+    h = min(table.header.experiment.step, parameter(table, h_max))
     h_p = h * robust_rate(rho_hat, eps_t, lambda_m2)
     if h_p <= _REVERSES:
         return []
     return [
-        f"the robust term chatters: with theta_hat[1] up to {rho_hat:.3g} N and {_EPS_T} = "
+        f"the robust term chatters: with theta_hat[1] up to {rho_hat:.3g} N and {eps} = "
         f"{eps_t:g} W it has h p = {h_p:.3g} and reverses in every step above {_REVERSES:g}; "
         "raise eps_t or take smaller steps"
     ]
 
 
-def _of_the_vertical(table: Table) -> list[str]:
+def _of_the_vertical(table: Table, loop: Loop) -> list[str]:
     """Whether a vehicle of five degrees of freedom has passed it."""
-    if not len(table) or table.missing((_PITCH,), (_ROLL,)):
+    roll, pitch = f"{loop.vehicle}.roll", loop.attitude[1]
+    if not len(table) or table.missing((pitch,), (roll,)):
         return []
-    beyond = np.cos(table[_PITCH]) * np.cos(table[_PITCH][0]) <= 0.0
-    if table.parameters[port_name(_ROLL)] is not False or not beyond.any():
+    beyond = np.cos(table[pitch]) * np.cos(table[pitch][0]) <= 0.0
+    if value_of(table, roll) is not False or not beyond.any():
         return []
     return [
         f"the pitch passes 90 degrees by t = {table.time[beyond.argmax()]:g} s, where (1) has a "
-        f"pole: with {_ROLL} = false what follows depends on rounding, so quote no single run; "
-        f"compare runs whose plant.eta0 differs by 1e-6 m, or set {_ROLL} = true"
+        f"pole: with {roll} = false what follows depends on rounding, so quote no single run; "
+        f"compare runs whose {loop.vehicle}.eta0 differs by 1e-6 m, or set {roll} = true"
     ]
 
 
-def cautions_beside(table: Table, name: str, other: Table) -> list[str]:
+def cautions_beside(
+    table: Table, name: str, other: Table, loops: Sequence[Loop] = (STANDARD,)
+) -> list[str]:
     """What a run has shown beside the one that it is compared with, in lines for the user.
 
     Args:
         table: of the run.
         name: of the one that it is compared with.
         other: of that one.
+        loops: that both have.
 
     """
-    if table.missing(Y_D) or other.missing(Y_D):
+    return [line for loop in loops for line in _of_the_reference(table, name, other, loop)]
+
+
+def _of_the_reference(table: Table, name: str, other: Table, loop: Loop) -> list[str]:
+    if table.missing(loop.y_d) or other.missing(loop.y_d):
         return []
     _, here, there = np.intersect1d(table.time, other.time, return_indices=True)
-    away = table.group(*Y_D)[here] - other.group(*Y_D)[there]
+    away = table.group(*loop.y_d)[here] - other.group(*loop.y_d)[there]
     apart = float(np.linalg.norm(away, axis=1).max(initial=0.0))
     if apart <= _SAME:
         return []
     return [
-        f"its reference planner.y_d is up to {apart:.3g} m away from that of {name}: the two runs "
-        "follow different paths"
+        f"its reference {loop.planner}.y_d is up to {apart:.3g} m away from that of {name}: the "
+        "two runs follow different paths"
     ]
 
 
@@ -163,7 +173,7 @@ def cautions_beside(table: Table, name: str, other: Table) -> list[str]:
 _VELOCITY_UNITS = {"m/s", "rad/s"}
 
 
-def velocities_reaching(system: System, component: str = CONTROLLER) -> list[str]:
+def velocities_reaching(system: System, component: str = STANDARD.controller) -> list[str]:
     """Velocities of the vehicle that reach a component, directly or through others.
 
     The vehicle is what the component feeds. Empty for a controller without velocity sensors.

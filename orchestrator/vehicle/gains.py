@@ -15,7 +15,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 from orchestrator.vehicle.cautions import gain_of_a_step
-from orchestrator.vehicle.signals import ELL, vehicle
+from orchestrator.vehicle.signals import STANDARD, Loop, loops_of, vehicle
 
 #: What the paper says of these conditions, in Remark 4, and what they leave open.
 _NOTE = """\
@@ -29,8 +29,8 @@ _PAPER = """\
 These are the paper's own gains: as printed they miss (30), and (31) in any unit of speed."""
 
 
-def evaluate(system: System) -> Theorem:
-    """The theorem for the parameters of a system.
+def evaluate(system: System, loop: Loop = STANDARD) -> Theorem:
+    """The theorem for the parameters of a loop.
 
     Raises:
         InputError: a parameter does not exist or cannot be set.
@@ -41,29 +41,37 @@ def evaluate(system: System) -> Theorem:
     def value(name: str) -> Any:
         return system.value(port_name(name))
 
-    saturation = value("controller.saturation")
+    def of(name: str) -> Any:
+        return value(f"{loop.controller}.{name}")
+
+    saturation = of("saturation")
     if saturation not in MAXIMUM_SLOPE:
         raise InputError(
-            f"controller.saturation = {saturation}: use one of {', '.join(MAXIMUM_SLOPE)}"
+            f"{loop.controller}.saturation = {saturation}: use one of {', '.join(MAXIMUM_SLOPE)}"
         )
-    K1, K2 = (tuple(value(f"controller.{K}[{i}]") for i in range(1, 4)) for K in ("K1", "K2"))
-    lambda_, k_d, gamma = (value(f"controller.{name}") for name in ("lambda", "k_d", "gamma"))
-    gains = Gains(K1=K1, K2=K2, lambda_=lambda_, k_d=k_d, gamma=gamma)
-    return theorem(vehicle(value), value(ELL), gains, MAXIMUM_SLOPE[saturation])
+    K1, K2 = (tuple(of(f"{K}[{i}]") for i in range(1, 4)) for K in ("K1", "K2"))
+    gains = Gains(K1=K1, K2=K2, lambda_=of("lambda"), k_d=of("k_d"), gamma=of("gamma"))
+    return theorem(vehicle(value, loop), value(loop.ell), gains, MAXIMUM_SLOPE[saturation])
 
 
 def check(system: System) -> str:
-    """The theorem in words and numbers, for the parameters of a system.
+    """The theorem in words and numbers, for the parameters of each loop of a system.
 
     Raises:
         InputError: a parameter does not exist or cannot be set.
 
     """
-    found = evaluate(system)
-    lines = [*stated(found), "", _NOTE, "", *_sampling(system)]
-    if found == theorem(Vehicle(), CONTROL_POINT, Gains(), MAXIMUM_SLOPE["tanh"]):
-        lines += ["", _PAPER]
-    return "\n".join(lines)
+    loops = loops_of(system)
+    lines: list[str] = []
+    for loop in loops:
+        found = evaluate(system, loop)
+        if len(loops) > 1:
+            lines += [f"{loop.vehicle}:", ""]
+        lines += [*stated(found), "", _NOTE, "", *_sampling(system, loop)]
+        if found == theorem(Vehicle(), CONTROL_POINT, Gains(), MAXIMUM_SLOPE["tanh"]):
+            lines += ["", _PAPER]
+        lines.append("")
+    return "\n".join(lines[:-1])
 
 
 def stated(found: Theorem) -> Iterator[str]:
@@ -109,12 +117,13 @@ def stated(found: Theorem) -> Iterator[str]:
     yield f"  (42)  holds for |r_1| < {found.speed_of_any_gains:.3g} m/s at most"
 
 
-def _sampling(system: System) -> list[str]:
+def _sampling(system: System, loop: Loop) -> list[str]:
     """What the step asks of k_d."""
     lambda_, h = (
-        float(system.value(port_name(f"controller.{name}")) or 0.0) for name in ("lambda", "h_max")
+        float(system.value(port_name(f"{loop.controller}.{name}")) or 0.0)
+        for name in ("lambda", "h_max")
     )
-    rate = observer_rate(lambda_, gain_of_a_step(system, h))
+    rate = observer_rate(lambda_, gain_of_a_step(system, h, loop.controller))
     return [
         f"Euler's scheme with internal steps of {h:g} s: the observer's fastest mode has the rate "
         f"{rate:.4g} 1/s,",

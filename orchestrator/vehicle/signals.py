@@ -1,92 +1,186 @@
-"""The loop's signals by the paper's names: the one place that says which port holds which.
+"""The signals of a vehicle's loop by the paper's names: which port of which component they are.
 
 The master steps any system and knows none of these names. What is drawn, measured and proved here
-needs some of them; `Table.missing` tells which a system does not have.
+needs some of them; `Table.missing` tells which a run does not have.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import control_point
 from auv_fmu.vehicle import Vehicle
+from fmus.ports import quantities
+from fmus.ports.quantities import member_name
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.table import Table
-from orchestrator.system.names import PortName
+from orchestrator.system.graph import reaching
+from orchestrator.system.names import PortName, file_name, splits
+from orchestrator.system.structure import System
+from orchestrator.system.values import Value
 
 #: Members of groups of ports, in the paper's order.
-ACTUATORS = ("u", "q", "r")
-AXES = ("x", "y", "z")
-EULER = ("phi", "theta", "psi")
-DIRECTIONS = ("u", "v", "w", "p", "q", "r")
+ACTUATORS, AXES = tuple(map(str, quantities.TAU)), tuple(map(str, quantities.POSITION))
+EULER, DIRECTIONS = tuple(map(str, quantities.EULER)), tuple(map(str, quantities.NU))
+
+#: Columns, and parameters, that something needs: what :meth:`.Table.missing` takes.
+Needs = tuple[Sequence[str], Sequence[str]]
 
 
-def _group(name: str, members: Iterable[str]) -> tuple[str, ...]:
-    return tuple(f"{name}.{member}" for member in members)
+class _Group:
+    """The names of a group of ports or parameters at a component of a loop."""
+
+    def __init__(self, role: str, group: str, members: Iterable[str | int]) -> None:
+        self._role = role
+        self._names = tuple(member_name(group, m) if group else m for m in members)
+
+    def __get__(self, loop: Loop, owner: type[Loop] | None = None) -> tuple[str, ...]:
+        component = getattr(loop, self._role)
+        return tuple(f"{component}.{name}" for name in self._names)
 
 
-#: eta: centre of mass [m] and Euler angles [rad], earth frame.
-POSITION, ATTITUDE = _group("plant.eta", AXES), _group("plant.eta", EULER)
-POSTURE = (*POSITION, *ATTITUDE)
-#: nu [m/s, rad/s], body frame.
-NU = _group("plant.nu", DIRECTIONS)
-#: Sway and heave, of which nothing is commanded.
-DRIFT = _group("plant.nu", ("v", "w"))
-#: Velocity of the control point [m/s].
-DY = _group("plant.dy", AXES)
-#: tau as commanded, and as (3) lets it through [N, N.m].
-COMMANDED, APPLIED = _group("plant.tau", ACTUATORS), _group("plant.tau_applied", ACTUATORS)
-#: y_d and its velocity.
-Y_D, DY_D = _group("planner.y_d", AXES), _group("planner.dy_d", AXES)
-#: What the controller was given and what it has estimated.
-SEEN_Y_D, SEEN_DY_D = _group("controller.y_d", AXES), _group("controller.dy_d", AXES)
-Y_HAT, DY_HAT = _group("controller.y_hat", AXES), _group("controller.dy_hat", AXES)
-Z = _group("controller.z", AXES)
-TAU = _group("controller.tau", ACTUATORS)
-THETA_HAT = tuple(f"controller.theta_hat[{i}]" for i in range(1, 5))
-THETA_UNITS = ("N", "kg/s", "kg/m", "kg")
+@dataclass(frozen=True)
+class Loop:
+    """A vehicle and what controls it: names of components, and from them those of the signals."""
 
-#: The parameters of (3), ell, and those of (2).
-LOWER_LIMITS, UPPER_LIMITS = _group("plant.tau_min", ACTUATORS), _group("plant.tau_max", ACTUATORS)
-LIMITS = (*LOWER_LIMITS, *UPPER_LIMITS)
-ELL = "plant.ell"
-VEHICLE = _group("plant", (name.replace("_", ".") for name in Vehicle._fields))
+    vehicle: str = "plant"
+    controller: str = "controller"
+    planner: str = "planner"
+    disturbance: str = "disturbance"
 
-#: Signals in figures.
-DRAWN = frozenset(
-    (*POSITION, *NU, *DY, *COMMANDED, *Y_D, *DY_HAT, *THETA_HAT, *_group("controller.e", AXES))
-)
+    #: eta: centre of mass [m] and Euler angles [rad], earth frame.
+    position, attitude = _Group("vehicle", "eta", AXES), _Group("vehicle", "eta", EULER)
+    posture = _Group("vehicle", "eta", (*AXES, *EULER))
+    #: nu [m/s, rad/s], body frame; sway and heave, of which nothing is commanded.
+    nu, drift = _Group("vehicle", "nu", DIRECTIONS), _Group("vehicle", "nu", ("v", "w"))
+    #: Velocity of the control point [m/s].
+    dy = _Group("vehicle", "dy", AXES)
+    #: tau as commanded, and as (3) lets it through [N, N.m].
+    commanded = _Group("vehicle", "tau", ACTUATORS)
+    applied = _Group("vehicle", "tau_applied", ACTUATORS)
+    #: y_d and its velocity, as they are planned and as the controller was given them.
+    y_d, dy_d = _Group("planner", "y_d", AXES), _Group("planner", "dy_d", AXES)
+    seen_y_d, seen_dy_d = _Group("controller", "y_d", AXES), _Group("controller", "dy_d", AXES)
+    #: What the controller has measured, estimated and computed.
+    e, z = _Group("controller", "e", AXES), _Group("controller", "z", AXES)
+    y_hat, dy_hat = _Group("controller", "y_hat", AXES), _Group("controller", "dy_hat", AXES)
+    theta_hat = _Group("controller", "theta_hat", quantities.THETA)
+    tau = _Group("controller", "tau", ACTUATORS)
+    #: The parameters of (3), and those of (2).
+    lower_limits = _Group("vehicle", "tau_min", ACTUATORS)
+    upper_limits = _Group("vehicle", "tau_max", ACTUATORS)
+    vehicle_parameters = _Group("vehicle", "", (name.replace("_", ".") for name in Vehicle._fields))
 
-#: What the control point and the tracking error follow from.
-CONTROL_POINT = (POSTURE, (ELL,))
-TRACKING = ((*POSTURE, *Y_D), (ELL,))
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """All parameters of (3)."""
+        return (*self.lower_limits, *self.upper_limits)
 
-#: The component that commands the vehicle, and the one that gives the reference.
-CONTROLLER, PLANNER = "controller", "planner"
+    @property
+    def ell(self) -> str:
+        """The parameter ell [m]: how far the control point lies ahead of the centre of mass."""
+        return f"{self.vehicle}.ell"
+
+    def drawn(self) -> tuple[str, ...]:
+        """All signals that stand in figures."""
+        return (
+            *self.position, *self.nu, *self.dy, *self.commanded, *self.y_d, *self.dy_hat,
+            *self.theta_hat, *self.e,
+        )  # fmt: skip
+
+    def for_control_point(self) -> Needs:
+        """What the control point follows from."""
+        return self.posture, (self.ell,)
+
+    def for_tracking(self) -> Needs:
+        """What the tracking error follows from."""
+        return (*self.posture, *self.y_d), (self.ell,)
+
+    def for_reference(self) -> Needs:
+        """What the path of the reference follows from."""
+        return self.y_d, ()
+
+    def for_commands(self) -> Needs:
+        """What the control signals follow from."""
+        return self.commanded, ()
+
+    def for_limits(self) -> Needs:
+        """What their limits follow from."""
+        return (), self.limits
+
+    def for_parameter_estimates(self) -> Needs:
+        """What theta_hat follows from."""
+        return self.theta_hat, ()
+
+    def for_velocity_estimates(self) -> Needs:
+        """What true and estimated velocities follow from."""
+        return (*self.dy, *self.dy_hat), ()
 
 
-#: Units of the members of groups, by the group's name at whichever component.
-_UNITS = {
-    **dict.fromkeys(("y", "y_d", "y_hat", "e", "z"), dict.fromkeys(AXES, "m")),
-    **dict.fromkeys(("dy", "dy_d", "dy_hat"), dict.fromkeys(AXES, "m/s")),
-    "ddy_d": dict.fromkeys(AXES, "m/s²"),
-    **dict.fromkeys(("eta", "eta_d"), dict.fromkeys(AXES, "m") | dict.fromkeys(EULER, "rad")),
-    "nu": dict.fromkeys(DIRECTIONS[:3], "m/s") | dict.fromkeys(DIRECTIONS[3:], "rad/s"),
-    **dict.fromkeys(
-        ("tau", "tau_applied", "tau_w"),
-        dict.fromkeys(DIRECTIONS[:3], "N") | dict.fromkeys(DIRECTIONS[3:], "N·m"),
-    ),
-}
+#: The loop of closed_loop.toml, the paper's Fig. 2.
+STANDARD = Loop()
 
 
-def unit_of(column: str) -> str:
-    """The unit of a signal of the loop; empty for others."""
-    _, _, port = column.partition(".")
-    group, _, member = port.rpartition(".")
-    return _UNITS.get(group, {}).get(member, "")
+def loops_of(system: System) -> tuple[Loop, ...]:
+    """The loops of a system, one for each vehicle, found by ports and wires.
+
+    A vehicle takes tau and gives eta; of what feeds it, directly or through others, the controller
+    takes y_d, which the planner gives. What one vehicle lacks has the standard name; what one of
+    several lacks has a name that no component has.
+
+    Returns:
+        At least one loop: where no vehicle is found, the standard one.
+
+    """
+    vehicles = [
+        name
+        for name in system.components
+        if _has(system, name, "input", "tau.u") and _has(system, name, "output", "eta.psi")
+    ]
+    return tuple(_loop(system, vehicle, vehicles) for vehicle in vehicles) or (STANDARD,)
+
+
+def suffixes(loops: Sequence[Loop]) -> dict[Loop, str]:
+    """What the names of files end with that hold one of these loops: of several, the vehicle."""
+    if len(loops) == 1:
+        return {loops[0]: ""}
+    found: dict[Loop, str] = {}
+    for loop in loops:
+        found[loop] = f"-{file_name(loop.vehicle, [name[1:] for name in found.values()])}"
+    return found
+
+
+def _has(system: System, component: str, causality: str, port: str) -> bool:
+    variable = system.components[component].variables.get(port)
+    return variable is not None and variable.causality == causality
+
+
+def _loop(system: System, vehicle: str, vehicles: Sequence[str]) -> Loop:
+    def feeding(component: str, group: str, role: str, causality: str, port: str) -> str:
+        """The nearest component with a port upstream of another, or else what feeds a group."""
+        if component in system.components:
+            wires = list(reaching(system, component, set(vehicles)))
+            group = f"{component}.{group}."
+            found = [wire for wire in wires if _has(system, wire.source.component, causality, port)]
+            found += [wire for wire in wires if str(wire.target).startswith(group)]
+            if found:
+                return found[0].source.component
+        return role if len(vehicles) == 1 else f"{vehicle}.{role}"
+
+    controller = feeding(vehicle, "tau", "controller", "input", "y_d.x")
+    planner = feeding(controller, "y_d", "planner", "output", "y_d.x")
+    disturbance = feeding(vehicle, "tau_w", "disturbance", "output", "tau_w.u")
+    return Loop(vehicle, controller, planner, disturbance)
+
+
+def value_of(table: Table, name: str) -> Value | None:
+    """The value of a parameter `component.name` in a run; None: there is none."""
+    names = (PortName(component, port) for component, port in splits(name))
+    return next((table.parameters[one] for one in names if one in table.parameters), None)
 
 
 def parameter(table: Table, name: str) -> float:
@@ -96,38 +190,37 @@ def parameter(table: Table, name: str) -> float:
         InputError: the record of the run holds something else.
 
     """
-    component, port = name.split(".", 1)
-    value = table.parameters[PortName(component, port)]
+    value = value_of(table, name)
     if not isinstance(value, int | float):
         raise InputError(f"{name} is {value!r}, not a number")
     return value
 
 
-def limits(table: Table) -> tuple[np.ndarray, np.ndarray]:
+def limits(table: Table, loop: Loop = STANDARD) -> tuple[np.ndarray, np.ndarray]:
     """The limits of (3), lower and upper, for u, q, r [N, N.m]."""
     return (
-        np.array([parameter(table, name) for name in LOWER_LIMITS]),
-        np.array([parameter(table, name) for name in UPPER_LIMITS]),
+        np.array([parameter(table, name) for name in loop.lower_limits]),
+        np.array([parameter(table, name) for name in loop.upper_limits]),
     )
 
 
-def vehicle(value: Callable[[str], float]) -> Vehicle:
+def vehicle(value: Callable[[str], float], loop: Loop = STANDARD) -> Vehicle:
     """The vehicle of (2), whose parameters a function gives by their names `plant.m11`, ..."""
-    return Vehicle._make(value(name) for name in VEHICLE)
+    return Vehicle._make(value(name) for name in loop.vehicle_parameters)
 
 
-def true_control_point(table: Table) -> np.ndarray:
-    """y without measurement noise: (9) on the plant's posture, (rows, 3) [m]."""
-    ell = parameter(table, ELL)
+def true_control_point(table: Table, loop: Loop = STANDARD) -> np.ndarray:
+    """y without measurement noise: (9) on the vehicle's posture, (rows, 3) [m]."""
+    ell = parameter(table, loop.ell)
     return np.array(
         [
             control_point((x, y, z), rotation_from_euler(*euler), ell)
-            for x, y, z, *euler in table.group(*POSTURE).tolist()
+            for x, y, z, *euler in table.group(*loop.posture).tolist()
         ]
     ).reshape(-1, 3)
 
 
-def tracking_error(table: Table) -> np.ndarray:
+def tracking_error(table: Table, loop: Loop = STANDARD) -> np.ndarray:
     """e = y - y_d with the true control point, (rows, 3) [m]."""
-    error: np.ndarray = true_control_point(table) - table.group(*Y_D)
+    error: np.ndarray = true_control_point(table, loop) - table.group(*loop.y_d)
     return error

@@ -8,8 +8,8 @@ from importlib import import_module
 import pytest
 from PIL import Image
 
-from orchestrator.studies.engine import INDICES
 from orchestrator.studies.study import read_study, ready_studies
+from orchestrator.vehicle.indices import index_columns
 from pages import PICTURES
 from support.markdown import DOCS
 
@@ -32,7 +32,10 @@ def test_numbers_are_read_off_columns_that_runs_have(name):
     pytest.importorskip("scipy", reason="needs the extra `studies`")
     tool = import_module("study_numbers")
     study = read_study(name)
-    row = dict.fromkeys((*study.varied, *INDICES), 1.0) | {"scenario": "fig5", "failure": ""}
+    row = dict.fromkeys((*study.varied, *index_columns()), 1.0) | {
+        "scenario": "fig5",
+        "failure": "",
+    }
     row |= {key: values[0] for key, values in study.vary.items()}
     runs = tool.prepared(name, pandas.DataFrame([{"run": 0, **row}]))
     for statistic, columns, by, where in map(tool.parsed, tool.lines_of(name)):

@@ -20,5 +20,5 @@ def test_example_runs_and_is_drawn(example, tmp_path, monkeypatch):
     (tmp_path / "mine.toml").write_text(example)
     assert main(["run", "mine.toml", "--stop-time", "2"]) == 0
     folder = tmp_path / "results/mine"
-    assert (folder / "mine.png").is_file()
+    assert list(folder.glob("mine*.png"))
     assert json.loads((folder / "metrics.json").read_text())["stop_time"] == 2.0

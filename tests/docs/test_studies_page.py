@@ -10,10 +10,10 @@ import pytest
 
 from orchestrator import sweep
 from orchestrator.runs.preparation import loaded
-from orchestrator.studies.engine import INDICES
-from orchestrator.studies.figures import read_figures
+from orchestrator.studies.figure_entries import read_figures
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import ready_studies, study_of
+from orchestrator.vehicle.indices import index_columns
 from support.markdown import DOCS, blocks
 
 PAGE = DOCS / "studies.md"
@@ -26,7 +26,7 @@ needs_extra = pytest.mark.skipif(
 
 
 def test_page_names_all_columns_options_and_ready_studies():
-    for name in INDICES:
+    for name in index_columns():
         assert f"`{name.split('.')[0].split('[')[0]}" in TEXT, name
     for name in (*signature(sweep).parameters.keys() - {"study", "progress"}, *ready_studies()):
         assert f"--{name} " in TEXT or f"`{name}`" in TEXT, name

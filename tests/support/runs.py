@@ -21,7 +21,7 @@ from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.structure import System
-from orchestrator.vehicle.metrics import indices
+from orchestrator.vehicle.indices import metrics_of
 
 
 def table_of(
@@ -76,4 +76,4 @@ def write(table: Table, path: Path) -> None:
 
 def final_error(table: Table) -> np.ndarray:
     """e_f of section 4.2 [m]."""
-    return np.array(indices(table)["final_error"])
+    return np.array(metrics_of(table).found()["final_error"])

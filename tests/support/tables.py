@@ -7,25 +7,28 @@ from typing import Any
 
 import numpy as np
 
+from fmus.ports.quantities import ETA, NU, TAU
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import PortName, port_name
-from orchestrator.vehicle.signals import (
-    COMMANDED,
-    DY,
-    DY_HAT,
-    ELL,
-    LOWER_LIMITS,
-    NU,
-    POSTURE,
-    THETA_HAT,
-    UPPER_LIMITS,
-    Y_D,
-)
+from orchestrator.vehicle.signals import STANDARD
 
-COLUMNS = (*POSTURE, *NU, *DY, *COMMANDED, *Y_D, *DY_HAT, *THETA_HAT)
+COLUMNS = (
+    *STANDARD.posture,
+    *STANDARD.nu,
+    *STANDARD.dy,
+    *STANDARD.commanded,
+    *STANDARD.y_d,
+    *STANDARD.dy_hat,
+    *STANDARD.theta_hat,
+)
 STEP = 0.02
+UNITS = {
+    f"{group}.{member}": unit
+    for group, quantity in (("plant.eta", ETA), ("plant.nu", NU), ("plant.tau", TAU))
+    for member, unit in quantity.items()
+}
 
 
 def loop_table(n: int = 400, without: Collection[str] = (), seed: int = 1) -> Table:
@@ -34,10 +37,13 @@ def loop_table(n: int = 400, without: Collection[str] = (), seed: int = 1) -> Ta
     time = STEP * np.arange(n)
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, len(columns))
     rows = np.column_stack((time, np.sin(time[:, np.newaxis] + phases)))
-    parameters = {ELL: 0.35}
-    parameters |= dict.fromkeys(LOWER_LIMITS, -80.0) | dict.fromkeys(UPPER_LIMITS, 80.0)
+    parameters = {STANDARD.ell: 0.35}
+    parameters |= dict.fromkeys(STANDARD.lower_limits, -80.0) | dict.fromkeys(
+        STANDARD.upper_limits, 80.0
+    )
     known = {port_name(name): value for name, value in parameters.items() if name not in without}
-    return Table.of(Header(columns, Experiment(max(n - 1, 1) * STEP, STEP), known), rows)
+    experiment = Experiment(max(n - 1, 1) * STEP, STEP)
+    return Table.of(Header(columns, experiment, known, units=UNITS), rows)
 
 
 def table_of(

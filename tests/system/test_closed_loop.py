@@ -20,7 +20,7 @@ from auv_fmu.saturation import ARCTAN
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.metrics import indices
+from orchestrator.vehicle.indices import metrics_of
 from orchestrator.vehicle.signals import tracking_error, true_control_point
 from support.instances import unpacked
 from support.runs import final_error, run
@@ -191,7 +191,10 @@ def test_estimated_velocity_is_the_true_one_after_the_transient(quiet: Table):
 
 def test_jacobi_changes_the_efforts_by_less_than_4_percent(system: System, noisy: Table):
     delayed = run(system, 100.0, 0.02, "jacobi")
-    change = np.divide(indices(delayed)["l2_effort"], indices(noisy)["l2_effort"]) - 1.0
+    change = (
+        np.divide(metrics_of(delayed).found()["l2_effort"], metrics_of(noisy).found()["l2_effort"])
+        - 1.0
+    )
     assert np.abs(change).max() < 0.04
     assert np.abs(change).max() > 1e-6, "the order must make a difference"
 

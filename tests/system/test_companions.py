@@ -14,7 +14,7 @@ from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.preparation import loaded, prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
-from orchestrator.vehicle.signals import Y_D
+from orchestrator.vehicle.signals import STANDARD
 from support.markdown import DOCS, blocks
 
 WAYPOINTS = "x,y,z\n0,0,-2\n3,0,-2\n3,3,-2\n"
@@ -56,7 +56,7 @@ def test_both_follow_the_reference_of_the_scenario(workplace, text):
         f"{PD}[steps]\nplanner = 0.5\n[parameters]\nplanner.tau_d.u = 3.0\n"
     )
     ours, theirs = runs_of(text)
-    assert np.array_equal(ours.group(*Y_D), theirs.group(*Y_D))
+    assert np.array_equal(ours.group(*STANDARD.y_d), theirs.group(*STANDARD.y_d))
     assert not np.array_equal(ours["plant.eta.x"], theirs["plant.eta.x"])
 
 
@@ -64,7 +64,7 @@ def test_both_follow_the_same_reference_in_the_example_of_the_guide(workplace):
     example = next(block.text for block in blocks(DOCS / "events.md", "toml"))
     ours, theirs = runs_of(example.replace("stop_time = 40.0\n", ""), 12.0)
     assert ours["planner.y_d.z"][0] == -2.0
-    assert np.array_equal(ours.group(*Y_D), theirs.group(*Y_D))
+    assert np.array_equal(ours.group(*STANDARD.y_d), theirs.group(*STANDARD.y_d))
 
 
 def test_the_surroundings_are_those_of_the_scenario_and_the_controller_is_its_own(workplace):

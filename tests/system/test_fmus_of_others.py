@@ -95,7 +95,7 @@ def test_files_hold_texts_and_give_the_numbers_beside_them_again(workplace, form
         with Path("r", "result.csv").open(newline="", encoding="utf-8") as file:
             names, *rows = csv.reader(file)
         assert [row[names.index("a.heard")] for row in rows] == [said] * 4
-    _, table = read_result(Path("r"))
+    _, table, *_ = read_result(Path("r"))
     assert (table["a.y"] == 101325.0).all()
     assert "a.heard" not in table
 

@@ -106,7 +106,7 @@ def test_record_that_does_not_name_a_table_is_not_its_record(results, tmp_path):
         (tmp_path / name).write_bytes((results / "quiet" / "result.csv").read_bytes())
     (tmp_path / "run.json").write_bytes((results / "quiet" / "run.json").read_bytes())
     assert read_result(tmp_path)[1].parameters
-    name, table = read_result(tmp_path / "other.csv")
+    name, table, *_ = read_result(tmp_path / "other.csv")
     assert name == "other"
     assert not table.parameters
 

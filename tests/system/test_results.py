@@ -162,7 +162,7 @@ def test_who_takes_fmus_along_takes_those_that_were_read(workplace: Path):
 
 def test_stored_result_is_read_again_with_its_parameters():
     assert main(["run", "fig4", "--stop-time", "1", "--no-figures"]) == 0
-    name, table = read_result(Path("results/fig4"))
+    name, table, *_ = read_result(Path("results/fig4"))
     again = simulate("fig4", stop_time=1.0)
     assert name == "fig4"
     assert np.array_equal(table.rows, again.rows)

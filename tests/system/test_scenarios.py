@@ -23,7 +23,7 @@ from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import PortName
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.certificates import COLUMNS, certificates
-from orchestrator.vehicle.metrics import indices
+from orchestrator.vehicle.indices import metrics_of
 from orchestrator.vehicle.signals import tracking_error
 from support.runs import final_error, system_of
 from support.runs import run as simulated
@@ -55,7 +55,7 @@ def run(dist: Path) -> Runner:
 
 
 def variation(result: Table) -> float:
-    return sum(indices(result)["total_variation"])
+    return sum(metrics_of(result).found()["total_variation"])
 
 
 def test_all_figures_are_there():
@@ -125,25 +125,25 @@ def test_smallest_turning_radius_is_that_of_the_printed_equations(dist: Path):
 
 
 def test_fig4_does_not_saturate(run: Runner):
-    assert not any(indices(run("fig4"))["saturated_fraction"])
-    assert not any(indices(run("fig4", plant__noise__std=0.0))["saturated_fraction"])
+    assert not any(metrics_of(run("fig4")).found()["saturated_fraction"])
+    assert not any(metrics_of(run("fig4", plant__noise__std=0.0)).found()["saturated_fraction"])
 
 
 @pytest.mark.parametrize("eps_t", [10.0, 1.0])
 def test_fig5_proposed_does_not_saturate(run: Runner, eps_t: float):
-    assert not any(indices(run("fig5", controller__eps_t=eps_t))["saturated_fraction"])
+    assert not any(metrics_of(run("fig5", controller__eps_t=eps_t)).found()["saturated_fraction"])
 
 
 def test_fig5_pd_saturates_chatters_and_ends_more_accurate(run: Runner):
     proposed, pd = run("fig5"), run("fig5-pd")
-    assert all(indices(pd)["saturated_fraction"])
+    assert all(metrics_of(pd).found()["saturated_fraction"])
     assert variation(pd) >= 3.0 * variation(proposed)
     assert (final_error(proposed) >= 5.0 * final_error(pd)).all()
 
 
 @pytest.mark.parametrize(("name", "published"), [("fig5", EFFORT_PROPOSED), ("fig5-pd", EFFORT_PD)])
 def test_published_efforts_are_met_within_a_factor_of_2(run: Runner, name, published):
-    ratio = np.divide(indices(run(name))["l2_effort"], published)
+    ratio = np.divide(metrics_of(run(name)).found()["l2_effort"], published)
     assert (ratio > 0.5).all()
     assert (ratio < 2.0).all()
 
@@ -170,7 +170,7 @@ def test_fig5_passes_the_vertical_without_a_jump(run: Runner):
 
 
 def test_fig7_needs_more_effort_under_more_disturbance(run: Runner):
-    efforts = [np.array(indices(run(f"fig7{letter}"))["l2_effort"]) for letter in "abc"]
+    efforts = [np.array(metrics_of(run(f"fig7{letter}")).found()["l2_effort"]) for letter in "abc"]
     assert (efforts[0] < efforts[1]).all()
     assert (efforts[1] < efforts[2]).all()
 
@@ -189,14 +189,14 @@ def test_jacobi_order_makes_pd_chatter_and_leaves_the_proposed_controller_alone(
 
 
 def test_jacobian_as_printed_saturates_where_the_full_attitude_does_not(run: Runner):
-    printed = indices(run("fig5", controller__printed_jacobian=True))
+    printed = metrics_of(run("fig5", controller__printed_jacobian=True)).found()
     assert any(printed["saturated_fraction"])
     assert sum(printed["total_variation"]) > 3.0 * variation(run("fig5"))
 
 
 def test_noise_of_1_cm_saturates_and_1_mm_does_not(run: Runner):
-    assert min(indices(run("fig4", plant__noise__std=0.01))["peak_command"]) > 160.0
-    assert max(indices(run("fig4"))["peak_command"]) < 80.0
+    assert min(metrics_of(run("fig4", plant__noise__std=0.01)).found()["peak_command"]) > 160.0
+    assert max(metrics_of(run("fig4")).found()["peak_command"]) < 80.0
 
 
 @pytest.mark.parametrize("name", ["fig4", "fig5", "fig6", "fig7a", "fig7b", "fig7c"])

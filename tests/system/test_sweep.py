@@ -15,11 +15,11 @@ from orchestrator.commands.main import main
 from orchestrator.runs.preparation import loaded
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import INDICES
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import BATCH, ENGINES, read_study, study_of
 from orchestrator.studies.sweep import Means, faster
+from orchestrator.vehicle.indices import index_columns
 from support import others
 from support.machine import contents
 
@@ -58,7 +58,7 @@ def check(result: Any, outcomes: list[Any]) -> None:
     """That a table has these outcomes, one a run, in their order."""
     assert list(result["run"]) == list(range(len(outcomes)))
     assert list(result["failure"]) == [outcome.failure for outcome in outcomes]
-    for name in INDICES:
+    for name in index_columns():
         expected = [outcome.indices.get(name, np.nan) for outcome in outcomes]
         assert np.array_equal(result[name], expected, equal_nan=True), name
 

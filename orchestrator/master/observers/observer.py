@@ -33,7 +33,8 @@ class Header:
         experiment: that is run.
         parameters: of all components, as the FMUs reported them after initialisation.
         loop: which one makes the steps, `python` or `compiled`: the rows are the same.
-        texts: for which numbers stand in the rows, by the columns that have them.
+        strings: texts for which numbers stand in the rows, by the columns that have them.
+        units: of the columns that have one, as the FMUs write them.
 
     """
 
@@ -42,6 +43,7 @@ class Header:
     parameters: Mapping[PortName, Any] = field(default_factory=dict)
     loop: str = field(default="python", compare=False)
     strings: Mapping[str, StringTable] = field(default_factory=dict, compare=False)
+    units: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def text_places(self) -> list[tuple[int, StringTable]]:
         """Where numbers of texts stand in a row, time first, and whose they are."""

@@ -14,7 +14,7 @@ import numpy as np
 from auv_fmu.actuators import Limits
 from auv_fmu.types import Vector3, Vector4
 from auv_fmu.vectors import norm
-from orchestrator.studies.engine import REACHED
+from orchestrator.vehicle.indices import REACHED
 
 #: Up to where an accumulator goes.
 END = np.dtype(

@@ -21,20 +21,7 @@ from auv_fmu.types import Vector3, Vector6
 from auv_fmu.vectors import difference
 from orchestrator.studies.batch.accumulator import RowSignals, StepSignals, take_row, take_step
 from orchestrator.studies.batch.numbers import flat, nought, square
-from orchestrator.vehicle.signals import (
-    APPLIED,
-    AXES,
-    COMMANDED,
-    DIRECTIONS,
-    DY,
-    DY_D,
-    DY_HAT,
-    NU,
-    POSTURE,
-    TAU,
-    THETA_HAT,
-    Y_D,
-)
+from orchestrator.vehicle.signals import AXES, DIRECTIONS, STANDARD
 
 #: The controller's part of the loop: whoever compiles this module for another one puts it here.
 law: Law = LAWS[Gains]
@@ -42,18 +29,18 @@ law: Law = LAWS[Gains]
 
 #: Of the rows, after the time: the names of their columns.
 COLUMNS: tuple[str, ...] = (
-    *POSTURE,
-    *NU,
+    *STANDARD.posture,
+    *STANDARD.nu,
     *(f"plant.y.{axis}" for axis in AXES),
-    *DY,
-    *Y_D,
-    *DY_D,
+    *STANDARD.dy,
+    *STANDARD.y_d,
+    *STANDARD.dy_d,
     *(f"planner.ddy_d.{axis}" for axis in AXES),
-    *DY_HAT,
-    *THETA_HAT,
-    *TAU,
-    *COMMANDED,
-    *APPLIED,
+    *STANDARD.dy_hat,
+    *STANDARD.theta_hat,
+    *STANDARD.tau,
+    *STANDARD.commanded,
+    *STANDARD.applied,
     *(f"plant.tau_w.{direction}" for direction in DIRECTIONS),
 )
 

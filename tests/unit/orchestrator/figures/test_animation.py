@@ -8,6 +8,7 @@ from PIL import Image
 
 from orchestrator.figures.animation import _Camera, animate, check_film
 from orchestrator.figures.body import body
+from orchestrator.figures.style import Drawn
 from orchestrator.machine.errors import InputError
 from support.tables import loop_table
 
@@ -56,7 +57,7 @@ def test_body_is_as_long_as_one_and_its_upper_fin_is_above():
 
 def test_film_has_a_frame_for_each_instant(tmp_path):
     path = tmp_path / "film.gif"
-    animate("title", loop_table(), path, fps=2)
+    animate("title", Drawn("run", loop_table()), path, fps=2)
     with Image.open(path) as film:
         frames = []
         for k in range(film.n_frames):

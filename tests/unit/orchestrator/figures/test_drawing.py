@@ -12,7 +12,7 @@ import pytest
 from orchestrator.figures import FIGURES, Drawn, check_figure, draw, overlay
 from orchestrator.figures.layout import compose
 from orchestrator.machine.errors import InputError
-from orchestrator.vehicle.signals import COMMANDED, DY_HAT, NU, POSTURE, THETA_HAT, Y_D
+from orchestrator.vehicle.signals import STANDARD
 from support.tables import loop_table
 from support.tiers import slow
 
@@ -70,9 +70,9 @@ def test_panels_end_together():
 @pytest.mark.parametrize(
     ("without", "note"),
     [
-        (THETA_HAT, "estimated parameters left out: no controller.theta_hat[1]"),
-        (Y_D, "tracking errors left out: no planner.y_d.x"),
-        (COMMANDED, "commands left out: no plant.tau.u"),
+        (STANDARD.theta_hat, "estimated parameters left out: no controller.theta_hat[1]"),
+        (STANDARD.y_d, "tracking errors left out: no planner.y_d.x"),
+        (STANDARD.commanded, "commands left out: no plant.tau.u"),
     ],
 )
 def test_what_is_missing_is_left_out_with_a_note(without, note):
@@ -82,14 +82,22 @@ def test_what_is_missing_is_left_out_with_a_note(without, note):
 
 
 def test_a_figure_that_is_missing_is_left_out_with_a_note(tmp_path):
-    notes = notes_of("tracking", loop_table(without=DY_HAT), folder=tmp_path)
+    notes = notes_of("tracking", loop_table(without=STANDARD.dy_hat), folder=tmp_path)
     assert notes == ["f-velocity left out: no controller.dy_hat.x"]
     assert {path.name for path in tmp_path.iterdir()} == {"f.png", "f.svg"}
 
 
 @pytest.mark.parametrize("kind", FIGURES)
 def test_no_vehicle_is_no_figure_and_one_note(tmp_path, kind):
-    table = loop_table(without=(*POSTURE, *NU, *COMMANDED, *THETA_HAT, *DY_HAT))
+    table = loop_table(
+        without=(
+            *STANDARD.posture,
+            *STANDARD.nu,
+            *STANDARD.commanded,
+            *STANDARD.theta_hat,
+            *STANDARD.dy_hat,
+        )
+    )
     [note] = notes_of(kind, table, folder=tmp_path)
     assert note.startswith("no figure: the run has no plant.")
     assert not list(tmp_path.iterdir())
@@ -102,14 +110,14 @@ def test_a_run_without_a_step_is_no_figure(tmp_path):
 
 
 def test_a_companion_that_lacks_something_is_named(tmp_path):
-    companion = loop_table(without=Y_D)
+    companion = loop_table(without=STANDARD.y_d)
     notes = notes_of("comparison-errors", loop_table(), companion, folder=tmp_path)
     assert "tracking errors of run 1 left out: no planner.y_d.x" in notes
 
 
 def test_colours_belong_to_runs():
     """A run that is not there does not hand its colour to the next."""
-    tables = (loop_table(), loop_table(without=Y_D), loop_table())
+    tables = (loop_table(), loop_table(without=STANDARD.y_d), loop_table())
     runs = [Drawn(name, table) for name, table in zip("abc", tables, strict=True)]
     figure = overlay("", runs)
     colours = {
@@ -157,7 +165,7 @@ def test_same_run_is_the_same_file(tmp_path):
 @pytest.mark.parametrize("value", [np.nan, *slow(2e8, 1e-9, np.inf)])
 def test_matplotlib_keeps_its_thoughts_to_itself(tmp_path, caplog, value):
     table = loop_table()
-    for column in (*COMMANDED, *THETA_HAT, *DY_HAT):
+    for column in (*STANDARD.commanded, *STANDARD.theta_hat, *STANDARD.dy_hat):
         table[column][200:] = value
     with warnings.catch_warnings(), caplog.at_level(logging.WARNING):
         warnings.simplefilter("error")

@@ -1,12 +1,13 @@
 """Any signals: which are chosen, which share a panel, and what they are called."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from orchestrator.figures.plot import group_of, plot
 from orchestrator.figures.style import save
 from orchestrator.machine.errors import InputError
-from orchestrator.vehicle.signals import unit_of
 from support.tables import loop_table, table_of
 
 TIME = 0.02 * np.arange(10)
@@ -86,15 +87,25 @@ def test_values_that_no_axis_can_show_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("column", "group", "unit"),
+    ("column", "group"),
     [
-        ("plant.y.x", "plant.y", "m"),
-        ("controller.theta_hat[2]", "controller.theta_hat", ""),
-        ("plant.fault", "plant.fault", ""),
-        ("disturbance.tau_w.p", "disturbance.tau_w", "N·m"),
-        ("vehicle.nu.r", "vehicle.nu", "rad/s"),
+        ("plant.y.x", "plant.y"),
+        ("controller.theta_hat[2]", "controller.theta_hat"),
+        ("plant.fault", "plant.fault"),
     ],
 )
-def test_groups_and_units(column, group, unit):
+def test_groups(column, group):
     assert group_of(column) == group
-    assert unit_of(column) == unit
+
+
+def test_units_are_those_of_the_fmus():
+    """Of a group a panel for each unit; the members of a vector share theirs."""
+    line = np.linspace(0.0, 1.0, 10)
+    names = ("own__F__x", "own__F__y", "own__M__z", "own__a", "own__k__1", "own__k__2")
+    table = table_of(**{name.replace("__1", "[1]").replace("__2", "[2]"): line for name in names})
+    units = {
+        "own.F.x": "N", "own.F.y": "N.m", "own.M.z": "N.m", "own.a": "m/s2", "own.k[1]": "N",
+    }  # fmt: skip
+    table.header = replace(table.header, units=units)
+    labels = [axes.get_ylabel() for axes in plot([("run", table)], ["own.*"]).axes]
+    assert labels == ["own.F.x\n[N]", "own.F.y\n[N·m]", "own.M.z\n[N·m]", "own.a\n[m/s²]", "own.k"]

@@ -21,7 +21,7 @@ from orchestrator.paper.measures import (
     turning_radius,
 )
 from orchestrator.system.names import PortName
-from orchestrator.vehicle.signals import APPLIED, THETA_HAT, Y_D
+from orchestrator.vehicle.signals import STANDARD
 from support.tables import table_of
 from support.texts import numbers_in, tells
 
@@ -158,7 +158,7 @@ def test_more_accurate_is_said_in_times():
 def applied(values):
     """Three signals of one course, sampled each second."""
     return table_of(
-        np.arange(float(len(values))), **{k.replace(".", "__"): values for k in APPLIED}
+        np.arange(float(len(values))), **{k.replace(".", "__"): values for k in STANDARD.applied}
     )
 
 
@@ -178,7 +178,9 @@ def test_severe_chattering_is_held_against_the_first_minute():
 def still(offsets):
     """A level vehicle at rest in the origin, and a reference that is so far along y."""
     posture = {f"plant__eta__{k}": 0.0 for k in ("x", "y", "z", "phi", "theta", "psi")}
-    reference = dict(zip((k.replace(".", "__") for k in Y_D), (ELL, offsets, 0.0), strict=True))
+    reference = dict(
+        zip((k.replace(".", "__") for k in STANDARD.y_d), (ELL, offsets, 0.0), strict=True)
+    )
     time = np.arange(float(len(offsets))) * 20.0
     return table_of(time, {PortName("plant", "ell"): ELL}, **posture, **reference)
 
@@ -254,7 +256,7 @@ def test_efforts_are_held_against_the_impulse_of_the_way():
 
 
 def estimating(largest, **metrics):
-    estimates = {k.replace(".", "__"): 0.5 for k in THETA_HAT} | {
+    estimates = {k.replace(".", "__"): 0.5 for k in STANDARD.theta_hat} | {
         "controller__theta_hat[2]": largest
     }
     return outcome(table_of(np.arange(2.0), **estimates), **metrics)

@@ -73,9 +73,9 @@ def test_a_section_has_its_numbers_with_units_and_its_command(tmp_path):
     [section] = sections(["fig7a"])
     text = "\n\n".join(written(section, Known(INDICES), ["no velocity"], tmp_path))
     assert text.startswith("### Fig. 7(a): proposed controller under A_f = 1, A_d = 2\n")
-    assert "| L2 effort (u; q, r) | 1 N·√s; 2, 3 N·m·√s |" in text
+    assert "| L2 effort (u, q, r) | 1 N·√s; 2, 3 N·m·√s |" in text
     assert "| share of saturated steps (u, q, r) | 0, 0.5, 1 |" in text
-    assert "| e_f of the last 5 s (x, y, z) | 0.1, 0.2, 0.3 m |" in text
+    assert "| final error (x, y, z) | 0.1, 0.2, 0.3 m |" in text
     assert "peak command" not in text
     assert "`auv-fmu run fig7a`, until 3 s" in text
     assert "reach the controller: `plant.dy.x`." in text

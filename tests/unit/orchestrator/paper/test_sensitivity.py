@@ -27,9 +27,7 @@ from orchestrator.runs.request import Request
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.system.names import port_name
-from orchestrator.vehicle.signals import APPLIED as APPLIED_PORTS
-from orchestrator.vehicle.signals import COMMANDED as COMMANDED_PORTS
-from orchestrator.vehicle.signals import ELL, POSTURE, Y_D, tracking_error
+from orchestrator.vehicle.signals import STANDARD, tracking_error
 from support.tables import table_of
 from support.variants import (
     APPLIED,
@@ -45,13 +43,14 @@ from support.variants import (
     spread,
 )
 
-COLUMNS = (*POSTURE, *Y_D, *APPLIED_PORTS, *COMMANDED_PORTS)
+COLUMNS = (*STANDARD.posture, *STANDARD.y_d, *STANDARD.applied, *STANDARD.commanded)
 
 
 def run_of(rows=10_001, **columns):
     """A run of 200 s in steps of 20 ms; what is not given is zero."""
     zeros = dict.fromkeys((name.replace(".", "__") for name in COLUMNS), 0.0)
-    return table_of(0.02 * np.arange(rows), {port_name(ELL): 0.35}, **{**zeros, **columns})
+    known = {port_name(STANDARD.ell): 0.35}
+    return table_of(0.02 * np.arange(rows), known, **{**zeros, **columns})
 
 
 def test_numbers_are_read_off_rows():
@@ -89,7 +88,7 @@ def test_a_run_that_ends_early_has_no_numbers():
 def test_formulas_are_those_that_someone_would_code():
     """By the rows themselves, at every end time."""
     tau = np.random.default_rng(2).uniform(-80.0, 80.0, (10_000, 3))
-    columns = zip(APPLIED_PORTS, np.vstack(([0.0] * 3, tau)).T, strict=True)
+    columns = zip(STANDARD.applied, np.vstack(([0.0] * 3, tau)).T, strict=True)
     numbers = numbers_of(run_of(**{name.replace(".", "__"): tau for name, tau in columns}))
     for time in (20.0, 82.0, 200.0):
         taken = tau[: round(time / 0.02)]

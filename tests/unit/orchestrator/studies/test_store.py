@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from orchestrator.machine.errors import InputError
-from orchestrator.studies.engine import INDICES, Outcome
+from orchestrator.studies.engine import Outcome
 from orchestrator.studies.store import StudyResult, read_record, store
+from orchestrator.vehicle.indices import index_columns
 from support.machine import contents, eventually
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow: the extra `studies`")
@@ -36,14 +37,14 @@ class Toys:
 
 
 def outcome(number: int) -> Outcome:
-    return Outcome(number, {name: 0.3 * number + i for i, name in enumerate(INDICES)})
+    return Outcome(number, {name: 0.3 * number + i for i, name in enumerate(index_columns())})
 
 
 def test_what_is_kept_is_found_again_and_the_rest_is_missing(tmp_path):
-    with store(tmp_path / "new", RECORD) as first:
+    with store(tmp_path / "new", RECORD, index_columns()) as first:
         assert list(first.missing(6)) == [0, 1, 2, 3, 4, 5]
         first.add([outcome(4), outcome(1)])
-    with store(tmp_path / "new", RECORD) as second:
+    with store(tmp_path / "new", RECORD, index_columns()) as second:
         assert len(second) == 2
         assert list(second.missing(6)) == [0, 2, 3, 5]
         missing = second.missing(6)
@@ -55,16 +56,16 @@ def test_what_is_kept_is_found_again_and_the_rest_is_missing(tmp_path):
 
 
 def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
-    odd = dict.fromkeys(INDICES, 0.1 + 0.2) | {"late_error": -0.0, "largest_speed": np.inf}
+    odd = dict.fromkeys(index_columns(), 0.1 + 0.2) | {"late_error": -0.0, "largest_speed": np.inf}
     del odd["time_to_reach"]
     outcomes = [outcome(3), Outcome(1, {}, "stopped at t = 1 s: it would"), outcome(2)]
-    with store(tmp_path, RECORD) as unfinished:
+    with store(tmp_path, RECORD, index_columns()) as unfinished:
         unfinished.add(outcomes)
         unfinished.add([Outcome(0, odd)])
         unfinished.publish(Toys(4))
     assert contents(tmp_path).keys() == {"runs.parquet", "study.json"}
     table = parquet.read_table(tmp_path / "runs.parquet")
-    names = ["run", "scenario", "toy.x", "toy.name", *INDICES, "failure"]
+    names = ["run", "scenario", "toy.x", "toy.name", *index_columns(), "failure"]
     assert table.column_names == names
     rows = table.to_pylist()
     assert [row["run"] for row in rows] == [0, 1, 2, 3]
@@ -72,14 +73,14 @@ def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
     for number, row in enumerate(rows):
         assert (row["scenario"], {k: row[k] for k in Toys(4).columns}) == Toys(4).point(number)
     assert rows[2] | outcome(2).indices == rows[2]
-    assert all(rows[1][name] is None for name in INDICES)
+    assert all(rows[1][name] is None for name in index_columns())
     assert rows[0]["time_to_reach"] is None
     assert np.signbit(rows[0].pop("late_error"))
     assert rows[0] | {k: v for k, v in odd.items() if k != "late_error"} == rows[0]
 
 
 def test_result_gives_columns_and_suggests_names(tmp_path):
-    with store(tmp_path, RECORD | {"runs": 2}) as unfinished:
+    with store(tmp_path, RECORD | {"runs": 2}, index_columns()) as unfinished:
         unfinished.add([outcome(1), Outcome(0, {}, "it would not")])
         unfinished.publish(Toys(2))
     result = StudyResult(tmp_path)
@@ -97,22 +98,22 @@ def test_result_gives_columns_and_suggests_names(tmp_path):
 
 
 def test_study_that_is_done_is_not_opened_again(tmp_path):
-    with store(tmp_path, RECORD | {"runs": 1}) as unfinished:
+    with store(tmp_path, RECORD | {"runs": 1}, index_columns()) as unfinished:
         unfinished.add([outcome(0)])
         unfinished.publish(Toys(1))
     # As if it had been killed before its database was gone.
-    with store(tmp_path, RECORD) as unfinished:
+    with store(tmp_path, RECORD, index_columns()) as unfinished:
         assert unfinished.is_done
     assert not (tmp_path / "unfinished.sqlite").exists()
 
 
 def test_other_study_is_refused(tmp_path):
-    with store(tmp_path, RECORD):
+    with store(tmp_path, RECORD, index_columns()):
         pass
     other = {"made_of": {"points": "5678", "scenario": ["fig4"], "step": 0.01}}
     with (
         pytest.raises(InputError, match="another study, which differs in points, step; choose"),
-        store(tmp_path, other),
+        store(tmp_path, other, index_columns()),
     ):
         raise AssertionError
     assert read_record(tmp_path) == json.loads(json.dumps(RECORD))
@@ -120,9 +121,9 @@ def test_other_study_is_refused(tmp_path):
 
 def test_folder_is_for_one_process(tmp_path):
     with (
-        store(tmp_path, RECORD),
+        store(tmp_path, RECORD, index_columns()),
         pytest.raises(InputError, match="another run is writing into"),
-        store(tmp_path, RECORD),
+        store(tmp_path, RECORD, index_columns()),
     ):
         raise AssertionError
 
@@ -139,24 +140,24 @@ def test_folder_is_for_one_process(tmp_path):
 )
 def test_what_is_not_ours_is_refused(tmp_path, file, content, words):
     (tmp_path / file).write_text(content)
-    with pytest.raises(InputError, match=words), store(tmp_path, RECORD):
+    with pytest.raises(InputError, match=words), store(tmp_path, RECORD, index_columns()):
         raise AssertionError
     assert (tmp_path / file).read_text() == content
 
 
 def test_damaged_database_and_place_that_is_no_folder_are_one_line(tmp_path):
-    with store(tmp_path / "study", RECORD):
+    with store(tmp_path / "study", RECORD, index_columns()):
         pass
     (tmp_path / "study" / "unfinished.sqlite").write_bytes(b"no database" * 1000)
     with (
         pytest.raises(InputError, match=r"unfinished\.sqlite is not a file that auv-fmu wrote"),
-        store(tmp_path / "study", RECORD),
+        store(tmp_path / "study", RECORD, index_columns()),
     ):
         raise AssertionError
     (tmp_path / "file").touch()
     with (
         pytest.raises(InputError, match=r"cannot write into .*choose another folder"),
-        store(tmp_path / "file", RECORD),
+        store(tmp_path / "file", RECORD, index_columns()),
     ):
         raise AssertionError
 
@@ -169,8 +170,9 @@ from itertools import count
 from pathlib import Path
 from orchestrator.studies.engine import Outcome
 from orchestrator.studies.store import store
+from orchestrator.vehicle.indices import index_columns
 
-with store(Path(sys.argv[1]), {RECORD!r}) as unfinished:
+with store(Path(sys.argv[1]), {RECORD!r}, index_columns()) as unfinished:
     for block in count(len(unfinished) // {BLOCK}):
         unfinished.add([Outcome({BLOCK} * block + i, {{}}, str(i)) for i in range({BLOCK})])
 """
@@ -185,7 +187,7 @@ def test_kill_loses_at_most_the_block_under_way(tmp_path):
         assert eventually(lambda log=log: log.exists() and log.stat().st_size > 100_000)
         process.send_signal(signal.SIGKILL)
         process.wait()
-        with store(tmp_path, RECORD) as unfinished:
+        with store(tmp_path, RECORD, index_columns()) as unfinished:
             assert len(unfinished) > done
             done = len(unfinished)
             # All of a block, or none.

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.studies.engine import INDICES
-from orchestrator.studies.figures.study_data import Values, is_known
+from orchestrator.figures.study_values import Values, is_known
+from orchestrator.vehicle.indices import index_columns
 
 N = 6
 
 
 def columns(**changes):
     """Six runs of two scenarios: one fails, one is far off, one saturates."""
-    made = {name: np.zeros(N) for name in INDICES}
+    made = {name: np.zeros(N) for name in index_columns()}
     made |= {
         "scenario": np.array(["fig5", "fig5-pd"] * 3, dtype=object),
         "controller.k_d": np.array([10.0, np.nan, 20.0, np.nan, 30.0, np.nan]),
@@ -62,7 +62,8 @@ def test_only_what_runs_have_is_known(value, known):
 
 
 def test_runs_that_lack_a_value_are_a_part_of_their_own():
-    parts = dict(Values(columns()).parts(["scenario", "controller.k_d"]))
+    legends = {"fig5": "proposed", "fig5-pd": "PD"}
+    parts = dict(Values(columns(), legends=legends).parts(["scenario", "controller.k_d"]))
     assert list(parts) == [
         "proposed, controller.k_d 10", "PD", "proposed, controller.k_d 20",
         "proposed, controller.k_d 30",

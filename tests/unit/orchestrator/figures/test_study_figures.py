@@ -5,15 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.studies.engine import INDICES
-from orchestrator.studies.figures import draw_figures, read_figures
-from orchestrator.studies.figures.bands import bands
-from orchestrator.studies.figures.fronts import best
-from orchestrator.studies.figures.influence import influence
-from orchestrator.studies.figures.maps import maps
-from orchestrator.studies.figures.study_data import Values
+from orchestrator.figures.study_figures import bands, best, draw_figures, influence, maps
+from orchestrator.figures.study_values import Values
+from orchestrator.studies.figure_entries import read_figures
+from orchestrator.vehicle.indices import index_columns
 
 GRID = np.geomspace(1.0, 100.0, 5)
+LEGENDS = {"fig5": "proposed", "fig5-pd": "PD"}
 VARIED = {"disturbance.A_f": float, "disturbance.A_d": float}
 
 
@@ -23,7 +21,7 @@ def columns():
         a.ravel() for a in np.meshgrid(GRID, GRID, range(3), ["fig5", "fig5-pd"], indexing="ij")
     )
     n = len(A_f)
-    made = {name: np.full(n, np.nan) for name in INDICES}
+    made = {name: np.full(n, np.nan) for name in index_columns()}
     made["late_error"] = np.random.default_rng(3).lognormal(0.0, 1.0, n)
     made["late_error"][A_f == GRID[-1]] = np.nan
     made["peak_command.u"] = A_f**2
@@ -60,7 +58,7 @@ def test_maps_are_medians_and_grey_where_no_run_has_any():
     runs = columns()
     figure = maps(
         plan(kind="maps", x="disturbance.A_f", y="disturbance.A_d", show="late_error"),
-        "", Values(runs),
+        "", Values(runs, legends=LEGENDS),
     )  # fmt: skip
     proposed, pd, _ = figure.axes
     assert (proposed.get_title(), pd.get_title()) == ("proposed", "PD")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from orchestrator.machine.errors import InputError
-from orchestrator.studies.figures.figure_entries import read_figures
+from orchestrator.studies.figure_entries import read_figures
 
 VARIED = {"plant.eta0.z": float, "controller.k_d": float, "controller.observer": str}
 

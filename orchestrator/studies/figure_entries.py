@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
+from orchestrator.figures.study_figures import FigureEntry
+from orchestrator.figures.study_values import SCENARIO, is_known
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
-from orchestrator.studies.engine import INDICES
-from orchestrator.studies.figures.study_data import SCENARIO, is_known
 from orchestrator.system.names import flattened
-
-#: What a figure can be.
-BANDS, MAPS, FRONT, INFLUENCE = "bands", "maps", "front", "influence"
+from orchestrator.vehicle.indices import index_columns
 
 #: What a figure may be called: its files are.
 _NAME = re.compile(r"[\w-]+")
@@ -21,32 +18,16 @@ _NAME = re.compile(r"[\w-]+")
 #: The table that is no figure.
 LABELS = "labels"
 
-#: What is shown of a study whose file does not say it.
-_USUAL = ("late_error", "peak_command", "lost")
-
-
-@dataclass(frozen=True)
-class FigureEntry:
-    """A figure that is to be drawn; :mod:`.study_file` says what each entry means.
-
-    Attributes:
-        name: of its files.
-
-    """
-
-    name: str
-    kind: str
-    x: Sequence[str] = ()
-    y: str = ""
-    show: Sequence[str] = ()
-    by: Sequence[str] = ()
-    where: Mapping[str, Any] = field(default_factory=dict)
-    limits: Mapping[str, float] = field(default_factory=dict)
-    labels: Mapping[str, str] = field(default_factory=dict)
+#: What is shown of a study whose file does not say it: of each vehicle, and of all together.
+_USUAL, _ALL = ("late_error", "peak_command"), "lost"
 
 
 def read_figures(
-    where: str, figures: Mapping[str, Any], varied: Mapping[str, type], is_compared: bool
+    where: str,
+    figures: Mapping[str, Any],
+    varied: Mapping[str, type],
+    is_compared: bool,
+    indices: Sequence[str] | None = None,
 ) -> tuple[FigureEntry, ...]:
     """The figures of a study.
 
@@ -55,16 +36,17 @@ def read_figures(
         figures: that the study file has; without any the usual one is drawn.
         varied: the types of what varies, by name.
         is_compared: whether there are several scenarios.
+        indices: the columns of what comes out of a run; None: of one vehicle.
 
     Raises:
         Refused: a figure names what runs do not have.
 
     """
-    tables = dict(figures)
+    tables, indices = dict(figures), indices or index_columns()
     labels = dict(flattened(tables.pop(LABELS, {})))
     numbers = [name for name, kind in varied.items() if kind is not str]
     if not tables and numbers:
-        tables["influence"] = {"kind": INFLUENCE, "x": numbers, "show": list(_USUAL)}
+        tables["influence"] = {"kind": "influence", "x": numbers, "show": _usual(indices)}
     by = (SCENARIO,) if is_compared else ()
     findings, plans = Findings(), []
     for name, table in tables.items():
@@ -73,7 +55,7 @@ def read_figures(
                 raise InputError(
                     f"{where}: figures: {name!r} is no name of a file: letters, digits, -"
                 )
-            _check_names(f"{where}: figures: {name}", table, (*numbers, *INDICES), (*varied, *by))
+            _check_names(f"{where}: figures: {name}", table, (*numbers, *indices), (*varied, *by))
         plans.append(
             FigureEntry(
                 name,
@@ -89,6 +71,12 @@ def read_figures(
         )
     findings.refuse()
     return tuple(plans)
+
+
+def _usual(indices: Sequence[str]) -> list[str]:
+    """What is shown of a study whose file does not say it: of each vehicle, and of all."""
+    of = [name.removesuffix(_USUAL[0]) for name in indices if name.endswith(_USUAL[0])]
+    return [*(f"{vehicle}{name}" for name in _USUAL for vehicle in of), _ALL]
 
 
 def _check_names(

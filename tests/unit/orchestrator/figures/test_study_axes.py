@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.studies.figures.bins import bins_of, grouped, is_logarithmic
+from orchestrator.figures.study_axes import bins_of, grouped, is_logarithmic
 
 
 @pytest.mark.parametrize(

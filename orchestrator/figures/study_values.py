@@ -10,11 +10,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from orchestrator.figures.style import heading
-from orchestrator.machine.errors import InputError
-from orchestrator.runs.scenario import read_scenario
-from orchestrator.studies.engine import INDICES, REACHED
-from orchestrator.vehicle.signals import THETA_UNITS
+from orchestrator.figures.style import heading, printed_unit
+from orchestrator.vehicle import indices
+from orchestrator.vehicle.indices import REACHED, Index
 
 #: Columns of runs.parquet, an array each; what a run does not have is nan or None.
 Columns: TypeAlias = Mapping[str, np.ndarray]
@@ -22,25 +20,6 @@ Columns: TypeAlias = Mapping[str, np.ndarray]
 #: Columns that are texts.
 SCENARIO, FAILURE = "scenario", "failure"
 
-#: What figures call the indices, by the name before the dot, and their units.
-_INDICES = {
-    "l2_effort": ("L2 effort", {"u": "N·√s", "q": "N·m·√s", "r": "N·m·√s"}),
-    "rms_effort": ("RMS effort", {"u": "N", "q": "N·m", "r": "N·m"}),
-    "peak_command": ("peak command", {"u": "N", "q": "N·m", "r": "N·m"}),
-    "saturated_fraction": ("share of saturated steps", {}),
-    "total_variation": ("total variation", {"u": "N", "q": "N·m", "r": "N·m"}),
-    "final_error": ("final error", dict.fromkeys(("", "x", "y", "z"), "m")),
-    "time_to_reach": ("time to reach", {"": "s"}),
-    "late_error": ("largest late error", {"": "m"}),
-    "estimate_error": ("error of the estimated velocity", {"": "m/s"}),
-    "theta_hat_half": ("estimate at half time", {}),
-    "theta_hat_end": ("estimate at the end", {}),
-    "largest_speed": ("largest speed", {"": "m/s"}),
-    "largest_drift": ("largest drift", {"": "m/s"}),
-}
-_THETA_UNITS = {f"[{i}]": unit for i, unit in enumerate(THETA_UNITS, start=1)}
-
-_MEMBER = re.compile(r"\.(\w+)$|(\[\d\])$")
 _NORM = re.compile(r"\|(.+)\|")
 _UNIT = re.compile(r" \[([^\]]*)\]$")
 
@@ -49,14 +28,31 @@ def _failed(columns: Columns) -> np.ndarray:
     return np.array([isinstance(text, str) and text != "" for text in columns[FAILURE]])
 
 
+def _parts(value: str) -> tuple[Index, str, str] | None:
+    """The index that a column or group is of, its member and its vehicle; None: it is another."""
+    names = "|".join(index.name for index in indices.INDICES)
+    found = re.fullmatch(rf"(?:(.+)\.)?({names})(?:\.(\w+)|\[(\d+)\])?", value)
+    if found is None:
+        return None
+    vehicle, name, *member = found.groups()
+    [index] = (index for index in indices.INDICES if index.name == name)
+    return index, next(filter(None, member), ""), vehicle or ""
+
+
+def _largest(columns: Columns, index: str) -> np.ndarray:
+    """The largest member of an index of each run, of all its vehicles."""
+    named = [name for name in columns if (parts := _parts(name)) and parts[0].name == index]
+    largest: np.ndarray = np.max([columns[name].astype(float) for name in named], axis=0)
+    return largest
+
+
 def _lost(columns: Columns) -> np.ndarray:
-    lost: np.ndarray = ~(columns["late_error"].astype(float) <= REACHED)
+    lost: np.ndarray = ~(_largest(columns, "late_error") <= REACHED)
     return lost
 
 
 def _saturated(columns: Columns) -> np.ndarray:
-    shares = [columns[name].astype(float) for name in INDICES if name.startswith("saturated_")]
-    saturated: np.ndarray = np.max(shares, axis=0) > 0.0
+    saturated: np.ndarray = _largest(columns, "saturated_fraction") > 0.0
     return saturated
 
 
@@ -80,15 +76,21 @@ class Values:
     ====================  ==============================================================
     """
 
-    def __init__(self, columns: Columns, labels: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        columns: Columns,
+        labels: Mapping[str, str] | None = None,
+        legends: Mapping[str, str] | None = None,
+    ) -> None:
         """Take some columns.
 
         Args:
             columns: of the same length.
             labels: of values, in place of what they are called otherwise.
+            legends: what the lines of scenarios are called.
 
         """
-        self._columns, self._labels = columns, labels or {}
+        self._columns, self._labels, self._legends = columns, labels or {}, legends or {}
 
     def __getitem__(self, value: str) -> np.ndarray:
         """A value of each run; nan where it has none."""
@@ -112,19 +114,15 @@ class Values:
             return VERDICTS[value][0]
         if len(factors := _factors(value)) > 1:
             return " · ".join(map(self.label, factors))
-        base = _MEMBER.sub("", value)
-        if base not in _INDICES:
+        if (parts := _parts(value)) is None:
             return value
-        words, units = _INDICES[base]
-        member = value[len(base) :]
-        if base.startswith("theta_hat"):
-            name, unit = (
-                rf"$\hat{{\theta}}_{member.strip('[]')}$, {words}",
-                _THETA_UNITS.get(member),
-            )
-        else:
-            name, unit = f"{words} {member[1:]}".rstrip(), units.get(member[1:])
-        return f"{name} [{unit}]" if unit else name
+        index, member, vehicle = parts
+        units = {str(m): printed_unit(unit) for m, unit in index.units.items()}
+        # A group may have one unit.
+        unit = units.get(member, next(iter(units.values())) if len({*units.values()}) == 1 else "")
+        symbol = f"{index.symbol}_{member}" if member else index.symbol
+        text = f"${symbol}$, {index.label}" if index.symbol else f"{index.label} {member}".rstrip()
+        return ", ".join(filter(None, (text, vehicle))) + (f" [{unit}]" if unit else "")
 
     def name(self, value: str) -> str:
         """What a value is called, without its unit."""
@@ -137,7 +135,7 @@ class Values:
 
     def _rows(self, rows: np.ndarray) -> Values:
         columns = {name: values[rows] for name, values in self._columns.items()}
-        return Values(columns, self._labels)
+        return Values(columns, self._labels, self._legends)
 
     def parts(self, by: Sequence[str]) -> Iterator[tuple[str, Values]]:
         """The runs that agree in some columns, and what tells them from the others.
@@ -162,7 +160,7 @@ class Values:
 
     def _part(self, name: str, value: Any) -> str:
         if name == SCENARIO:
-            return _legend(value)
+            return self._legends.get(value, value)
         number = f"{value:g}" if isinstance(value, int | float) else str(value)
         unit = _UNIT.search(self.label(name))
         return f"{self.name(name)} {number}" + (f" {unit[1]}" if unit else "")
@@ -189,11 +187,3 @@ def _factors(value: str) -> list[str]:
 
 def _is_nan(value: Any) -> bool:
     return isinstance(value, float) and isnan(value)
-
-
-def _legend(reference: str) -> str:
-    """What the lines of a scenario are called."""
-    try:
-        return read_scenario(reference).legend
-    except InputError:
-        return reference

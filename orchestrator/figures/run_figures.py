@@ -1,0 +1,206 @@
+"""Figures of a run by the names that scenarios have for them: rows of panels.
+
+A new one is an entry of :data:`FIGURES`, of the panels here and in :mod:`.panels`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from fmus.ports.quantities import NU, THETA
+from orchestrator.figures.layout import Cell, Panel, Rows, compose
+from orchestrator.figures.panels import (
+    COMMANDS,
+    ERRORS,
+    LOGARITHMIC_ERRORS,
+    PATH,
+    draw_lines,
+    over_time,
+    title,
+)
+from orchestrator.figures.signal import draw_signal
+from orchestrator.figures.style import COLOURS, Drawn, earth_axes, having, printed_unit
+from orchestrator.machine.errors import InputError
+from orchestrator.master.observers.table import Table
+from orchestrator.vehicle.signals import AXES, Loop, Needs, tracking_error, true_control_point
+
+
+def _all_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
+    """The three tracking errors in one panel."""
+    axes = cell.axes()
+    for i, (run, _) in enumerate(having(runs, Loop.for_tracking)):
+        twin = run.label if i else None
+        errors = tracking_error(run.result, run.loop)
+        draw_lines(axes, run.result.time, errors, [f"$e_{k}$" for k in AXES], twin)
+    axes.set_ylabel("error [m]")
+    title(axes, "tracking errors")
+    over_time([axes], runs)
+
+
+def _estimates(cell: Cell, runs: Sequence[Drawn]) -> None:
+    axes = cell.axes()
+    labels = [rf"$\hat{{\theta}}_{i}$ [{unit}]" for i, unit in THETA.items()]
+    for i, (run, _) in enumerate(having(runs, Loop.for_parameter_estimates)):
+        estimates = run.result.step_values(*run.loop.theta_hat)
+        draw_lines(axes, run.result.step_start, estimates, labels, run.label if i else None)
+    axes.set_ylabel("estimate")
+    title(axes, "estimated parameters")
+    over_time([axes], runs)
+
+
+def _estimated_velocity(cell: Cell, runs: Sequence[Drawn]) -> None:
+    """True and estimated velocity of the control point."""
+    run, _ = next(having(runs, Loop.for_velocity_estimates))
+    time, true = run.result.step_start, run.result.start_values(*run.loop.dy)
+    panels = cell.stack(3)
+    has_means = False
+    for k, axes, truth, column in zip(AXES, panels, true.T, run.loop.dy_hat, strict=True):
+        estimate = partial(_estimated, column)
+        has_means |= draw_signal(axes, run.result, estimate, color=COLOURS[1], label="estimated")
+        axes.plot(time, truth, color=COLOURS[0], linestyle="--", label="true, never measured")
+        axes.set_ylabel(rf"$\dot{{y}}_{k}$ [m/s]")
+    title(panels[0], "velocity of the control point")
+    over_time(panels, [run], has_means)
+
+
+def _velocity_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
+    """Estimated less true velocity of the control point."""
+    run, _ = next(having(runs, Loop.for_velocity_estimates))
+    panels = cell.stack(3)
+    has_means = False
+    for k, axes, estimate, truth in zip(AXES, panels, run.loop.dy_hat, run.loop.dy, strict=True):
+        error = partial(_velocity_error, estimate, truth)
+        has_means |= draw_signal(axes, run.result, error, color=COLOURS[1])
+        axes.set_ylabel(rf"$\Delta \dot{{y}}_{k}$ [m/s]")
+    title(panels[0], "estimated less true")
+    over_time(panels, [run], has_means)
+
+
+def _estimated(column: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
+    return table.step_start, table.step_values(column)[:, 0]
+
+
+def _velocity_error(estimate: str, truth: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
+    time, estimated = _estimated(estimate, table)
+    return time, estimated - table.start_values(truth)[:, 0]
+
+
+def _velocity(name: str, directions: slice) -> Panel:
+    def needs(loop: Loop) -> Needs:
+        return loop.nu[directions], ()
+
+    def draw(cell: Cell, runs: Sequence[Drawn]) -> None:
+        axes = cell.axes(ylabel=f"velocity [{_unit(directions)}]")
+        run, _ = next(having(runs, needs))
+        columns = run.loop.nu[directions]
+        labels = [f"${column[-1]}$" for column in columns]
+        draw_lines(axes, run.result.time, run.result.group(*columns), labels)
+        title(axes, name)
+        over_time([axes], [run])
+
+    return Panel(name, needs, draw)
+
+
+def _acceleration(name: str, directions: slice) -> Panel:
+    """D nu/dt as the plant's Euler scheme has it: the difference over the step."""
+
+    def needs(loop: Loop) -> Needs:
+        return loop.nu[directions], ()
+
+    def draw(cell: Cell, runs: Sequence[Drawn]) -> None:
+        axes = cell.axes(ylabel=f"acceleration [{_unit(directions)}²]")
+        run, _ = next(having(runs, needs))
+        columns = run.loop.nu[directions]
+        time, nu = run.result.time, run.result.group(*columns)
+        rates = np.diff(nu, axis=0) / np.diff(time)[:, np.newaxis]
+        labels = [rf"$\dot{{{column[-1]}}}$" for column in columns]
+        draw_lines(axes, time[:-1], rates, labels)
+        title(axes, name)
+        over_time([axes], [run])
+
+    return Panel(name, needs, draw)
+
+
+def _unit(directions: slice) -> str:
+    return printed_unit(list(NU.values())[directions][0])
+
+
+def _from_above(cell: Cell, runs: Sequence[Drawn]) -> None:
+    x, y, _ = earth_axes(runs[0].z_up)
+    axes = cell.axes(xlabel=y, ylabel=x)
+    axes.set_aspect("equal", adjustable="datalim")
+    if runs[0].z_up:
+        axes.invert_xaxis()
+    for run, colour in having(runs, Loop.for_control_point):
+        path = true_control_point(run.result, run.loop)
+        axes.plot(path[:, 1], path[:, 0], color=colour)
+        axes.plot(path[0, 1], path[0, 0], "o", color=colour)
+    title(axes, "path from above")
+
+
+ALL_ERRORS = Panel("tracking errors", Loop.for_tracking, _all_errors, 3.4)
+ESTIMATES = Panel("estimated parameters", Loop.for_parameter_estimates, _estimates, 3.6)
+VELOCITY = Panel("estimated velocity", Loop.for_velocity_estimates, _estimated_velocity, 4.6)
+VELOCITY_ERRORS = Panel(
+    "error of the estimated velocity", Loop.for_velocity_estimates, _velocity_errors, 4.6
+)
+FROM_ABOVE = Panel("path from above", Loop.for_control_point, _from_above)
+
+_SURGE, _LINEAR, _ANGULAR = slice(1), slice(3), slice(3, None)
+
+#: Rows of panels by what the names of their files end with, for each name.
+FIGURES: Mapping[str, Mapping[str, Rows]] = {
+    # Figs. 4 and 7: one run, and thin and black its twin, say without noise.
+    "tracking": {
+        "": ((PATH, ALL_ERRORS), (COMMANDS, ESTIMATES)),
+        "-velocity": ((VELOCITY, VELOCITY_ERRORS),),
+    },
+    # Fig. 5.
+    "comparison": {"": ((PATH, COMMANDS), (ERRORS, LOGARITHMIC_ERRORS))},
+    # Fig. 6: the paper leaves out the control signals.
+    "comparison-errors": {"": ((ERRORS, LOGARITHMIC_ERRORS),)},
+    # Fig. 7 in one: any number of runs.
+    "overlay": {"": ((ERRORS, COMMANDS),)},
+    # Fig. 3(a): the vehicle alone.
+    "open-loop-surge": {
+        "": (
+            (PATH,),
+            (_velocity("surge velocity", _SURGE), _acceleration("surge acceleration", _SURGE)),
+        )
+    },
+    # Fig. 3(b).
+    "open-loop-turn": {
+        "": (
+            (PATH, FROM_ABOVE),
+            (
+                _velocity("linear velocities", _LINEAR),
+                _acceleration("linear accelerations", _LINEAR),
+            ),
+            (
+                _velocity("angular velocities", _ANGULAR),
+                _acceleration("angular accelerations", _ANGULAR),
+            ),
+        )
+    },
+}
+
+
+def overlay(heading: str, runs: Sequence[Drawn]) -> Figure:
+    """Tracking errors and commands of several runs in the same panels.
+
+    Args:
+        heading: of the figure; empty for none.
+        runs: with labels that tell them apart.
+
+    Raises:
+        InputError: no run has anything to show.
+
+    """
+    figure, missing = compose(heading, FIGURES["overlay"][""], runs)
+    if figure is None:
+        raise InputError(f"no figure: the runs have no {missing[0]}")
+    return figure

@@ -1,0 +1,315 @@
+"""Figures of a study from its runs: a study file says which.
+
+A new one is a function and an entry of :data:`KINDS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import cycle, product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+
+from orchestrator.figures.study_axes import (
+    Bins,
+    bins_of,
+    grouped,
+    is_logarithmic,
+    legend,
+    paneled,
+    spread,
+)
+from orchestrator.figures.study_values import VERDICTS, Columns, Values
+from orchestrator.figures.style import COLOURS, FORMATS, STYLES, save, styled
+from orchestrator.system.names import file_name
+
+#: Heights of a row of panels, of a panel by itself, and of a row of a matrix and what surrounds
+#: it [in].
+_ROW, _SQUARE, _LINE, _AROUND = 2.3, 4.0, 0.27, 0.5
+
+#: Bands: parts of an axis along which runs are counted together, shares of the runs between which
+#: the band lies, and panels in a row, where there is one x.
+_BINS, _LOWER, _UPPER, _ABREAST = 30, 0.1, 0.9, 2
+
+#: Maps: cells along each axis of runs that are no grid; the colours end where all but a share of
+#: the cells do, for a few that are far off shall dim no others.
+_CELLS, _FAR = 24, 0.01
+
+#: Colours that stay apart for colour-blind eyes and in print, that of a cell without runs, and
+#: those of correlations: blue falls, red grows.
+_VALUES, _EMPTY, _CORRELATIONS = "cividis", "lightgrey", "RdBu_r"
+
+#: Influence: numbers are white upon colours as dark as from here on; smaller ones are not printed.
+_DARK, _NOTHING = 0.6, 0.05
+
+#: More lines or panels than this show nothing.
+_MOST_PARTS = 12
+
+
+@dataclass(frozen=True)
+class FigureEntry:
+    """A figure that is to be drawn, as a study file has it.
+
+    Attributes:
+        name: of its files.
+
+    """
+
+    name: str
+    kind: str
+    x: Sequence[str] = ()
+    y: str = ""
+    show: Sequence[str] = ()
+    by: Sequence[str] = ()
+    where: Mapping[str, Any] = field(default_factory=dict)
+    limits: Mapping[str, float] = field(default_factory=dict)
+    labels: Mapping[str, str] = field(default_factory=dict)
+
+
+def bands(plan: FigureEntry, title: str, runs: Values) -> Figure:
+    """A row of panels for each value that is shown, a column for each x; runs apart by colours."""
+    abreast = len(plan.x) if len(plan.x) > 1 else min(_ABREAST, len(plan.show))
+    shown = list(product(plan.show, plan.x))
+    share = "row" if len(plan.x) > 1 else False
+    figure, panels = paneled(title, -(-len(shown) // abreast), abreast, _ROW, sharey=share)
+    parts = list(runs.parts(plan.by))
+    for axes, (value, x) in zip(panels.flat, shown, strict=False):
+        bins = bins_of(runs[x], _BINS, are_full=True)
+        for (name, part), colour, style in zip(parts, cycle(COLOURS), cycle(STYLES), strict=False):
+            _draw(axes, bins, part[x], part[value], value in VERDICTS, (name, colour, style))
+        if value in plan.limits:
+            axes.axhline(plan.limits[value], color="black", linewidth=0.8)
+        axes.margins(x=0)
+        if bins.is_logarithmic:
+            spread(axes.xaxis)
+        if is_logarithmic(runs[value]):
+            spread(axes.yaxis)
+        axes.set_xlabel(runs.label(x))
+        if x == plan.x[0]:
+            axes.set_title(runs.label(value))
+    for axes in panels.flat[len(shown) :]:
+        axes.remove()
+    legend(figure, panels.flat[0])
+    return figure
+
+
+def _draw(
+    axes: Axes,
+    bins: Bins,
+    x: np.ndarray,
+    values: np.ndarray,
+    is_share: bool,
+    look: tuple[str, str, str],
+) -> None:
+    """Draw a line; a share needs no band."""
+    label, color, linestyle = look
+    groups = grouped(bins.places(x), values, len(bins.centres))
+    middle = [
+        np.nan if not len(group) else group.mean() if is_share else np.median(group)
+        for group in groups
+    ]
+    axes.plot(bins.centres, middle, color=color, linestyle=linestyle, label=label)
+    if not is_share:
+        ends = [
+            np.quantile(group, (_LOWER, _UPPER)) if len(group) else (np.nan, np.nan)
+            for group in groups
+        ]
+        axes.fill_between(bins.centres, *np.transpose(ends), color=color, alpha=0.2, linewidth=0)
+
+
+def maps(plan: FigureEntry, title: str, runs: Values) -> Figure:
+    """Panels for each value that is shown, with one scale of colours.
+
+    The last column that tells runs apart has its values side by side, the others below each other.
+    """
+    [x], y = plan.x, plan.y
+    across, down = bins_of(runs[x], _CELLS), bins_of(runs[y], _CELLS)
+    beside = [name for name, _ in runs.parts(plan.by[-1:])]
+    below = list(runs.parts(plan.by[:-1]))
+    rows = len(plan.show) * len(below)
+    figure, panels = paneled(title, rows, len(beside), _ROW, sharex=True, sharey=True)
+    for value, own in zip(plan.show, np.split(panels, len(plan.show)), strict=True):
+        drawn: dict[Axes, np.ndarray] = {}
+        for row, (name, part) in zip(own, below, strict=True):
+            row[0].set_ylabel("\n".join(filter(None, (name, runs.label(y)))))
+            for other, cell in part.parts(plan.by[-1:]):
+                axes = row[beside.index(other)]
+                places = down.places(cell[y]), across.places(cell[x])
+                drawn[axes] = _cells(places, cell[value], (down, across), value in VERDICTS)
+        norm = _norm(np.array(list(drawn.values())), value in VERDICTS)
+        for axes, middles in drawn.items():
+            image = axes.pcolormesh(
+                across.edges, down.edges, middles, norm=norm, cmap=_VALUES, rasterized=True
+            )
+            axes.set_facecolor(_EMPTY)
+            axes.grid(visible=False)
+            if value in plan.limits and min(middles.shape) > 1:
+                edge = [plan.limits[value]]
+                axes.contour(across.centres, down.centres, middles, edge, colors="white")
+        figure.colorbar(image, ax=list(own.flat), label=runs.label(value), extend="both")
+    for axes, name in zip(panels[0], beside, strict=True):
+        axes.set_title(name)
+    for axes in panels[-1]:
+        axes.set_xlabel(runs.label(x))
+    # All panels share their axes.
+    if across.is_logarithmic:
+        spread(axes.xaxis)
+    if down.is_logarithmic:
+        spread(axes.yaxis)
+    return figure
+
+
+def _cells(
+    places: tuple[np.ndarray, np.ndarray],
+    values: np.ndarray,
+    bins: tuple[Bins, Bins],
+    is_verdict: bool,
+) -> np.ndarray:
+    """The median of each cell, or the share of a verdict; nan where there are no runs."""
+    shape = len(bins[0].centres), len(bins[1].centres)
+    groups = grouped(np.ravel_multi_index(places, shape), values, shape[0] * shape[1])
+    middle = np.mean if is_verdict else np.median
+    return np.reshape([middle(group) if len(group) else np.nan for group in groups], shape)
+
+
+def _norm(values: np.ndarray, is_verdict: bool) -> Any:
+    """The scale of the colours."""
+    values = values[np.isfinite(values)]
+    if is_verdict or not len(values):
+        return Normalize(0.0, 1.0)
+    low, high = np.quantile(values, (_FAR, 1.0 - _FAR))
+    return (LogNorm if is_logarithmic(values) else Normalize)(low, high)
+
+
+def front(plan: FigureEntry, title: str, runs: Values) -> Figure:
+    """Every run a dot; a line through those than which no other is better in both values."""
+    figure, [[axes]] = paneled(title, 1, 1, _SQUARE)
+    [x] = plan.x
+    for (name, part), colour, style in zip(
+        runs.parts(plan.by), cycle(COLOURS), cycle(STYLES), strict=False
+    ):
+        points = np.column_stack((part[x], part[plan.y]))
+        points = points[np.isfinite(points).all(axis=1)]
+        axes.plot(*points.T, ".", color=colour, markersize=2, alpha=0.25, rasterized=True)
+        line = {"color": colour, "linestyle": style, "label": name, "drawstyle": "steps-post"}
+        axes.plot(*best(points).T, **line)
+    if is_logarithmic(runs[x]):
+        spread(axes.xaxis)
+    if is_logarithmic(runs[plan.y]):
+        spread(axes.yaxis)
+    axes.set(xlabel=runs.label(x), ylabel=runs.label(plan.y))
+    legend(figure, axes)
+    return figure
+
+
+def best(points: np.ndarray) -> np.ndarray:
+    """The points than which no other is smaller in both coordinates, the Pareto front.
+
+    Args:
+        points: (n, 2).
+
+    """
+    points = points[np.lexsort(points.T[::-1])]
+    lowest = np.minimum.accumulate(np.append(np.inf, points[:, 1]))
+    front: np.ndarray = points[points[:, 1] < lowest[:-1]]
+    return front
+
+
+def influence(plan: FigureEntry, title: str, runs: Values) -> Figure:
+    """A matrix for each part of the runs: a row for each value, a column for what moves it.
+
+    The colour is Spearman's rank correlation: 1 where more of the one always goes with more of the
+    other, -1 where it goes with less, 0 where it makes no difference.
+    """
+    parts = list(runs.parts(plan.by))
+    height = _LINE * len(plan.show) + _AROUND
+    figure, panels = paneled(title, len(parts), 1, height, sharex=True)
+    for axes, (name, part) in zip(panels.flat, parts, strict=True):
+        found = np.array([[_correlation(part[x], part[y]) for x in plan.x] for y in plan.show])
+        image = axes.imshow(found, cmap=_CORRELATIONS, vmin=-1.0, vmax=1.0, aspect="auto")
+        for (row, column), value in np.ndenumerate(found):
+            if abs(value) >= _NOTHING:
+                colour = "white" if abs(value) > _DARK else "black"
+                axes.text(
+                    column, row, f"{value:.2f}".replace("0.", "."), color=colour, fontsize="small",
+                    ha="center", va="center",
+                )  # fmt: skip
+        axes.set_yticks(range(len(plan.show)), [runs.name(value) for value in plan.show])
+        axes.set_xticks(range(len(plan.x)), [runs.name(value) for value in plan.x], rotation=90)
+        axes.grid(visible=False)
+        axes.set_title(name)
+    figure.colorbar(image, ax=list(panels.flat), label="rank correlation")
+    return figure
+
+
+def _correlation(x: np.ndarray, y: np.ndarray) -> float:
+    """Spearman's rank correlation of the runs that have both values; nan if one is constant."""
+    from scipy.stats import spearmanr  # noqa: PLC0415
+
+    both = np.isfinite(x) & np.isfinite(y)
+    if min(len(np.unique(x[both])), len(np.unique(y[both]))) < 2:
+        return np.nan
+    return float(spearmanr(x[both], y[both]).statistic)
+
+
+class Kind(NamedTuple):
+    """A kind of figure: what draws it, what it needs, and what it may have beside."""
+
+    draw: Callable[[FigureEntry, str, Values], Figure]
+    needs: Sequence[str]
+    may: Sequence[str]
+
+
+#: The kinds of figures, by the names that study files have for them.
+KINDS: Mapping[str, Kind] = {
+    "bands": Kind(bands, ("x", "show"), ("by", "where", "limits")),
+    "maps": Kind(maps, ("x", "y", "show"), ("by", "where", "limits")),
+    "front": Kind(front, ("x", "y"), ("by", "where")),
+    "influence": Kind(influence, ("x", "show"), ("by", "where")),
+}
+
+
+def figure_files(plans: Sequence[FigureEntry]) -> list[str]:
+    """The files that :func:`draw_figures` may write."""
+    return [f"{file_name(plan.name)}.{ending}" for plan in plans for ending in FORMATS]
+
+
+def draw_figures(
+    plans: Sequence[FigureEntry],
+    title: str,
+    columns: Columns,
+    folder: Path,
+    legends: Mapping[str, str] | None = None,
+) -> Iterator[str]:
+    """Draw the figures of a study, as PNG and SVG.
+
+    Args:
+        plans: what is to be drawn.
+        title: heading; empty where there is one beside the figures.
+        columns: of runs.parquet.
+        folder: to write into.
+        legends: what the lines of scenarios are called.
+
+    Yields:
+        What was left out, and why.
+
+    """
+    for plan in plans:
+        runs = Values(columns, plan.labels, legends).where(plan.where)
+        values = (*plan.x, *([plan.y] if plan.y else ()), *plan.show)
+        lacking = [value for value in values if not np.isfinite(runs[value]).any()]
+        if lacking:
+            yield f"figure {plan.name} left out: no run has {lacking[0]}"
+            continue
+        if (parts := len(list(runs.parts(plan.by)))) > _MOST_PARTS:
+            yield f"figure {plan.name} left out: by tells {parts} parts of the runs apart"
+            continue
+        with styled():
+            figure = KINDS[plan.kind].draw(plan, title, runs)
+        save(figure, *(folder / f"{file_name(plan.name)}.{ending}" for ending in FORMATS))

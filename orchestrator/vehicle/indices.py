@@ -1,0 +1,573 @@
+"""Indices of a run, (59) and others: each is declared once, in :data:`INDICES`.
+
+The table serves metrics.json, the terminal, the report, the columns of a study and the labels of
+its figures. What an index is of, it gets in blocks of rows while the run goes on; sums go on row by
+row, so that they do not depend on the blocks.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fmus.ports.quantities import POSITION, TAU, THETA, Members, member_name
+from orchestrator.master.observers.observer import Ending, Header
+from orchestrator.master.observers.table import Table
+from orchestrator.system.structure import System
+from orchestrator.vehicle.cautions import velocities_reaching
+from orchestrator.vehicle.signals import STANDARD, Loop, Needs, limits, tracking_error
+
+#: T_L of section 4.2 [s].
+LAST_SECONDS = 5.0
+
+#: An error of tracking that counts as having reached the reference [m].
+REACHED = 1.0
+
+
+class LoopRows:
+    """Some rows of a run, and what indices of one loop take from them.
+
+    Attributes:
+        loop: whose signals count.
+        number: of the first of them in the run, from 0; row 0 ends no step.
+        half: when half of the run is over [s].
+
+    """
+
+    def __init__(
+        self, header: Header, loop: Loop, number: int, before: np.ndarray, rows: np.ndarray
+    ) -> None:
+        """Take rows, and the one before them, if there is one."""
+        self.loop, self.number = loop, number
+        self.half = 0.5 * header.experiment.stop_time
+        self._header, self._rows = header, np.vstack((before, rows))
+        self._table = Table.of(header, self._rows)
+        self._groups: dict[tuple[str, ...], np.ndarray] = {}
+        self._new = len(before)
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times of the rows [s]."""
+        return self._table.time[self._new :]
+
+    @property
+    def late(self) -> np.ndarray:
+        """Which rows lie in the second half of the run."""
+        return self.time >= self.half
+
+    def at(self, *columns: str) -> np.ndarray:
+        """Values in the rows."""
+        return self._group(columns)[self._new :]
+
+    def starts(self, *columns: str) -> np.ndarray:
+        """Values at the beginning of each step that ends at one of the rows."""
+        return self._group(columns)[:-1]
+
+    def ends(self, *columns: str) -> np.ndarray:
+        """Values at the end of each of these steps."""
+        return self._group(columns)[1:]
+
+    def _group(self, columns: tuple[str, ...]) -> np.ndarray:
+        if columns not in self._groups:
+            self._groups[columns] = self._table.group(*columns)
+        return self._groups[columns]
+
+    @property
+    def limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """The limits of (3), lower and upper."""
+        return limits(self._table, self.loop)
+
+    def errors(self, wanted: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """y - y_d with the true control point, in all rows or in some [m]."""
+        rows = self._rows[self._new :][wanted]
+        return tracking_error(Table.of(self._header, rows), self.loop)
+
+    @cached_property
+    def distance(self) -> np.ndarray:
+        """|y - y_d| in each row [m]."""
+        # The control point takes as long as everything else together, and is not always wanted.
+        return size(self.errors())
+
+
+class Fold:
+    """Makes an index of terms, a row for each instant or step that counts."""
+
+    def __init__(
+        self, term: Callable[[LoopRows], np.ndarray], fold: Callable[[np.ndarray], np.ndarray]
+    ) -> None:
+        """Start with nothing.
+
+        Args:
+            term: of some rows, in their order.
+            fold: many terms to one: :func:`total`, :func:`largest`, :func:`first` or :func:`last`.
+
+        """
+        self._term, self._fold = term, fold
+        self._found, self.n = np.empty(0), 0
+
+    def take(self, rows: LoopRows) -> None:
+        """Take some rows into account."""
+        if self.n and self._fold is first:
+            return
+        if len(terms := self._term(rows)):
+            terms = terms.reshape(len(terms), -1)
+            self._found = self._fold(np.vstack((self._found, terms)) if self.n else terms)
+            self.n += len(terms)
+
+    def found(self, end: float) -> np.ndarray:
+        """What the terms of a run come to that ends at a time [s]."""
+        return self._found
+
+
+def total(terms: np.ndarray) -> np.ndarray:
+    """The sum, row by row: it does not depend on the blocks in which rows come."""
+    found: np.ndarray = terms.sum(axis=0)
+    return found
+
+
+def largest(terms: np.ndarray) -> np.ndarray:
+    """The largest of each column."""
+    found: np.ndarray = terms.max(axis=0)
+    return found
+
+
+def first(terms: np.ndarray) -> np.ndarray:
+    """The first row."""
+    found: np.ndarray = terms[0]
+    return found
+
+
+def last(terms: np.ndarray) -> np.ndarray:
+    """The last row."""
+    found: np.ndarray = terms[-1]
+    return found
+
+
+class LargestOfTheEnd:
+    """e_f of section 4.2: max |e| of each axis over the last T_L seconds.
+
+    Attributes:
+        n: how many steps there were: before the first nothing has been followed.
+
+    """
+
+    def __init__(self) -> None:
+        """Start with nothing."""
+        self._recent: deque[LoopRows] = deque()
+        self.n = 0
+
+    def take(self, rows: LoopRows) -> None:
+        """Keep the last seconds."""
+        self.n = rows.number + len(rows.time) - 1
+        self._recent.append(rows)
+        while self._recent[0].time[-1] < rows.time[-1] - LAST_SECONDS:
+            self._recent.popleft()
+
+    def found(self, end: float) -> np.ndarray:
+        """The largest errors."""
+        errors = [rows.errors(rows.time >= end - LAST_SECONDS) for rows in self._recent]
+        return largest(np.abs(np.vstack(errors)))
+
+
+class Index(NamedTuple):
+    """An index: what it is called, what it is of, and what makes it.
+
+    Attributes:
+        name: in files; `name.member` in the columns of a study.
+        label: in figures and tables.
+        units: of its members; of a single number, that of the member without a name.
+        meaning: what the reference page says.
+        needs: what a run must have.
+        reducer: takes rows in, for what it is a function of.
+        accumulated: where the batch engine has the same.
+        result: that function, also of the number of terms and of the time at the end [s].
+        symbol: in formulas, with its members as indices, before the label.
+        is_metric: whether metrics.json holds it, or a study only.
+
+    """
+
+    name: str
+    label: str
+    units: Members
+    meaning: str
+    needs: Callable[[Loop], Needs]
+    reducer: Callable[[], Fold | LargestOfTheEnd]
+    accumulated: str = ""
+    result: Callable[[np.ndarray, int, float], Any] = lambda found, n, end: found
+    symbol: str = ""
+    is_metric: bool = False
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The names of its numbers in the table of a study."""
+        return tuple(member_name(self.name, m) if m != "" else self.name for m in self.units)
+
+    def members_of(self, found: np.ndarray, n: int, end: float) -> list[float]:
+        """The values of its members, from what its terms come to."""
+        values: list[float] = np.atleast_1d(self.result(found, n, end)).tolist()
+        return values
+
+    @property
+    def members(self) -> str:
+        """Its members, with commas between them; empty: it is a single number."""
+        return ", ".join(map(str, self.units))
+
+    @property
+    def unit(self) -> str:
+        """The units of its members, each once, with commas between them."""
+        return ", ".join(filter(None, dict.fromkeys(self.units.values())))
+
+
+def size(vectors: np.ndarray) -> np.ndarray:
+    """The Euclidean norm of each row, summed in the order of its members."""
+    squares = np.zeros(len(vectors))
+    for column in vectors.T:
+        squares = squares + column * column
+    norm: np.ndarray = np.sqrt(squares)
+    return norm
+
+
+def _energy(rows: LoopRows) -> np.ndarray:
+    """Integral of the square of the applied signal, over each step."""
+    h: np.ndarray = rows.ends("time") - rows.starts("time")
+    energy: np.ndarray = rows.ends(*rows.loop.applied) ** 2 * h
+    return energy
+
+
+def _outside(rows: LoopRows) -> np.ndarray:
+    commanded, (lower, upper) = rows.ends(*rows.loop.commanded), rows.limits
+    outside: np.ndarray = ((commanded < lower) | (commanded > upper)).astype(float)
+    return outside
+
+
+def _change(rows: LoopRows) -> np.ndarray:
+    change: np.ndarray = np.abs(rows.ends(*rows.loop.applied) - rows.starts(*rows.loop.applied))
+    if rows.number <= 1:
+        # Before the first step nothing was applied.
+        change[:1] = 0.0
+    return change
+
+
+def _miss(rows: LoopRows) -> np.ndarray:
+    """Squares of dy_hat - dy: a row holds the estimate of the instant at which its step began."""
+    late = rows.starts("time")[:, 0] >= rows.half
+    miss: np.ndarray = (rows.ends(*rows.loop.dy_hat) - rows.starts(*rows.loop.dy))[late] ** 2
+    return miss
+
+
+def _root_mean(squares: np.ndarray, n: int, end: float) -> np.ndarray:
+    # One after the other, as the equations add.
+    x, y, z = squares
+    mean: np.ndarray = np.sqrt((x + y + z) / n)
+    return mean
+
+
+def _late_distance(rows: LoopRows) -> np.ndarray:
+    return rows.distance[rows.late] if rows.late.any() else np.empty(0)
+
+
+def _actuation(loop: Loop) -> Needs:
+    return (*loop.commanded, *loop.applied), loop.limits
+
+
+#: Two indices are made of it.
+_ENERGY = partial(Fold, _energy, total)
+
+#: Units of its root.
+_EFFORT = {member: f"{unit}.s^1/2" for member, unit in TAU.items()}
+
+#: All indices, in the order of the columns of a study; e is y - y_d with the true control point,
+#: efforts are of the applied signal. What a system has no ports for, and what is never reached, is
+#: not there.
+INDICES: tuple[Index, ...] = (
+    Index(
+        "l2_effort",
+        "L2 effort",
+        _EFFORT,
+        "root of the integral of the square of the applied signal, the size of what the paper "
+        "prints (reading 6)",
+        _actuation,
+        _ENERGY,
+        "square",
+        lambda found, n, end: np.sqrt(found),
+        is_metric=True,
+    ),
+    Index(
+        "rms_effort",
+        "RMS effort",
+        TAU,
+        "(59): the same over the time",
+        _actuation,
+        _ENERGY,
+        "square",
+        lambda found, n, end: np.sqrt(found / end),
+        is_metric=True,
+    ),
+    Index(
+        "peak_command",
+        "peak command",
+        TAU,
+        "largest absolute value of the commanded signal",
+        _actuation,
+        partial(Fold, lambda rows: np.abs(rows.ends(*rows.loop.commanded)), largest),
+        "peak",
+        is_metric=True,
+    ),
+    Index(
+        "saturated_fraction",
+        "share of saturated steps",
+        dict.fromkeys(TAU, ""),
+        "share of the steps whose command is outside the limits",
+        _actuation,
+        partial(Fold, _outside, total),
+        "outside",
+        lambda found, n, end: found / n,
+        is_metric=True,
+    ),
+    Index(
+        "total_variation",
+        "total variation",
+        TAU,
+        "sum of the absolute differences of the applied signal from step to step",
+        _actuation,
+        partial(Fold, _change, total),
+        "variation",
+        is_metric=True,
+    ),
+    Index(
+        "final_error",
+        "final error",
+        POSITION,
+        f"e_f: largest absolute value of e in the last {LAST_SECONDS:g} s",
+        Loop.for_tracking,
+        LargestOfTheEnd,
+        "final",
+        is_metric=True,
+    ),
+    Index(
+        "time_to_reach",
+        "time to reach",
+        {"": "s"},
+        f"first time at which |e| is at most {REACHED:g} m",
+        Loop.for_tracking,
+        partial(Fold, lambda rows: rows.time[rows.distance <= REACHED], first),
+        "reached",
+    ),
+    Index(
+        "late_error",
+        "largest late error",
+        {"": "m"},
+        "largest |e| in the second half of the run",
+        Loop.for_tracking,
+        partial(Fold, _late_distance, largest),
+        "late",
+    ),
+    Index(
+        "estimate_error",
+        "error of the estimated velocity",
+        {"": "m/s"},
+        "root mean square of |dy_hat - dy| in the second half, both of the same instant",
+        Loop.for_velocity_estimates,
+        partial(Fold, _miss, total),
+        "miss",
+        _root_mean,
+    ),
+    Index(
+        "theta_hat_half",
+        "estimate at half time",
+        THETA,
+        "theta_hat when half of the run is over",
+        Loop.for_parameter_estimates,
+        partial(Fold, lambda rows: rows.at(*rows.loop.theta_hat)[rows.late], first),
+        "half",
+        symbol=r"\hat{\theta}",
+    ),
+    Index(
+        "theta_hat_end",
+        "estimate at the end",
+        THETA,
+        "theta_hat at its end",
+        Loop.for_parameter_estimates,
+        partial(Fold, lambda rows: rows.at(*rows.loop.theta_hat), last),
+        "end",
+        symbol=r"\hat{\theta}",
+    ),
+    Index(
+        "largest_speed",
+        "largest speed",
+        {"": "m/s"},
+        "of the control point, |dy|",
+        lambda loop: (loop.dy, ()),
+        partial(Fold, lambda rows: size(rows.at(*rows.loop.dy)), largest),
+        "speed",
+    ),
+    Index(
+        "largest_drift",
+        "largest drift",
+        {"": "m/s"},
+        "of sway and heave, |(v, w)|: Assumption 1",
+        lambda loop: (loop.drift, ()),
+        partial(Fold, lambda rows: size(rows.at(*rows.loop.drift)), largest),
+        "drift",
+    ),
+)
+
+
+def metrics() -> tuple[Index, ...]:
+    """The indices that metrics.json holds."""
+    return tuple(index for index in INDICES if index.is_metric)
+
+
+def index_columns(loops: Sequence[Loop] = (STANDARD,)) -> tuple[str, ...]:
+    """The columns of all indices in a study; of several loops, after the names of the vehicles."""
+    return tuple(
+        f"{prefix}{column}"
+        for _, prefix in _prefixed(loops)
+        for index in INDICES
+        for column in index.columns
+    )
+
+
+def _prefixed(loops: Sequence[Loop]) -> Iterator[tuple[Loop, str]]:
+    for loop in loops:
+        yield loop, f"{loop.vehicle}." if len(loops) > 1 else ""
+
+
+class Indices:
+    """An observer that computes indices on the way; it keeps no more than the last seconds.
+
+    Those whose columns a loop does not have are left out.
+    """
+
+    def __init__(
+        self, loops: Sequence[Loop] = (STANDARD,), chosen: Sequence[Index] | None = None
+    ) -> None:
+        """Take what is measured.
+
+        Args:
+            loops: of the vehicles.
+            chosen: out of :data:`INDICES`; None: all.
+
+        """
+        self._loops, self._chosen = loops, INDICES if chosen is None else chosen
+
+    def begin(self, header: Header) -> None:
+        """Find out which indices there will be."""
+        self._header, self._end, self._n = header, 0.0, 0
+        self._failure: str | None = None
+        self._last = np.empty((0, 1 + len(header.columns)))
+        none = Table.of(header, self._last)
+        self._measured = {
+            loop: [index for index in self._chosen if not none.missing(*index.needs(loop))]
+            for loop in self._loops
+        }
+        # Those that are made of the same share it.
+        self._reducers = {
+            loop: {index.reducer: index.reducer() for index in found}
+            for loop, found in self._measured.items()
+        }
+
+    def take(self, rows: np.ndarray) -> None:
+        """Take some rows into account."""
+        for loop, reducers in self._reducers.items():
+            seen = LoopRows(self._header, loop, self._n, self._last, rows)
+            for reducer in reducers.values():
+                reducer.take(seen)
+        self._last, self._end = rows[-1:].copy(), float(rows[-1, 0])
+        self._n += len(rows)
+
+    def end(self, ending: Ending) -> None:
+        """Remember how the run has ended."""
+        self._failure = ending.failure
+
+    @np.errstate(all="ignore")
+    def found(self, loop: Loop = STANDARD) -> dict[str, list[float]]:
+        """The members of the indices of a loop, by their names."""
+        return {
+            index.name: index.members_of(reducer.found(self._end), reducer.n, self._end)
+            for index in self._measured[loop]
+            if (reducer := self._reducers[loop][index.reducer]).n
+        }
+
+    def values(self) -> dict[str, float]:
+        """The numbers of all loops, by their columns in a study."""
+        return {
+            f"{prefix}{column}": value
+            for loop, prefix in _prefixed(self._loops)
+            for found in [self.found(loop)]
+            for index in self._chosen
+            if index.name in found
+            for column, value in zip(index.columns, found[index.name], strict=True)
+        }
+
+
+class Metrics(Indices):
+    """An observer that computes what metrics.json holds."""
+
+    def __init__(self, loops: Sequence[Loop] = (STANDARD,)) -> None:
+        """Take the loops of the vehicles."""
+        super().__init__(loops, metrics())
+
+    def content(self, scenario: str, system: System) -> dict[str, Any]:
+        """What metrics.json holds: of several vehicles, the indices of each under its name.
+
+        Args:
+            scenario: its name.
+            system: that was run.
+
+        """
+        experiment = self._header.experiment
+        content: dict[str, Any] = {
+            "scenario": scenario,
+            "stop_time": self._end,
+            "step": experiment.step,
+            "order": experiment.order,
+            "parameters": changed_parameters(system, self._header),
+        }
+        if self._failure is not None:
+            content["failure"] = self._failure
+        of = {loop.vehicle: self._of(loop, system) for loop in self._loops}
+        return content | (next(iter(of.values())) if len(of) == 1 else {VEHICLES: of})
+
+    def _of(self, loop: Loop, system: System) -> dict[str, Any]:
+        found = self.found(loop)
+        content: dict[str, Any] = {
+            index.name: found[index.name] if len(index.units) > 1 else found[index.name][0]
+            for index in self._chosen
+            if index.name in found
+        }
+        if loop.controller in system.components:
+            reaching = velocities_reaching(system, loop.controller)
+            content["velocities_reaching_controller"] = reaching
+        return content
+
+
+#: Where metrics.json has the indices of each of several vehicles.
+VEHICLES = "vehicles"
+
+
+def of_vehicles(content: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """The indices that metrics.json holds, by the vehicle's name; of one vehicle, by none."""
+    return dict(content.get(VEHICLES, {"": content}))
+
+
+def metrics_of(table: Table, loops: Sequence[Loop] = (STANDARD,)) -> Metrics:
+    """The metrics of a run whose rows are all there."""
+    found = Metrics(loops)
+    found.begin(table.header)
+    found.take(table.rows)
+    found.end(table.ending)
+    return found
+
+
+def changed_parameters(system: System, header: Header) -> dict[str, Any]:
+    """Values of parameters, and of inputs that were set, that differ from the FMU's defaults."""
+    return {
+        str(name): value
+        for name, value in {**header.parameters, **system.parameters}.items()
+        if value != system.component(name.component).start(name.port)
+    }

@@ -1,0 +1,224 @@
+"""(59), e_f and the indices of a study, on signals whose integrals are known."""
+
+from __future__ import annotations
+
+from functools import partial
+from math import exp, log, pi, sqrt
+
+import numpy as np
+import pytest
+
+from orchestrator import simulate as run
+from orchestrator.figures.study_values import Values
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.loop import chosen
+from orchestrator.master.observers.observer import Ending, Header
+from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import planned
+from orchestrator.master.simulation import simulate
+from orchestrator.runs.preparation import loaded
+from orchestrator.studies.fmu_engine import FmuEngine
+from orchestrator.studies.space import Space
+from orchestrator.studies.store import StudyResult, store
+from orchestrator.studies.study import study_of
+from orchestrator.system.names import PortName, port_name
+from orchestrator.vehicle import indices as table_of_indices
+from orchestrator.vehicle.indices import (
+    Fold,
+    Index,
+    Indices,
+    Metrics,
+    index_columns,
+    largest,
+    metrics_of,
+)
+from orchestrator.vehicle.signals import AXES, EULER, Loop
+
+T, H, ELL = 10.0, 0.02, 0.35
+
+#: Signals over time, in the plane of zero attitude: y is eta + (ell, 0, 0).
+SIGNALS = {
+    "plant.eta.x": lambda t: 10.0 * np.exp(-t) - ELL + np.cos(t),
+    "plant.eta.y": np.sin,
+    "plant.eta.z": lambda t: 0.0 * t,
+    **{f"plant.eta.{angle}": lambda t: 0.0 * t for angle in EULER},
+    "planner.y_d.x": np.cos,
+    "planner.y_d.y": np.sin,
+    "planner.y_d.z": lambda t: 0.0 * t,
+    "plant.dy.x": lambda t: 3.0 * np.cos(t),
+    "plant.dy.y": lambda t: 4.0 * np.cos(t),
+    "plant.dy.z": lambda t: 0.0 * t,
+    "plant.nu.v": lambda t: 3.0 * t / T,
+    "plant.nu.w": lambda t: -4.0 * t / T,
+    # A controller is sampled: a row holds what it made of the instant a step before.
+    "controller.dy_hat.x": lambda t: 3.0 * np.cos(t - H) + np.sin(2.0 * pi * (t - H)),
+    "controller.dy_hat.y": lambda t: 4.0 * np.cos(t - H),
+    "controller.dy_hat.z": lambda t: 0.0 * t + 2.0,
+    **{f"controller.theta_hat[{i}]": lambda t, i=i: i * t for i in range(1, 5)},
+}
+TIME = H * np.arange(round(T / H) + 1)
+
+
+def indices(signals=SIGNALS, blocks=1):
+    header = Header(tuple(signals), Experiment(T, H), {port_name("plant.ell"): ELL})
+    rows = np.column_stack([TIME, *(signal(TIME) for signal in signals.values())])
+    observer = Indices()
+    observer.begin(header)
+    for block in np.array_split(rows, blocks):
+        observer.take(block)
+    observer.end(Ending())
+    return observer.values()
+
+
+def test_indices_of_signals_that_are_known():
+    found = indices()
+    # 10 exp(-t) is one metre at t = log 10, between two rows.
+    assert log(10.0) < found.pop("time_to_reach") < log(10.0) + H
+    expected = {
+        "final_error.x": 10.0 * exp(-5.0),
+        "final_error.y": 0.0,
+        "final_error.z": 0.0,
+        "late_error": 10.0 * exp(-0.5 * T),
+        # Whole periods of the sine, and two in z.
+        "estimate_error": sqrt(0.5 + 4.0),
+        **{f"theta_hat_half[{i}]": 0.5 * T * i for i in range(1, 5)},
+        **{f"theta_hat_end[{i}]": T * i for i in range(1, 5)},
+        "largest_speed": 5.0,
+        "largest_drift": 5.0,
+    }
+    assert found == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("blocks", [2, 7, 251, len(TIME)])
+def test_blocks_in_which_rows_come_change_nothing(blocks):
+    assert indices(blocks=blocks) == indices()
+
+
+@pytest.mark.parametrize(
+    ("group", "without"),
+    [
+        (
+            "controller.theta_hat",
+            [name for name in index_columns() if name.startswith("theta_hat")],
+        ),
+        ("controller.dy_hat", ["estimate_error"]),
+        ("plant.nu", ["largest_drift"]),
+        ("planner", ["late_error", "time_to_reach", *(f"final_error.{axis}" for axis in AXES)]),
+    ],
+)
+def test_what_a_system_has_no_ports_for_is_not_there(group, without):
+    rest = {name: signal for name, signal in SIGNALS.items() if not name.startswith(group)}
+    assert indices().keys() - indices(rest).keys() == set(without)
+
+
+def test_what_is_never_reached_is_not_there():
+    away = {**SIGNALS, "plant.eta.z": lambda t: 0.0 * t + 1.01}
+    assert indices().keys() - indices(away).keys() == {"time_to_reach"}
+
+
+def test_closed_loop_has_all_of_them():
+    _, system = loaded("fig4", "native")
+    experiment, observer = Experiment(4.0, 0.02), Indices()
+    simulate(planned(system, experiment), [observer], loop=chosen("auto", experiment))
+    found = observer.values().keys()
+    assert set(index_columns()) - {"time_to_reach"} <= found <= set(index_columns())
+
+
+def test_a_new_index_is_one_entry(monkeypatch, tmp_path):
+    """It is in metrics.json, in the table of a study, and in the labels of its figures."""
+    pytest.importorskip("pyarrow", reason="needs the extra studies")
+    depth = Index(
+        "largest_depth",
+        "largest depth",
+        {"": "m"},
+        "largest z of the centre of mass",
+        Loop.for_control_point,
+        partial(Fold, lambda rows: rows.at(rows.loop.position[2]), largest),
+        is_metric=True,
+    )
+    monkeypatch.setattr(table_of_indices, "INDICES", (*table_of_indices.INDICES, depth))
+    result = run("fig4", {"plant.nu0.w": 1.0}, stop_time=1.0, kind="native")
+    deepest = result["plant.eta.z"].max()
+    assert deepest > 0.1
+    assert result.metrics()["largest_depth"] == deepest
+
+    study = {"scenario": "fig4", "stop_time": 1.0, "vary": {"plant.nu0.w": [1.0]}}
+    space = Space(study_of("own", study), {"fig4": loaded("fig4", "native")})
+    with store(tmp_path, {"made_of": {}, "runs": 1}, space.indices) as kept:
+        kept.add(list(FmuEngine(space.prepared).outcomes([space[0]])))
+        kept.publish(space)
+    made = StudyResult(tmp_path)
+    assert made["largest_depth"].tolist() == [deepest]
+    assert Values(made).label("largest_depth") == "largest depth [m]"
+
+
+def table_of(**columns: np.ndarray) -> Table:
+    names = tuple(name.replace("__", ".") for name in columns)
+    n = len(next(iter(columns.values())))
+    parameters = {
+        PortName("plant", f"{limit}.{k}"): value
+        for limit, value in (("tau_min", -2.0), ("tau_max", 2.0))
+        for k in "uqr"
+    }
+    parameters[PortName("plant", "ell")] = 0.35
+    rows = np.column_stack([np.arange(n) * 0.001, *columns.values()])
+    return Table.of(Header(names, Experiment((n - 1) * 0.001, 0.001), parameters), rows)
+
+
+def test_effort_of_a_known_signal():
+    """3 sin(2 pi t) over 4 s, cut off at +-2: its norm, RMS, variation and share beyond."""
+    t = np.arange(4001) * 0.001
+    command = 3.0 * np.sin(2 * pi * t)
+    applied = np.clip(command, -2.0, 2.0)
+    zeros = np.zeros_like(t)
+    found = metrics_of(
+        table_of(
+            plant__tau__u=command, plant__tau__q=zeros, plant__tau__r=command / 3,
+            plant__tau_applied__u=applied, plant__tau_applied__q=zeros,
+            plant__tau_applied__r=command / 3,
+        )
+    ).found()  # fmt: skip
+    a = np.arcsin(2 / 3)
+    # Mean square of a clipped sine: 2/pi (9 (a/2 - sin(2a)/4) + 4 (pi/2 - a)).
+    mean_square = 2 / pi * (9 * (a / 2 - np.sin(2 * a) / 4) + 4 * (pi / 2 - a))
+    assert found["rms_effort"] == pytest.approx([sqrt(mean_square), 0.0, sqrt(0.5)], rel=1e-3)
+    assert found["l2_effort"] == pytest.approx([2 * sqrt(mean_square), 0.0, sqrt(2)], rel=1e-3)
+    assert found["total_variation"] == pytest.approx([4 * 4 * 2, 0.0, 4 * 4 * 1], rel=1e-2)
+    assert found["peak_command"] == pytest.approx([3.0, 0.0, 1.0], rel=1e-4)
+    share = 1 - 2 * a / pi
+    assert found["saturated_fraction"] == pytest.approx([share, 0.0, 0.0], abs=2e-3)
+
+
+def test_final_error_is_the_largest_of_the_last_5_seconds():
+    """The control point lies ell ahead; an error of 9 m before the window does not count."""
+    t = np.arange(8001) * 0.001
+    zeros, ones = np.zeros_like(t), np.ones_like(t)
+    far = np.where(t < 2.9, 9.0, 0.0)
+    found = metrics_of(
+        table_of(
+            plant__eta__x=far, plant__eta__y=ones, plant__eta__z=-2 * t, plant__eta__phi=zeros,
+            plant__eta__theta=zeros, plant__eta__psi=zeros, planner__y_d__x=0.35 * ones,
+            planner__y_d__y=zeros, planner__y_d__z=zeros,
+        )
+    ).found()  # fmt: skip
+    assert found["final_error"] == pytest.approx([0.0, 1.0, 16.0])
+
+
+def test_indices_do_not_depend_on_the_blocks_in_which_rows_come():
+    """To the last bit, on numbers that round."""
+    random = np.random.default_rng(1)
+    columns = {
+        f"plant__{signal}__{k}": random.normal(scale=3.0, size=7001)
+        for signal in ("tau", "tau_applied")
+        for k in "uqr"
+    }
+    columns |= {f"plant__eta__{k}": random.normal(size=7001)
+                for k in ("x", "y", "z", "phi", "theta", "psi")}  # fmt: skip
+    columns |= {f"planner__y_d__{k}": random.normal(size=7001) for k in "xyz"}
+    table = table_of(**columns)
+    found = Metrics()
+    found.begin(table.header)
+    for start, end in ((0, 1), (1, 2), (2, 700), (700, 6000), (6000, 7001)):
+        found.take(table.rows[start:end])
+    found.end(Ending())
+    assert found.found() == metrics_of(table).found()
