@@ -102,7 +102,9 @@ def test_units_are_those_of_the_fmus():
     """Of a group a panel for each unit; the members of a vector share theirs."""
     line = np.linspace(0.0, 1.0, 10)
     names = ("own__F__x", "own__F__y", "own__M__z", "own__a", "own__k__1", "own__k__2")
-    table = table_of(**{name.replace("__1", "[1]").replace("__2", "[2]"): line for name in names})
+    table = table_of(
+        line, **{name.replace("__1", "[1]").replace("__2", "[2]"): line for name in names}
+    )
     units = {
         "own.F.x": "N", "own.F.y": "N.m", "own.M.z": "N.m", "own.a": "m/s2", "own.k[1]": "N",
     }  # fmt: skip
