@@ -41,8 +41,8 @@ from orchestrator.master.simulation import simulate
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.inputs import Inputs, read_inputs
 from orchestrator.runs.request import Request
-from orchestrator.runs.scenario import Scenario, names, read_scenario
-from orchestrator.runs.scenario_events import check_events, read_events, shared_events
+from orchestrator.runs.scenario import Scenario, check_events, names, read_scenario
+from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.runs.wiring import closed_loop, read_wiring
 from orchestrator.system.component import RUNNABLE, WRITABLE, read_component
 from orchestrator.system.names import PortName, port_name

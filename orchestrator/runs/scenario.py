@@ -86,6 +86,18 @@ def read_scenario(name: str) -> Scenario:
         return _scenario(path, text)
 
 
+def check_events(where: object, tables: Sequence[Mapping[str, Any]]) -> None:
+    """Check what can be checked of events without a system.
+
+    Raises:
+        Refused: an event is not written as one.
+
+    """
+    from orchestrator.runs.scenario_file import ScenarioFile  # noqa: PLC0415
+
+    ScenarioFile.check(where, {"events": list(tables)})
+
+
 def _scenario(path: Path, text: str) -> Scenario:
     from orchestrator.runs.scenario_file import ScenarioFile  # noqa: PLC0415
 

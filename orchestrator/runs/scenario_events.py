@@ -31,18 +31,6 @@ _MEMBER = (".", "[")
 _CONDITION = re.compile(rf"(\S+)\s*({'|'.join(COMPARISONS)})\s*(\S+)")
 
 
-def check_events(where: object, tables: Sequence[Mapping[str, Any]]) -> None:
-    """Check what can be checked of events without a system.
-
-    Raises:
-        Refused: an event is not written as one.
-
-    """
-    from orchestrator.runs.scenario_file import ScenarioFile  # noqa: PLC0415
-
-    ScenarioFile.check(where, {"events": list(tables)})
-
-
 def read_events(
     where: object, tables: Sequence[Mapping[str, Any]], system: System
 ) -> tuple[Event, ...]:

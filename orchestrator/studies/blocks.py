@@ -76,48 +76,19 @@ class Crew(Protocol):
 
 
 @contextmanager
-def making(
-    engine: Engine,
-    runs: Iterable[Point],
-    *,
-    scheduler: str | None = None,
-    workers: int | None = None,
-) -> Iterator[Iterator[list[Outcome]]]:
-    """The outcomes of runs, block by block as they are done, for the time of the context.
-
-    Runs are taken from their iterator as they are needed. Each has one outcome; those that end the
-    process which makes them have one as well, at the very end.
+def local(n: int | None, engine: Engine) -> Iterator[Crew]:
+    """Processes of this machine, for the time of the context.
 
     Args:
-        engine: what makes them.
-        runs: to be made.
-        scheduler: address of a Dask scheduler; None for processes of this machine.
-        workers: how many processes of this machine; None for one a core.
+        n: how many; None for one a core.
+        engine: makes the runs.
 
     Raises:
-        InputError: there is no such scheduler, or nobody is left to make the runs.
+        InputError: none can be started.
 
     """
-    if scheduler is not None:
-        # Dask takes a second to be imported, and need not be there.
-        from orchestrator.studies.cluster import cluster  # noqa: PLC0415
-
-        if workers is not None:
-            raise InputError(
-                "--workers is for processes of this machine: those of a scheduler are started with "
-                "it"
-            )
-        crew = cluster(scheduler, engine)
-    else:
-        if workers is not None and workers < 1:
-            raise InputError(f"--workers {workers}: must be at least 1")
-        crew = _local(workers, engine)
-    with crew as of:
-        yield _Making(of).outcomes(runs)
-
-
-@contextmanager
-def _local(n: int | None, engine: Engine) -> Iterator[Crew]:
+    if n is not None and n < 1:
+        raise InputError(f"--workers {n}: must be at least 1")
     with workers_of(n, partial(_set_up, engine)) as workers:
         try:
             workers.done([first := workers.submit(bool)])
@@ -205,7 +176,7 @@ def cannot_make(block: list[Point], error: Exception) -> InputError:
     return InputError(f"runs {numbers} cannot be made: {reason(error)}")
 
 
-class _Making:
+class Making:
     """Blocks of runs on their way to workers and back."""
 
     def __init__(self, crew: Crew) -> None:

@@ -17,25 +17,16 @@ from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.engine import Point
-from orchestrator.studies.study import (
-    LATIN_HYPERCUBE,
-    LOG,
-    MOST_RUNS,
-    SOBOL,
-    STEP,
-    Range,
-    Sample,
-    Study,
-    members,
-)
+from orchestrator.studies.study import STEP, Range, Sample, Study, members
+from orchestrator.studies.study_file import LATIN_HYPERCUBE, LOG, MOST_RUNS, SOBOL
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value, is_finite, type_of, typed
 from orchestrator.vehicle.indices import index_columns
 from orchestrator.vehicle.signals import loops_of
 
-#: Types of values by those of FMI's variables.
-_KINDS = {"Real": float, "Integer": int, "Enumeration": int, "Boolean": bool, "String": str}
+#: Types of values by the types of FMI's variables.
+_TYPES = {"Real": float, "Integer": int, "Enumeration": int, "Boolean": bool, "String": str}
 
 
 class Space:
@@ -177,7 +168,7 @@ class _Known:
 
     def kind(self, name: str) -> type[Value]:
         """The type of a value."""
-        return float if name == STEP else _KINDS[type_of(self._variable(name))]
+        return float if name == STEP else _TYPES[type_of(self._variable(name))]
 
     def typed(self, name: str, value: Any) -> Value:
         """A value in its type."""

@@ -14,23 +14,20 @@ import numpy as np
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.machine.user_files import explained, names_in, path_of, text_of
 from orchestrator.runs.preparation import is_path
+from orchestrator.studies.study_file import (
+    FMU,
+    LINEAR,
+    LOG,
+    METHODS,
+    GridTable,
+    RangeTable,
+    StudyFile,
+)
 from orchestrator.system.names import file_name, flattened, port_name
 from orchestrator.system.values import is_finite
 
 #: Studies that come with the program.
 FOLDER = Path(__file__).parent / "ready"
-
-#: What makes the runs; the first is the default.
-ENGINES = FMU, BATCH = "fmu", "batch"
-
-#: How values that nobody lists are spread between two ends.
-SPACINGS = LINEAR, LOG = "linear", "log"
-
-#: How samples are drawn; the first is the default.
-METHODS = SOBOL, LATIN_HYPERCUBE, RANDOM = "sobol", "latin-hypercube", "random"
-
-#: More runs than this are taken for a mistake.
-MOST_RUNS = 1_000_000_000
 
 #: What may vary beside parameters.
 STEP = "step"
@@ -167,8 +164,6 @@ def study_of(name: str, content: Mapping[str, Any], path: Path | None = None) ->
         Refused: there is a mistake in it.
 
     """
-    from orchestrator.studies.study_file import StudyFile  # noqa: PLC0415
-
     where = str(path or name)
     StudyFile.check(where, content)
     findings = Findings()
@@ -200,8 +195,6 @@ def _is_range(value: Any) -> bool:
 
 def _values(where: str, value: Any) -> tuple[Any, ...]:
     """The values of a list, or of a range under `vary`."""
-    from orchestrator.studies.study_file import GridTable  # noqa: PLC0415
-
     if isinstance(value, list) and value:
         return tuple(value)
     if not _is_range(value):
@@ -225,8 +218,6 @@ def _range(where: str, value: Any) -> Range:
 
 
 def _sample(where: str, content: Mapping[str, Any]) -> Sample:
-    from orchestrator.studies.study_file import RangeTable  # noqa: PLC0415
-
     findings, ranges = Findings(), {}
     for key, value in flattened(content["range"], _is_range):
         with findings.collecting():

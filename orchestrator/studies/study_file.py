@@ -10,9 +10,20 @@ from pydantic import AfterValidator, ConfigDict, Field, model_validator
 from orchestrator.figures.study_figures import KINDS
 from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.master.experiment import ORDERS
-from orchestrator.studies.study import ENGINES, METHODS, MOST_RUNS, SPACINGS
 from orchestrator.system.names import flattened
 from orchestrator.system.values import is_finite
+
+#: What makes the runs; the first is the default.
+ENGINES = FMU, BATCH = "fmu", "batch"
+
+#: How values that nobody lists are spread between two ends.
+SPACINGS = LINEAR, LOG = "linear", "log"
+
+#: How samples are drawn; the first is the default.
+METHODS = SOBOL, LATIN_HYPERCUBE, RANDOM = "sobol", "latin-hypercube", "random"
+
+#: More runs than this are taken for a mistake.
+MOST_RUNS = 1_000_000_000
 
 #: More values of one parameter than this are taken for a mistake.
 _MOST_VALUES = 1_000_000

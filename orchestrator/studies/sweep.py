@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import platform
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -26,13 +26,14 @@ from orchestrator.runs.preparation import Prepared, loaded
 from orchestrator.runs.request import CliOption, Force, Kind, LoopName
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.blocks import making
-from orchestrator.studies.engine import Engine
+from orchestrator.studies.blocks import Making, local
+from orchestrator.studies.engine import Engine, Outcome, Point
 from orchestrator.studies.figure_entries import read_figures
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import Store, StudyResult, read_record, store
-from orchestrator.studies.study import BATCH, ENGINES, FMU, Study, read_study, study_of
+from orchestrator.studies.study import Study, read_study, study_of
+from orchestrator.studies.study_file import BATCH, ENGINES, FMU
 
 #: Packages whose versions the runs and their table depend on.
 _PACKAGES = (*PACKAGES, "numba", "pyarrow", "scipy")
@@ -260,6 +261,45 @@ def _record(
         | {package: version(package) for package in _PACKAGES},
         "platform": platform.platform(),
     }
+
+
+@contextmanager
+def making(
+    engine: Engine,
+    runs: Iterable[Point],
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
+) -> Iterator[Iterator[list[Outcome]]]:
+    """The outcomes of runs, block by block as they are done, for the time of the context.
+
+    Runs are taken from their iterator as they are needed. Each has one outcome; those that end the
+    process which makes them have one as well, at the very end.
+
+    Args:
+        engine: what makes them.
+        runs: to be made.
+        scheduler: address of a Dask scheduler; None for processes of this machine.
+        workers: how many processes of this machine; None for one a core.
+
+    Raises:
+        InputError: there is no such scheduler, or nobody is left to make the runs.
+
+    """
+    if scheduler is not None:
+        # Dask takes a second to be imported, and need not be there.
+        from orchestrator.studies.cluster import cluster  # noqa: PLC0415
+
+        if workers is not None:
+            raise InputError(
+                "--workers is for processes of this machine: those of a scheduler are started with "
+                "it"
+            )
+        crew = cluster(scheduler, engine)
+    else:
+        crew = local(workers, engine)
+    with crew as of:
+        yield Making(of).outcomes(runs)
 
 
 def _complete(

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
+from graphlib import TopologicalSorter
 from importlib import import_module
 from pathlib import Path
 
@@ -151,3 +152,14 @@ def test_the_general_half_names_no_component_and_no_port_of_this_vehicle():
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.Constant) and isinstance(node.value, str):
                 assert node.value not in quoted, f"{path} names {node.value}"
+
+
+def test_no_modules_import_each_other():
+    """Also where an import waits within a function."""
+    for package in ("auv_fmu", "fmus", "orchestrator"):
+        names = {".".join((package, *name)): path for path, name in modules(package)}
+        needs = {}
+        for name, path in names.items():
+            found = {".".join(part) for one in imports(path) for part in (one, one[:-1])}
+            needs[name] = found & (names.keys() - {name})
+        list(TopologicalSorter(needs).static_order())

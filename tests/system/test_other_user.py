@@ -17,7 +17,7 @@ import pytest
 from orchestrator.machine.cache import keep, kept
 from orchestrator.machine.locks import process_folder
 from orchestrator.master import stepper
-from orchestrator.studies.blocks import making
+from orchestrator.studies.sweep import making
 from support.machine import called
 from support.toy_engine import Toy, outcome, run
 

@@ -17,7 +17,8 @@ from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import BATCH, ENGINES, read_study, study_of
+from orchestrator.studies.study import read_study, study_of
+from orchestrator.studies.study_file import BATCH, ENGINES
 from orchestrator.studies.sweep import Means, faster
 from orchestrator.vehicle.indices import index_columns
 from support import others

@@ -88,7 +88,7 @@ def test_interrupt_ends_processes_that_are_busy():
 def test_script_without_a_guard_is_told_what_it_needs(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(
-        "from orchestrator.studies.blocks import making\n"
+        "from orchestrator.studies.sweep import making\n"
         "from support.toy_engine import Toy\n"
         "with making(Toy(), [], workers=1): pass\n"
     )

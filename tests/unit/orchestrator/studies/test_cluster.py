@@ -22,7 +22,7 @@ pytest.importorskip("distributed", reason="needs the extra `cluster`")
 from dask import config
 
 from orchestrator.machine.errors import InputError
-from orchestrator.studies.blocks import making
+from orchestrator.studies.sweep import making
 
 TESTS = Path(__file__).parents[3]
 
@@ -124,7 +124,7 @@ def test_no_address_leaves_anything_to_wait_for():
     ]  # fmt: skip
     code = (
         "from orchestrator.machine.errors import InputError\n"
-        "from orchestrator.studies.blocks import making\n"
+        "from orchestrator.studies.sweep import making\n"
         "from support.toy_engine import Toy\n"
         f"for address in {addresses}:\n"
         "    try:\n"
