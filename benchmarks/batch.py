@@ -29,7 +29,7 @@ from time import process_time
 
 from auv_fmu.closed_loop import Setting, closed_loop
 from orchestrator.master.experiment import Experiment
-from orchestrator.runs.preparation import load, loaded
+from orchestrator.runs.loading import load, loaded
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.studies.space import Space

@@ -32,7 +32,8 @@ from orchestrator.formats.osp import write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
-from orchestrator.runs.preparation import load, prepare
+from orchestrator.runs.loading import load
+from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.component import read_component

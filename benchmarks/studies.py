@@ -23,7 +23,8 @@ from time import perf_counter, process_time
 from typing import NamedTuple
 from unittest.mock import patch
 
-from orchestrator.runs.preparation import Prepared, loaded, prepare
+from orchestrator.runs.loading import loaded
+from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
 from orchestrator.studies import blocks as blocks_module
 from orchestrator.studies.batch_engine import BatchEngine

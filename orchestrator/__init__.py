@@ -29,7 +29,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from orchestrator.runs.preparation import load
+    from orchestrator.runs.loading import load
     from orchestrator.runs.result import Result, simulate
     from orchestrator.studies.sweep import sweep
 
@@ -37,7 +37,7 @@ __all__ = ["Result", "load", "simulate", "sweep"]
 
 _MODULES = {
     "Result": "runs.result",
-    "load": "runs.preparation",
+    "load": "runs.loading",
     "simulate": "runs.result",
     "sweep": "studies.sweep",
 }

@@ -14,7 +14,7 @@ from PIL import Image
 
 from orchestrator.figures.study_figures import draw_figures
 from orchestrator.figures.style import SETTINGS
-from orchestrator.runs.preparation import loaded
+from orchestrator.runs.loading import loaded
 from orchestrator.studies.figure_entries import read_figures
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import StudyResult

@@ -10,7 +10,8 @@ from orchestrator.commands.streams import BAD_INPUT, OK, show
 from orchestrator.formats.examination import examine, surprises
 from orchestrator.machine.errors import Findings
 from orchestrator.master.fmi.binary import binary_of, check_binary
-from orchestrator.runs.preparation import SOME_TIME, loaded, prepare
+from orchestrator.runs.loading import loaded
+from orchestrator.runs.preparation import SOME_TIME, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.waypoints import impossible_paths
 from orchestrator.studies.study import is_study, read_study

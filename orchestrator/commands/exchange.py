@@ -27,13 +27,8 @@ from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, order_of
 from orchestrator.runs.folder import replaced
-from orchestrator.runs.preparation import (
-    DEFAULT_STEP,
-    SOME_TIME,
-    left_behind,
-    load,
-    prepare,
-)
+from orchestrator.runs.loading import left_behind, load
+from orchestrator.runs.preparation import DEFAULT_STEP, SOME_TIME, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.run import Files
 from orchestrator.system.structure import System

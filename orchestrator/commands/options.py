@@ -11,7 +11,7 @@ from fmus.kinds import FMI_VERSIONS, NATIVE
 from orchestrator.commands.streams import FAILED, OK, say
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.master.observers.observer import Ending
-from orchestrator.runs.preparation import loaded
+from orchestrator.runs.loading import loaded
 from orchestrator.runs.request import Request, flag, options_of
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import PortName, port_name

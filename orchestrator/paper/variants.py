@@ -29,7 +29,7 @@ from orchestrator.paper.sensitivity import (
     Sensitivity,
     Variant,
 )
-from orchestrator.runs.preparation import loaded
+from orchestrator.runs.loading import loaded
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.studies.sweep import check_installed

@@ -23,13 +23,8 @@ from orchestrator.master.observers.observer import Observer, Occurrence
 from orchestrator.master.observers.progress import Progress
 from orchestrator.master.observers.table import Table
 from orchestrator.runs.folder import locked, replaced
-from orchestrator.runs.preparation import (
-    Prepared,
-    check_brings_its_own,
-    loaded,
-    prepare,
-    warned,
-)
+from orchestrator.runs.loading import check_brings_its_own, loaded, warned
+from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.record import METRICS, Stopwatch, write_metrics, write_record
 from orchestrator.runs.request import Request
 from orchestrator.runs.resume import checkpoints_of, leave

@@ -13,7 +13,7 @@ import numpy as np
 
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.machine.user_files import explained, names_in, path_of, text_of
-from orchestrator.runs.preparation import is_path
+from orchestrator.runs.loading import is_path
 from orchestrator.studies.study_file import (
     FMU,
     LINEAR,

@@ -22,7 +22,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import PACKAGES, digest_of
 from orchestrator.master.loop import LOOPS
-from orchestrator.runs.preparation import Prepared, loaded
+from orchestrator.runs.loading import loaded
+from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import CliOption, Force, Kind, LoopName
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine

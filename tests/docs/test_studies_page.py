@@ -9,7 +9,7 @@ from inspect import signature
 import pytest
 
 from orchestrator import sweep
-from orchestrator.runs.preparation import loaded
+from orchestrator.runs.loading import loaded
 from orchestrator.studies.figure_entries import read_figures
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import ready_studies, study_of

@@ -16,7 +16,8 @@ from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.preparation import Prepared, loaded, prepare
+from orchestrator.runs.loading import loaded
+from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop

@@ -21,7 +21,7 @@ from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.preparation import load, loaded
+from orchestrator.runs.loading import load, loaded
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.studies.batch_engine import BatchEngine

@@ -13,7 +13,7 @@ from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.preparation import load
+from orchestrator.runs.loading import load
 from orchestrator.system.names import port_name
 from support.machine import LOOPS
 

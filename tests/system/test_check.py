@@ -15,7 +15,8 @@ from orchestrator.formats.examination import open_inputs
 from orchestrator.formats.ssp import STRUCTURE
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.preparation import load, loaded, prepare
+from orchestrator.runs.loading import load, loaded
+from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.result import simulate
 from orchestrator.runs.scenario import names

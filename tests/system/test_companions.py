@@ -11,7 +11,8 @@ import pytest
 from orchestrator.commands.main import main
 from orchestrator.master.observers.table import Table
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.preparation import loaded, prepare, with_companion
+from orchestrator.runs.loading import loaded
+from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.vehicle.signals import STANDARD

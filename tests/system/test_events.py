@@ -20,7 +20,8 @@ from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS
 from orchestrator.master.observers.table import Table
-from orchestrator.runs.preparation import loaded, prepare, with_companion
+from orchestrator.runs.loading import loaded
+from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.vehicle.signals import tracking_error

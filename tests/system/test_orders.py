@@ -18,7 +18,8 @@ from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import delays, planned, stages
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.preparation import load, prepare
+from orchestrator.runs.loading import load
+from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.result import simulate as simulated
 from orchestrator.runs.scenario import Scenario

@@ -12,7 +12,7 @@ import pytest
 
 from orchestrator import sweep
 from orchestrator.commands.main import main
-from orchestrator.runs.preparation import loaded
+from orchestrator.runs.loading import loaded
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.fmu_engine import FmuEngine

@@ -22,7 +22,8 @@ from orchestrator.paper.measures import Approach
 from orchestrator.paper.printed_table import section, write_variants
 from orchestrator.paper.sensitivity import PUBLISHED, as_read
 from orchestrator.paper.variants import errors, moved, numbers_of
-from orchestrator.runs.preparation import loaded, prepare
+from orchestrator.runs.loading import loaded
+from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point

@@ -7,7 +7,8 @@ import pytest
 
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.inputs import Inputs, read_inputs
-from orchestrator.runs.preparation import load, loaded, prepare
+from orchestrator.runs.loading import load, loaded
+from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.system.names import port_name

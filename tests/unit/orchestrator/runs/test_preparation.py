@@ -8,14 +8,8 @@ from pathlib import Path
 import pytest
 
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.preparation import (
-    DEFAULT_STEP,
-    check_brings_its_own,
-    is_path,
-    left_behind,
-    prepare,
-    read_fmu,
-)
+from orchestrator.runs.loading import check_brings_its_own, is_path, left_behind, read_fmu
+from orchestrator.runs.preparation import DEFAULT_STEP, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.component import read_component

@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.machine.errors import InputError, Refused
 from orchestrator.master.hooks.events import Alter, Freeze, Set
-from orchestrator.runs.preparation import load
+from orchestrator.runs.loading import load
 from orchestrator.runs.scenario import check_events, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.system.names import PortName, port_name

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.runs.preparation import loaded
+from orchestrator.runs.loading import loaded
 from orchestrator.studies.figure_entries import read_figures
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import BATCH, read_study, ready_studies

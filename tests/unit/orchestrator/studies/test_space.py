@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.preparation import loaded
+from orchestrator.runs.loading import loaded
 from orchestrator.studies.engine import Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import study_of

@@ -16,7 +16,7 @@ from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
-from orchestrator.runs.preparation import loaded
+from orchestrator.runs.loading import loaded
 from orchestrator.studies.fmu_engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import StudyResult, store

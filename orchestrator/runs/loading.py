@@ -1,0 +1,181 @@
+"""From a name to a system: a scenario of the bundle, or a file that brings its own FMUs."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+from fmus.kinds import FMI_VERSIONS, PYTHON
+from orchestrator.figures import check_figure
+from orchestrator.formats.examination import open_inputs
+from orchestrator.formats.osp import STRUCTURE as OSP
+from orchestrator.formats.osp import read_osp
+from orchestrator.formats.ssp import STRUCTURE as SSD
+from orchestrator.formats.ssp.reader import read_ssp
+from orchestrator.machine.errors import Findings, InputError
+from orchestrator.machine.user_files import is_folder
+from orchestrator.master.experiment import step_of
+from orchestrator.runs.bundle import current_fmus
+from orchestrator.runs.scenario import Scenario, names, read_scenario
+from orchestrator.runs.wiring import closed_loop
+from orchestrator.system.component import RUNNABLE, WRITABLE, read_component
+from orchestrator.system.names import PortName
+from orchestrator.system.structure import System
+from orchestrator.vehicle.cautions import differing_vehicle
+
+T = TypeVar("T")
+
+
+def load(
+    name: str | Path, kind: str = PYTHON, *, variant: str | None = None, strict: bool = False
+) -> System:
+    """The system of a scenario, or of a file of others, with its experiment.
+
+    What is not as it should be and does no harm is a warning.
+
+    Args:
+        name: of a scenario of the bundle, or path of a .toml file, an SSP, an FMU, or libcosim's
+            OspSystemStructure.xml; an SSP and the latter may also be a folder.
+        kind: of the bundle's FMUs, `python` or `native`.
+        variant: which of the descriptions in an SSP; None: the default.
+        strict: refuse what otherwise is a warning.
+
+    Raises:
+        InputError: there is no such scenario, or its system cannot be put together.
+
+    """
+    with warned(strict) as findings:
+        scenario, system = loaded(str(name), kind, variant=variant, findings=findings)
+        left = left_behind(scenario)
+        for note in [left] if left else doubts_of(system):
+            findings.note(note)
+        findings.refuse()
+    return replace(
+        system,
+        name=scenario.name,
+        stop_time=first_given(scenario.stop_time, system.stop_time),
+        step=first_given(scenario.step, system.step),
+    )
+
+
+@contextmanager
+def warned(strict: bool = False) -> Iterator[Findings]:
+    """Findings whose notes become warnings, as Python has them."""
+    findings = Findings(strict)
+    yield findings
+    for note in findings.notes:
+        warnings.warn(note, stacklevel=4)
+
+
+def loaded(
+    name: str,
+    kind: str = PYTHON,
+    fmi: str = FMI_VERSIONS[0],
+    variant: str | None = None,
+    findings: Findings | None = None,
+) -> tuple[Scenario, System]:
+    """A scenario and its system.
+
+    Args:
+        name: of a scenario of the bundle, or path of a .toml file, an SSP, an FMU, or libcosim's
+            OspSystemStructure.xml; an SSP and the latter may also be a folder.
+        kind: of the bundle's FMUs, `python` or `native`; FMUs that a file names are as they are.
+        fmi: their version of FMI. The master can step those of the first.
+        variant: which of the descriptions in an SSP; None: the default.
+        findings: takes what is wrong with it; None: nobody asks for what does no harm.
+
+    Raises:
+        InputError: there is no such scenario, or its system cannot be put together.
+
+    """
+    path = Path(name)
+    read = _reader(path)
+    if variant is not None and read is not read_ssp:
+        raise InputError(f"{name}: has no variants; an SSP may have")
+    if read is not None:
+        check_brings_its_own(name, kind, fmi)
+        system = read_ssp(path, variant, findings) if read is read_ssp else read(path, findings)
+        whole = path.resolve()
+        named = whole.parent if path.name in (SSD, OSP) else whole
+        return Scenario(named.stem, title=path.name or named.name), system
+    scenario = read_scenario(name)
+    check_figure(scenario.figure)
+    versions = RUNNABLE if fmi == FMI_VERSIONS[0] else WRITABLE
+    return scenario, closed_loop(current_fmus(kind, fmi), scenario, versions)
+
+
+def read_fmu(path: Path, findings: Findings | None = None) -> System:
+    """A system of one FMU, with the experiment that it was made for.
+
+    Raises:
+        InputError: the file is missing, or is no FMU that can be run.
+
+    """
+    name = re.sub(r"\W", "_", path.stem)
+    component = read_component(name, path, findings=findings)
+    return System(
+        name=path.stem,
+        components={name: component},
+        connections=(),
+        start_time=component.experiment("startTime"),
+        stop_time=component.experiment("stopTime"),
+        step=step_of(component),
+    )
+
+
+#: Who reads what is no scenario, by the endings of files.
+_READERS: Mapping[str, Callable[..., System]] = {
+    ".ssp": read_ssp,
+    ".ssd": read_ssp,
+    ".xml": read_osp,
+    ".fmu": read_fmu,
+}
+
+
+def is_path(name: str) -> bool:
+    """Whether what is run is named by a path: all else is the name of a scenario."""
+    return name.endswith((".toml", *_READERS))
+
+
+def _reader(path: Path) -> Callable[..., System] | None:
+    """Who reads a file or folder; None: it is a scenario."""
+    if path.suffix in _READERS or str(path) in names() or not is_folder(path):
+        return _READERS.get(path.suffix)
+    return read_osp if (path / OSP).is_file() and not (path / SSD).is_file() else read_ssp
+
+
+def left_behind(scenario: Scenario) -> str | None:
+    """What of a scenario a system by itself does not have, in words."""
+    has = {"events": bool(scenario.events), "inputs": scenario.inputs is not None}
+    names = " and ".join(name for name, there in has.items() if there)
+    return f"{scenario.name}: the system comes without the scenario's {names}" if names else None
+
+
+def check_brings_its_own(name: str, kind: str, fmi: str = FMI_VERSIONS[0]) -> None:
+    """Check that no other FMUs are asked for than those that a system comes with.
+
+    Raises:
+        InputError: it would not have any effect.
+
+    """
+    if (kind, fmi) != (PYTHON, FMI_VERSIONS[0]):
+        raise InputError(f"{name}: comes with its FMUs; kind and fmi are for the bundle's own")
+
+
+def doubts_of(system: System, given: Collection[PortName] = ()) -> list[str]:
+    """What may have been forgotten, in lines: inputs without a source, a part of a vehicle."""
+    if len(system.components) == 1:
+        # No other one could feed it.
+        return []
+    found = open_inputs(system, given), differing_vehicle(system)
+    return [text for text in found if text is not None]
+
+
+def first_given(*values: T | None) -> T | None:
+    """The first of some values that is not None."""
+    return next((value for value in values if value is not None), None)
