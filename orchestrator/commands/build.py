@@ -20,8 +20,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
 from orchestrator.runs.bundle import DEFAULT_FOLDERS
 from orchestrator.runs.own_controller import BASES, build_own, new_controller
-from orchestrator.runs.request import Request
-from orchestrator.runs.run import Files
+from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle import gains

@@ -29,8 +29,7 @@ from orchestrator.master.experiment import ORDERS, order_of
 from orchestrator.runs.folder import replaced
 from orchestrator.runs.loading import left_behind, load
 from orchestrator.runs.preparation import DEFAULT_STEP, SOME_TIME, prepare
-from orchestrator.runs.request import Request
-from orchestrator.runs.run import Files
+from orchestrator.runs.request import Files, Request
 from orchestrator.system.structure import System
 
 #: Writers by the names of their formats.

@@ -9,8 +9,7 @@ from orchestrator.commands.options import add_options, add_out
 from orchestrator.commands.streams import OK, show
 from orchestrator.paper.printed_table import write_table
 from orchestrator.paper.report import write_report
-from orchestrator.runs.request import Request
-from orchestrator.runs.run import Files
+from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import names
 from orchestrator.studies.study import ready_studies
 

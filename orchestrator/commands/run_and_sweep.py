@@ -25,8 +25,8 @@ from orchestrator.commands.streams import INTERRUPTED, OK, say, show
 from orchestrator.machine.errors import Findings
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.runs.preparation import prepare, with_companion
-from orchestrator.runs.request import Request
-from orchestrator.runs.run import Files, run_into
+from orchestrator.runs.request import Files, Request
+from orchestrator.runs.run import run_into
 from orchestrator.studies.study import read_study, ready_studies
 from orchestrator.studies.sweep import Means, folder_of, swept
 from orchestrator.vehicle.indices import metrics, of_vehicles

@@ -33,7 +33,7 @@ from orchestrator.runs.loading import loaded
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.studies.sweep import check_installed
-from orchestrator.vehicle.indices import LAST_SECONDS
+from orchestrator.vehicle.reducers import LAST_SECONDS
 from orchestrator.vehicle.signals import AXES, STANDARD, parameter
 
 #: Runs that a worker makes at a time.

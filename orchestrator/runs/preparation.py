@@ -1,4 +1,4 @@
-"""What is run, ready: a scenario and system with the user's changes, and what it is compared with."""
+"""A run that is ready to be made, with the changes of the user, and what it is compared with."""
 
 from __future__ import annotations
 

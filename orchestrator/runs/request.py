@@ -16,6 +16,7 @@ from fmus.kinds import KINDS, PYTHON
 from orchestrator.master.experiment import COUPLINGS, ORDERS, Order, order_of, written_order
 from orchestrator.master.fmi.isolated import STEP_TIMEOUT
 from orchestrator.master.loop import LOOPS
+from orchestrator.master.observers.files import FORMATS
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.values import literal
 
@@ -182,6 +183,41 @@ class Request:
         # There is no option for these.
         steps = ", ".join(f"{name} = {_text(step)} s" for name, step in self.steps.items())
         return shlex.join(words) + f" (steps: {steps})" * bool(steps)
+
+
+@dataclass(frozen=True)
+class Files:
+    """What is kept of a run."""
+
+    interval: Annotated[
+        float | None,
+        CliOption(
+            "rows kept in the table, one for each interval [s]; default: one a step",
+            type=float,
+            metavar="S",
+        ),
+    ] = None
+    columns: Annotated[
+        str,
+        CliOption(
+            "columns kept in the table, for example plant.y.*,controller.tau; default: all",
+            metavar="outputs|all|PATTERN,...",
+        ),
+    ] = "all"
+    format: Annotated[str, CliOption("of the table; default: csv", choices=tuple(FORMATS))] = "csv"
+    no_figures: Annotated[bool, CliOption("draw none; default: draw", action="store_true")] = False
+    checkpoint_every: Annotated[
+        float | None,
+        CliOption(
+            "keep what it takes to go on, every so many simulated seconds, in DIR/checkpoint",
+            type=float,
+            metavar="S",
+        ),
+    ] = None
+    resume: Annotated[
+        bool, CliOption("go on from the last checkpoint in DIR/checkpoint", action="store_true")
+    ] = False
+    force: Force = False
 
 
 def _text(value: Any) -> str:

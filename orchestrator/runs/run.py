@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
 from shutil import rmtree
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from orchestrator.master.observers.selection import Selection, check_interval, m
 from orchestrator.runs.folder import INCOMPLETE, inner, place_of, publish, replaced
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.record import METRICS, Stopwatch, write_metrics, write_record
-from orchestrator.runs.request import CliOption, Force
+from orchestrator.runs.request import Files
 from orchestrator.runs.resume import FOLDER, checkpoints_of, leave
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import file_name
@@ -48,41 +48,6 @@ _SPARE, _SPARE_BYTES = ".spare", 65536
 
 #: Exit status of a process that a run has to end with.
 _FAILED = 1
-
-
-@dataclass(frozen=True)
-class Files:
-    """What is kept of a run."""
-
-    interval: Annotated[
-        float | None,
-        CliOption(
-            "rows kept in the table, one for each interval [s]; default: one a step",
-            type=float,
-            metavar="S",
-        ),
-    ] = None
-    columns: Annotated[
-        str,
-        CliOption(
-            "columns kept in the table, for example plant.y.*,controller.tau; default: all",
-            metavar="outputs|all|PATTERN,...",
-        ),
-    ] = "all"
-    format: Annotated[str, CliOption("of the table; default: csv", choices=tuple(FORMATS))] = "csv"
-    no_figures: Annotated[bool, CliOption("draw none; default: draw", action="store_true")] = False
-    checkpoint_every: Annotated[
-        float | None,
-        CliOption(
-            "keep what it takes to go on, every so many simulated seconds, in DIR/checkpoint",
-            type=float,
-            metavar="S",
-        ),
-    ] = None
-    resume: Annotated[
-        bool, CliOption("go on from the last checkpoint in DIR/checkpoint", action="store_true")
-    ] = False
-    force: Force = False
 
 
 @dataclass(frozen=True)

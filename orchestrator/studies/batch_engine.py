@@ -31,7 +31,8 @@ from orchestrator.studies.batch.support import setting_of, unsupported
 from orchestrator.studies.engine import Outcome, Point
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.indices import INDICES, LAST_SECONDS
+from orchestrator.vehicle.indices import INDICES
+from orchestrator.vehicle.reducers import LAST_SECONDS
 from orchestrator.vehicle.signals import STANDARD
 
 #: What makes every system.

@@ -23,15 +23,8 @@ from orchestrator.studies.store import StudyResult, store
 from orchestrator.studies.study import study_of
 from orchestrator.system.names import PortName, port_name
 from orchestrator.vehicle import indices as table_of_indices
-from orchestrator.vehicle.indices import (
-    Fold,
-    Index,
-    Indices,
-    Metrics,
-    index_columns,
-    largest,
-    metrics_of,
-)
+from orchestrator.vehicle.indices import Index, Indices, Metrics, index_columns, metrics_of
+from orchestrator.vehicle.reducers import Fold, largest
 from orchestrator.vehicle.signals import AXES, EULER, Loop
 
 T, H, ELL = 10.0, 0.02, 0.35

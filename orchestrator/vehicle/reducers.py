@@ -1,0 +1,170 @@
+"""What indices are made of: rows of one loop, and reducers that take them block by block."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+from orchestrator.master.observers.observer import Header
+from orchestrator.master.observers.table import Table
+from orchestrator.vehicle.signals import Loop, limits, tracking_error
+
+#: T_L of section 4.2 [s].
+LAST_SECONDS = 5.0
+
+
+class LoopRows:
+    """Some rows of a run, and what indices of one loop take from them.
+
+    Attributes:
+        loop: whose signals count.
+        number: of the first of them in the run, from 0; row 0 ends no step.
+        half: when half of the run is over [s].
+
+    """
+
+    def __init__(
+        self, header: Header, loop: Loop, number: int, before: np.ndarray, rows: np.ndarray
+    ) -> None:
+        """Take rows, and the one before them, if there is one."""
+        self.loop, self.number = loop, number
+        self.half = 0.5 * header.experiment.stop_time
+        self._header, self._rows = header, np.vstack((before, rows))
+        self._table = Table.of(header, self._rows)
+        self._groups: dict[tuple[str, ...], np.ndarray] = {}
+        self._new = len(before)
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times of the rows [s]."""
+        return self._table.time[self._new :]
+
+    @property
+    def late(self) -> np.ndarray:
+        """Which rows lie in the second half of the run."""
+        return self.time >= self.half
+
+    def at(self, *columns: str) -> np.ndarray:
+        """Values in the rows."""
+        return self._group(columns)[self._new :]
+
+    def starts(self, *columns: str) -> np.ndarray:
+        """Values at the beginning of each step that ends at one of the rows."""
+        return self._group(columns)[:-1]
+
+    def ends(self, *columns: str) -> np.ndarray:
+        """Values at the end of each of these steps."""
+        return self._group(columns)[1:]
+
+    def _group(self, columns: tuple[str, ...]) -> np.ndarray:
+        if columns not in self._groups:
+            self._groups[columns] = self._table.group(*columns)
+        return self._groups[columns]
+
+    @property
+    def limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """The limits of (3), lower and upper."""
+        return limits(self._table, self.loop)
+
+    def errors(self, wanted: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """y - y_d with the true control point, in all rows or in some [m]."""
+        rows = self._rows[self._new :][wanted]
+        return tracking_error(Table.of(self._header, rows), self.loop)
+
+    @cached_property
+    def distance(self) -> np.ndarray:
+        """|y - y_d| in each row [m]."""
+        # The control point takes as long as everything else together, and is not always wanted.
+        return size(self.errors())
+
+
+class Fold:
+    """Makes an index of terms, a row for each instant or step that counts."""
+
+    def __init__(
+        self, term: Callable[[LoopRows], np.ndarray], fold: Callable[[np.ndarray], np.ndarray]
+    ) -> None:
+        """Start with nothing.
+
+        Args:
+            term: of some rows, in their order.
+            fold: many terms to one: :func:`total`, :func:`largest`, :func:`first` or :func:`last`.
+
+        """
+        self._term, self._fold = term, fold
+        self._found, self.n = np.empty(0), 0
+
+    def take(self, rows: LoopRows) -> None:
+        """Take some rows into account."""
+        if self.n and self._fold is first:
+            return
+        if len(terms := self._term(rows)):
+            terms = terms.reshape(len(terms), -1)
+            self._found = self._fold(np.vstack((self._found, terms)) if self.n else terms)
+            self.n += len(terms)
+
+    def found(self, end: float) -> np.ndarray:
+        """What the terms of a run come to that ends at a time [s]."""
+        return self._found
+
+
+def total(terms: np.ndarray) -> np.ndarray:
+    """The sum, row by row: it does not depend on the blocks in which rows come."""
+    found: np.ndarray = terms.sum(axis=0)
+    return found
+
+
+def largest(terms: np.ndarray) -> np.ndarray:
+    """The largest of each column."""
+    found: np.ndarray = terms.max(axis=0)
+    return found
+
+
+def first(terms: np.ndarray) -> np.ndarray:
+    """The first row."""
+    found: np.ndarray = terms[0]
+    return found
+
+
+def last(terms: np.ndarray) -> np.ndarray:
+    """The last row."""
+    found: np.ndarray = terms[-1]
+    return found
+
+
+class LargestOfTheEnd:
+    """e_f of section 4.2: max |e| of each axis over the last T_L seconds.
+
+    Attributes:
+        n: how many steps there were: before the first nothing has been followed.
+
+    """
+
+    def __init__(self) -> None:
+        """Start with nothing."""
+        self._recent: deque[LoopRows] = deque()
+        self.n = 0
+
+    def take(self, rows: LoopRows) -> None:
+        """Keep the last seconds."""
+        self.n = rows.number + len(rows.time) - 1
+        self._recent.append(rows)
+        while self._recent[0].time[-1] < rows.time[-1] - LAST_SECONDS:
+            self._recent.popleft()
+
+    def found(self, end: float) -> np.ndarray:
+        """The largest errors."""
+        errors = [rows.errors(rows.time >= end - LAST_SECONDS) for rows in self._recent]
+        return largest(np.abs(np.vstack(errors)))
+
+
+def size(vectors: np.ndarray) -> np.ndarray:
+    """The Euclidean norm of each row, summed in the order of its members."""
+    squares = np.zeros(len(vectors))
+    for column in vectors.T:
+        squares = squares + column * column
+    norm: np.ndarray = np.sqrt(squares)
+    return norm
