@@ -268,12 +268,12 @@ def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path, loop: s
             go_on.wait()
 
     table = Waits()
-    system, experiment = foreign_system(c_fmu, "SILENT_ERROR"), Experiment(0.5, STEP)
+    plan = planned(foreign_system(c_fmu, "SILENT_ERROR"), Experiment(0.5, STEP))
     talkative = foreign_system(c_fmu, "LOGS", at=0.0)
-    steps = chosen(loop, experiment)
-    thread = threading.Thread(target=simulate, args=(system, experiment, [table], None, steps))
+    steps = chosen(loop, plan.experiment)
+    thread = threading.Thread(target=simulate, args=(plan, [table], None, steps))
     thread.start()
-    begun.wait()
+    assert begun.wait(60.0)
     assert len(simulate(planned(talkative, Experiment(STEP, STEP)), loop=steps).messages) == 101
     gc.collect()
     go_on.set()
