@@ -42,13 +42,11 @@ def identity(
         system: that is run.
         experiment: until when, in which steps and which order.
         events: that happen to it.
-        course: of its inputs; None: they keep their values.
+        input_table: values of inputs over time; None: they keep their values.
 
     """
     return {
-        "the code": code_of(
-            *(f"orchestrator.{room}" for room in ("machine", "system", "formats", "master"))
-        ),
+        "the code": code_of(*(f"orchestrator.{room}" for room in ROOMS)),
         "the version of Python": python_version(),
         **{f"the version of {package}": version(package) for package in PACKAGES},
         # Their order is that of the columns, and says where a ring is opened.

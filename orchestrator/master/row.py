@@ -25,14 +25,14 @@ class Row:
     The ports of a component that have the same causality and type are neighbours, in the order
     of its description, so that one FMI call moves them all.
 
-    Outputs of some components have a hidden place behind all columns, into which their instance
-    writes them; they are shown in their columns when somebody copies them there.
+    Outputs of some components have a hidden place after all columns, into which their instance
+    writes them; they are shown once they are copied into their columns.
 
     Attributes:
         values: of all ports, and the hidden ones.
-        shown: a view of the columns alone.
+        shown: a view of the columns only.
         columns: where the value of a port is.
-        texts: for which numbers stand in it, and the ports of which that is so.
+        strings, text_ports: the texts for which numbers stand in it, and the ports they belong to.
 
     """
 

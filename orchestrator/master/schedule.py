@@ -121,7 +121,7 @@ class Decimation(NamedTuple):
     at_end: bool = False
 
     def is_due(self, k: int, steps: int) -> bool:
-        """Whether in the communication step behind the k-th of so many."""
+        """Whether in the communication step after the k-th of so many."""
         if self.at_end:
             return (k + 1) % self.every == 0 or k + 1 == steps
         return k % self.every == 0
@@ -133,7 +133,7 @@ class Stage(NamedTuple):
     Attributes:
         gather: moves values within the row.
         members: the components.
-        pace: in which communication steps; None: in all of them.
+        decimation: in which communication steps; None: in all of them.
 
     """
 

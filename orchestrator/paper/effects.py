@@ -105,7 +105,7 @@ def show_effect(name: str, kept_runs: Sequence[KeptRun], folder: Path) -> str:
 
     Args:
         name: of the effect.
-        outcomes: of its runs.
+        kept_runs: that it shows.
         folder: to write `NAME.png` into.
 
     """

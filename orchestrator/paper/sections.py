@@ -146,7 +146,7 @@ def draw_section(section: Section, kept_runs: Sequence[KeptRun], folder: Path) -
 
     Args:
         section: whose figures.
-        outcomes: of its runs.
+        kept_runs: of the section.
         folder: to write into.
 
     """
@@ -172,7 +172,7 @@ def written(
 
     Args:
         section: to write.
-        outcomes: of its runs.
+        kept_runs: all that the report has.
         notes: on what its figures leave out.
         folder: of the report, in which its figures are.
 

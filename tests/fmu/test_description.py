@@ -26,7 +26,6 @@ from fmus.ports.terminals import terminals_and_icons
 
 GUID = "{00000000-0000-0000-0000-000000000000}"
 
-MEMBER = "TerminalMemberVariable"
 SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
 
 #: Types of FMI 3.0 by the names of FMI 2.0, and what both versions say of a variable.

@@ -178,7 +178,7 @@ class Part:
         fmu: that it is an instance of.
         values: of parameters and inputs that nothing feeds, as they are in the end.
         hidden: values that others win over.
-        pace: how many communication steps it takes in one of its own.
+        every: how many communication steps it takes in one of its own.
 
     """
 

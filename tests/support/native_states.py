@@ -21,10 +21,6 @@ MAGIC = "FMU state 2"
 _WORDS, _VERSION = 625, 3
 
 
-#: What Python raises where a value is not what it should be.
-_OF_ANOTHER_SHAPE = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
-
-
 class NativeState(dict[str, Any]):
     """What a state of an FMU in C says."""
 

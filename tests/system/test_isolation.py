@@ -227,7 +227,7 @@ def test_a_python_slave_that_raises(raising: System, mark: str):
     assert left_over(mark) == []
 
 
-def test_nobody_hangs_where_the_keeper_is_killed(c_fmu: Path, mark: str):
+def test_nothing_hangs_where_the_supervisor_is_killed(c_fmu: Path, mark: str):
     class Kills(Table):
         def begin(self, header: Header) -> None:
             super().begin(header)

@@ -104,7 +104,7 @@ class Instance(Protocol):
         Args:
             values: of the row, from its first on.
             parts: of them.
-            texts: for which numbers stand there.
+            strings: the texts for which numbers stand there.
 
         """
 

@@ -55,10 +55,10 @@ class PortBlock:
 
         Args:
             causality: `input` or `output`.
-            kind: one of :data:`FMI_TYPES`.
+            fmi_type: one of :data:`FMI_TYPES`.
             references: value references.
             row: the part of the row of all values where the values are, a view.
-            texts: whose numbers stand in the row.
+            strings: the texts whose numbers stand in the row.
 
         """
         self._fmi_type, c_type = FMI_TYPES[fmi_type]
@@ -128,13 +128,13 @@ class PortBlock:
         return partial(function, self._references, self._n, self._values)
 
     def _set_texts(self, function: Callable[..., int]) -> int:
-        strings = [self._strings.text(number).encode() for number in self._values]
-        return function(self._references, self._n, (fmi2String * len(strings))(*strings))
+        texts = [self._strings.text(number).encode() for number in self._values]
+        return function(self._references, self._n, (fmi2String * len(texts))(*texts))
 
     def _get_texts(self, function: Callable[..., int]) -> int:
-        strings = (fmi2String * len(self._values))()
-        status = function(self._references, self._n, strings)
-        for i, text in enumerate(strings):
+        texts = (fmi2String * len(self._values))()
+        status = function(self._references, self._n, texts)
+        for i, text in enumerate(texts):
             self._values[i] = self._strings.number(text_of(text))
         return status
 

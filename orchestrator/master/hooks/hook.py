@@ -29,7 +29,7 @@ class Run:
         instances: of its components, by their names.
         row: of all values.
         stages: of every step.
-        signals: what is done to values on their way from outputs to inputs.
+        overrides: what is done to values on their way from outputs to inputs.
         blocks: take the rows.
         log: of what the FMUs say.
         interrupts: signals to stop that have come; a hook that waits looks there.

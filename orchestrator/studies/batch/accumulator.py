@@ -1,7 +1,7 @@
 """The indices of a run on the way.
 
-They are those of :data:`orchestrator.studies.engine.INDICES`, bit for bit as they follow from the
-rows of a table: sums go on row by row, in the same order.
+They equal :data:`orchestrator.vehicle.indices.INDICES` of the rows of a table bit for bit: sums go
+on row by row, in the same order.
 """
 
 from __future__ import annotations
