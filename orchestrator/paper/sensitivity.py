@@ -102,8 +102,8 @@ class Sensitivity:
         numbers: by scenario, with L2 norms for efforts; an axis for each of `of_runs`, then for
             SIGNALS, END_TIMES and the six. A choice that a scenario has not has one element, and a
             run that has failed has NaN.
-        approaches: to the reference, by scenario; an axis for each of `of_runs`, then the two numbers
-            of :class:`.Approach`, which are NaN for a run that has not come there.
+        approaches: to the reference, by scenario; an axis for each of `of_runs`, then the two
+            numbers of :class:`.Approach`, which are NaN for a run that has not come there.
         of_runs: choices that the runs depend on.
 
     """
