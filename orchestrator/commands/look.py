@@ -17,9 +17,9 @@ from orchestrator.commands.options import (
     status,
 )
 from orchestrator.commands.streams import OK, say, show
-from orchestrator.figures import Drawn, save
 from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
 from orchestrator.figures.plot import plot, wanted
+from orchestrator.figures.style import Drawn, save
 from orchestrator.figures.view import page
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError

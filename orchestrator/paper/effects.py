@@ -13,15 +13,9 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from auv_fmu.euler import STEP
 from auv_fmu.output_feedback import Gains
-from orchestrator.figures import (
-    COLOURS,
-    STYLES,
-    Drawn,
-    draw_commands,
-    overlay,
-    save,
-)
-from orchestrator.figures.style import WIDTH, styled
+from orchestrator.figures.panels import draw_commands
+from orchestrator.figures.run_figures import overlay
+from orchestrator.figures.style import COLOURS, STYLES, WIDTH, Drawn, save, styled
 from orchestrator.paper.claims import FIVE, FIVE_PD, QUIET, SEVEN
 from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.measures import EFFORT_PD, EFFORT_PROPOSED

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.figures import Drawn, draw, figure_files
+from orchestrator.figures.drawing import draw, figure_files
+from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts, held_interrupts

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.figures import Drawn
+from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.errors import InputError

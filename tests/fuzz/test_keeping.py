@@ -31,7 +31,7 @@ from hypothesis import strategies as st
 
 from orchestrator.commands import paper
 from orchestrator.commands.main import main
-from orchestrator.figures import figure_files
+from orchestrator.figures.drawing import figure_files
 from orchestrator.machine.ledger import LEDGER
 from orchestrator.machine.workers import Workers
 from orchestrator.master.hooks.checkpoint import Checkpoints
