@@ -1,7 +1,7 @@
 """Fill in what the pages of docs/ take from the code, and write the schemas for editors.
 
 `python tools/pages.py` writes each file anew that is not as it would be written; a test holds them
-against it. Pages are written by hand but for what stands between `<!-- filled: NAME -->` and
+against it. Pages are written by hand except what stands between `<!-- filled: NAME -->` and
 `<!-- / -->`, which this replaces. `docs/components` and `docs/schemas` are written whole.
 
 The other tools compute what takes minutes, and print it: `accuracy.py` the tables of

@@ -159,7 +159,7 @@ def _verify(options: argparse.Namespace) -> int:
 
 
 def _system(name: str, kind: str = PYTHON) -> System:
-    """What another tool runs; warnings go where those of a command go."""
+    """What another tool runs; its warnings are told as the command's own."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         system = load(name, kind)

@@ -22,7 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status.
 
     Args:
-        arguments: of a command within a process that goes on; None: those of the process, which
+        arguments: of a command within a process that goes on; None: the process's own, which
             ends after it.
 
     """
@@ -35,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with orderly_end(arguments is None), warnings.catch_warnings():
             warnings.showwarning = partial(_warn, warnings.showwarning)
-            # What is in the current folder may be of somebody else.
+            # What is in the current folder may belong to someone else.
             imported_apart("matplotlib", "matplotlibrc")
             # Half a second of imports, in which Ctrl-C must find an answer, too.
             status = int(import_module("orchestrator.commands.parser").dispatch(arguments))

@@ -41,7 +41,7 @@ def add_variant(parser: argparse.ArgumentParser) -> None:
 
 
 def add_options(parser: argparse.ArgumentParser, declared: type[Any], *names: str) -> None:
-    """Add the fields of a dataclass that are options: those of some names, or all."""
+    """Add the fields of a dataclass that are options: the named ones, or all."""
     defaults = declared()
     for name, one in options_of(declared).items():
         if not names or name in names:

@@ -17,7 +17,7 @@ from orchestrator.system.values import BOOLEANS, finite
 #: Columns that name the time, in lower case.
 _TIME = ("time", "t")
 
-#: What ecos puts behind a name.
+#: What ecos puts after a name.
 _TYPE = re.compile(r"\[[A-Z]+\]$")
 
 
@@ -45,7 +45,7 @@ def read_table(path: Path, ports: Mapping[str, str], known: Collection[str]) -> 
     Args:
         path: CSV with a line of names; the separators are commas, semicolons or tabs.
         ports: types of the ports that are looked for, by `component.port`.
-        known: names of all ports; those of systems may stand before them.
+        known: names of all ports; names of systems may stand before them.
 
     Raises:
         InputError: a row is not as long as the first, a time falls, a value is no number,

@@ -165,7 +165,7 @@ class _Samples:
         self._last = rows[-1:].copy()
 
     def end(self, ending: Ending) -> None:
-        """Take the samples that lie behind the last row, but for rounding."""
+        """Take the samples that lie after the last row, apart from rounding."""
         self._sample(self._last, len(self._times))
 
     def _sample(self, rows: np.ndarray, end: int) -> None:

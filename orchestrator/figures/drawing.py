@@ -79,7 +79,7 @@ def draw(
 
 
 def _same(run: Drawn, loop: Loop, i: int) -> Loop:
-    """The loop of a run that is drawn beside one of another: that of the vehicle's name."""
+    """The loop of a run that is drawn beside another's: the one of the same vehicle."""
     named = [own for own in run.loops if own.vehicle == loop.vehicle]
     return next(iter([*named, *run.loops[i : i + 1], *run.loops]))
 

@@ -23,7 +23,7 @@ class _Division(NamedTuple):
     """What is kept of a part of a run.
 
     Attributes:
-        pairs: rows with extremes, and the first and the last, each behind the row before it,
+        pairs: rows with extremes, and the first and the last, each after the row before it,
             (n, 2, 1 + columns).
         integral: of the rows over time, linear between them.
 
@@ -45,7 +45,7 @@ class VisibleRows(Table):
     Of each division of the time it keeps the rows in which one of the drawn signals is smallest or
     largest, so the envelope of noise and chatter stays, and with each row the one before it, so
     that steps stay whole. Neighbouring divisions are merged when there are too many. So memory does
-    not grow with the length of the run, and nobody has to know before how long it will be.
+    not grow with the length of the run, and its length need not be known before.
 
     Attributes:
         means: of a longer run, for the rows that are kept are its extremes and no sample of it: a
@@ -108,7 +108,7 @@ class VisibleRows(Table):
             self._divisions = []
 
     def _add(self, pairs: np.ndarray) -> None:
-        """Put rows, each behind the one before it, into the last division, or into a new one."""
+        """Put rows, each after the one before it, into the last division, or into a new one."""
         n = len(pairs)
         areas = 0.5 * np.diff(pairs[:, :, 0], axis=1) * pairs.sum(axis=1)
         if self._in_last:

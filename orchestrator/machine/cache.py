@@ -35,7 +35,7 @@ _MOST_LINKS = 40
 
 
 def users_folder() -> Path:
-    """The user's cache folder, whoever can write into it."""
+    """The user's cache folder, even one that others can write into."""
     return user_cache_path("auv-fmu", appauthor=False)
 
 

@@ -43,7 +43,7 @@ def run_module(
     Without -P it would import from the current folder.
 
     Args:
-        module: as behind `python -m`.
+        module: as after `python -m`.
         arguments: of its command line.
         folder: that it runs in; None: the current one.
         timeout: how long it may take [s]; None: as long as it wants.
@@ -53,7 +53,7 @@ def run_module(
         OSError: no process can be started.
 
     """
-    # The child reads from a pipe of which nobody but this process has the other end.
+    # The child reads from a pipe of which only this process has the other end.
     end_of_child, end_of_ours = os.pipe()
     try:
         with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:

@@ -1,4 +1,4 @@
-"""The C compiler that there is: the machine's own, or else that of the package ziglang."""
+"""The C compiler that there is: the machine's own, or else the one in the package ziglang."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from subprocess import PIPE, CompletedProcess, Popen, TimeoutExpired
 
 from orchestrator.machine.children import run_module
 
-#: C compilers, the first of which is taken that there is. The packaging has the same.
+#: C compilers: the first one that there is, is taken. :mod:`fmus.compilers` has the same.
 COMPILERS = ("cc", "gcc", "clang")
 
 #: How long this machine's compiler may take [s], and ziglang, which makes a C library, too.
@@ -22,7 +22,7 @@ Compiler = Callable[..., CompletedProcess[str]]
 
 
 def compiler() -> Compiler | None:
-    """A C compiler: this machine's, or else that of a package; None: there is none."""
+    """A C compiler: this machine's, or else a package's; None: there is none."""
     return of_the_machine() or _zig()
 
 
@@ -50,7 +50,7 @@ def run_compiler(command: Sequence[str], limit: float | None = None) -> Complete
 
     """
     limit = _LIMIT if limit is None else limit
-    # Ctrl-C is for this process alone.
+    # Ctrl-C is for this process only.
     with Popen(
         command, stdout=PIPE, stderr=PIPE, text=True, errors="replace", start_new_session=True
     ) as process:

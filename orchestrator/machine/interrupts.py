@@ -21,7 +21,7 @@ _ENDS = [
     if hasattr(signal, n)
 ]
 
-#: After so many signals, somebody does not want to wait any more.
+#: After so many signals, the user does not want to wait any more.
 _INSISTENCE = 3
 
 #: Exit status of a process that a signal has ended, less the number of the signal.
@@ -53,7 +53,7 @@ class Interrupts:
         self.hand_over: Callable[[], None] = lambda: None
 
     def __bool__(self) -> bool:
-        """Whether somebody wants the work to end."""
+        """Whether the work is to end."""
         return bool(self.signals)
 
     @property
@@ -154,7 +154,7 @@ def held_interrupts(
 ) -> Iterator[Interrupts]:
     """Collect signals to stop as long as the context lasts.
 
-    Within another such context the signals are those of the outer one. Signals reach the main
+    Within another such context the signals go to the outer one. Signals reach the main
     thread only: elsewhere nothing is held.
 
     Args:

@@ -281,7 +281,7 @@ def _content(path: Path) -> _Content | None:
             return None
         content = _Content(**unsealed(path.read_text(encoding="utf-8")))
         names = [Path(name) for name in (*content.files, *content.moving, *content.leaving)]
-        # One that somebody else has written must not lead out of the folder.
+        # One that someone else has written must not lead out of the folder.
         leads_out = any(name.is_absolute() or ".." in name.parts for name in names)
         is_ours = re.fullmatch("[0-9a-f]{32}", content.identity) and not leads_out
     except (OSError, ValueError, TypeError, RecursionError):

@@ -1,7 +1,8 @@
 """What only one process may have, and what it leaves when it is killed.
 
 A process that works on a folder holds a lock on it, which ends with the process, however that ends.
-Its temporary folder holds a marker, too: one with a marker and without a lock nobody needs.
+Its temporary folder holds a marker, too: one with a marker and without a lock is not needed any
+more.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from orchestrator.machine.atomic import sealed, unsealed
 try:
     import fcntl
 except ImportError:  # pragma: no cover
-    # Not a POSIX system: nobody is kept out there, and nothing is removed.
+    # Not a POSIX system: no process is kept out there, and nothing is removed.
     fcntl = None  # type: ignore[assignment]
 
 #: How the name of a process's temporary folder begins, and the file that proves it to be one.
@@ -70,7 +71,7 @@ def _lock(descriptor: int, wait: bool = False) -> bool:
 
 
 def process_folder() -> Path:
-    """The folder for what nobody needs after this process; it goes when the process ends."""
+    """The folder for what is not needed after this process; it goes when the process ends."""
     return Path(_process_folder().name)
 
 

@@ -10,7 +10,7 @@ The loop, in :func:`.simulation.simulate`::
             gather the inputs of its components
             step each of them, then read their outputs
         tell the observers the row
-        stop if an FMU has failed, or somebody wants it
+        stop if an FMU has failed, or a signal says so
 
 Nothing here knows which components there are.
 """

@@ -23,7 +23,7 @@ Order: TypeAlias = str | Sequence[str]
 #: inputs that change linearly from one communication point to the next.
 COUPLINGS = SOLVE, DELAY, LINEAR = "solve", "delay", "linear"
 
-#: A rest shorter than this share of the run, and than that of a step, is a rounding error.
+#: A rest shorter than this share of the run, and of a step, is a rounding error.
 ROUNDING, _MOST_OF_A_STEP = 1e-9, 1e-3
 
 #: More steps than this are taken for a mistake.
@@ -128,7 +128,7 @@ class Experiment:
 
     @property
     def _in_steps(self) -> float:
-        """The run in steps; a whole number where it is one but for rounding."""
+        """The run in steps; a whole number where it is one apart from rounding."""
         # However small its share of a step, a run is not empty.
         return _rounded(max(self._length / self.step, ulp(0.0)))
 
@@ -172,7 +172,7 @@ class Experiment:
 
 
 def _rounded(n: float) -> float:
-    """A number of steps; a whole number where it is one but for rounding."""
+    """A number of steps; a whole number where it is one apart from rounding."""
     nearest = round(n)
     return nearest if abs(n - nearest) <= min(ROUNDING * nearest, _MOST_OF_A_STEP) else n
 
@@ -211,7 +211,7 @@ def decimations(system: System, step: float) -> dict[str, int]:
 def with_common_step(system: System) -> System:
     """A system that names no communication step with the longest that all components' fit.
 
-    They are those that it names for them, or else the FMUs name; it names none if nobody does.
+    They are the ones that it names for them, or else the FMUs name; it names none if neither does.
 
     Raises:
         InputError: they have none in common.

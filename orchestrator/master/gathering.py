@@ -72,7 +72,7 @@ class Gathering:
 
 
 class Overrides:
-    """All that is gathered in a step, and what somebody does to it for some time."""
+    """All that is gathered in a step, and what is done to it for some time."""
 
     def __init__(
         self, row: Row, gatherings: Iterable[Gathering], connections: Sequence[Connection]

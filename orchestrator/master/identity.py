@@ -49,7 +49,7 @@ def identity(
         "the code": code_of(*(f"orchestrator.{room}" for room in ROOMS)),
         "the version of Python": python_version(),
         **{f"the version of {package}": version(package) for package in PACKAGES},
-        # Their order is that of the columns, and says where a ring is opened.
+        # Their order is the order of the columns, and says where a ring is opened.
         "the components": ", ".join(system.components),
         **{f"the FMU of {name}": part.digest for name, part in system.components.items()},
         # What follows from the units of the two ends is in the transformation.

@@ -41,7 +41,7 @@ class Steps(Protocol):
             Nothing, when Python may look: after as many steps as are due, at the latest.
 
         Raises:
-            ComponentFailed: by the step behind them.
+            ComponentFailed: by the step after them.
 
         """
 

@@ -94,7 +94,7 @@ def _check_linear(system: System) -> None:
 
 
 def stages(system: System, order: Order, solved: Sequence[Sequence[str]] = ()) -> list[list[str]]:
-    """Components in the order in which they are stepped; those of one stage are independent.
+    """Components in the order in which they are stepped; within one stage they are independent.
 
     Args:
         system: that is stepped.
@@ -183,7 +183,7 @@ def gathered(
         if start in ring_of and ring_of[start] == ring_of.get(end):
             continue
         source, target = stage_of[start], stage_of[end]
-        # What is no feedthrough is a state, and must be taken before anybody advances.
+        # What is no feedthrough is a state, and must be taken before any component advances.
         at_once = latest or (order != JACOBI and has_feedthrough(system, connection))
         late = at_once and source < target
         found[target if late else 0].append(connection)

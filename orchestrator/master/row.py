@@ -98,7 +98,7 @@ class Row:
         return [port for port, causality, _ in self._ports[component] if causality == "output"]
 
     def enter(self, values: Mapping[PortName, Value]) -> None:
-        """Take values of ports, but for those that are no finite numbers."""
+        """Take values of ports, except the ones that are no finite numbers."""
         for port, value in values.items():
             if port in self.columns and isfinite(number := self.number(value)):
                 self.values[self.columns[port]] = number
@@ -139,7 +139,7 @@ class Row:
         return passed_on
 
     def moving(self, before: np.ndarray) -> list[PortName]:
-        """The ports whose values are not what they were, but for rounding."""
+        """The ports whose values are not what they were, apart from rounding."""
         near = np.isclose(self.values, before, rtol=_ROUNDING, atol=_ROUNDING)
         return [port for port, column in self.columns.items() if not near[column]]
 

@@ -178,7 +178,7 @@ def schedule(
             Gathering.along(row, taken.pop(1)),
             [member(instances[name]) for name in names if decimation[name] == 1],
         )
-        # All inputs are gathered before anybody is stepped.
+        # All inputs are gathered before any component is stepped.
         found += [Stage(Gathering.along(row, some), [], Decimation(n)) for n, some in taken.items()]
         here = [ring_of[name] for name in names if name in ring_of]
         if here:

@@ -54,7 +54,7 @@ def simulate(
 
     Raises:
         InputError: an FMU or a parameter is not usable; nothing was stepped.
-        KeyboardInterrupt: somebody wants it to stop, and an FMU does not come to its first step.
+        KeyboardInterrupt: a signal has come to stop it, and an FMU does not come to its first step.
 
     """
     system, experiment = plan.system, plan.experiment
@@ -120,7 +120,7 @@ def completed(plan: Plan, observers: Sequence[Observer] = (), exchange: Exchange
 
     Raises:
         InputError: it cannot be run, or not to its end.
-        KeyboardInterrupt: somebody wants it to stop.
+        KeyboardInterrupt: a signal has come to stop it.
 
     """
     ending = simulate(plan, observers, exchange=exchange)

@@ -72,7 +72,7 @@ typedef struct {
 
 typedef struct {
     const stage *stages;
-    double *values; /* the row of all values, behind those that are shown more */
+    double *values; /* the row of all values: first the ones that are shown, then the hidden */
     size_t n_stages, n_shown;
     double start_time, step, stop_time;
     size_t full_steps, steps; /* if there is one more of all steps, it is shorter */
@@ -135,7 +135,7 @@ static int set(const move *inputs, void *component) {
     }
     for (i = 0; i < inputs->n; i++) {
         const double value = inputs->values[i];
-        /* What is none of FMI's Integers is named by whoever looks at the row. */
+        /* What is none of FMI's Integers is named where the row is looked at. */
         if (!(value >= INT_MIN && value <= INT_MAX && value == (int)value)) return FMI2_ERROR;
         inputs->integers[i] = (int)value;
     }

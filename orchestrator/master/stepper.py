@@ -41,7 +41,7 @@ _CATEGORY = "loop"
 #: Libraries that this process has loaded, by cache folders.
 _in_use: dict[Path, CDLL] = {}
 
-#: Longest time until Python looks whether somebody wants the run to stop [s].
+#: Longest time until Python checks whether the run is to stop [s].
 _GLANCE = 0.02
 
 

@@ -125,7 +125,7 @@ def write_report(
 def _draw(
     chapters: Sequence[Section], kept_runs: KeptRuns, folder: Path, crew: Workers
 ) -> tuple[dict[str, list[str]], dict[str, str]]:
-    """Draw all figures; give the notes on those of the sections, and the texts of the effects."""
+    """Draw all figures; give the notes on the sections' figures, and the texts of the effects."""
     figures = folder / _FIGURES
     figures.mkdir()
     tasks: dict[tuple[str, str], Callable[[], Any]] = {}

@@ -256,7 +256,7 @@ def make_studies(
 
     Raises:
         InputError: something about a study is not usable, or cannot be written.
-        KeyboardInterrupt: somebody wants it to stop; what is done is kept.
+        KeyboardInterrupt: a signal has come to stop it; what is done is kept.
 
     """
     studies = [read_study(name) for name in names]

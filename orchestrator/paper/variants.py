@@ -139,7 +139,7 @@ def _run_of(found: Sensitivity, variant: Variant, scenario: str) -> Point:
 def taken_of(engine: BatchEngine, block: Sequence[Point]) -> tuple[np.ndarray, np.ndarray]:
     """Numbers and ways of some runs, an axis for the runs first; a task for a worker.
 
-    Those of a run that has failed are not numbers, nor is the way of one that has not arrived.
+    Of a run that has failed they are not numbers, nor is the way of one that has not arrived.
     """
     tables = [engine.table(run) for run in block]
     approaches = [approach_of(table, errors(table)) or (np.nan, np.nan) for table in tables]

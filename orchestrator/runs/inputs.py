@@ -18,7 +18,7 @@ from orchestrator.system.values import type_of, typed
 #: How a continuous Real input goes from one row to the next; the first is the default.
 WAYS = ("linear", "hold")
 
-#: So many seconds are farther apart than two numbers can be, but for rounding [s].
+#: So many seconds are farther apart than two numbers can be, apart from rounding [s].
 _MOST = 1e308
 
 

@@ -31,7 +31,7 @@ PACKAGES = (*identity.PACKAGES, "matplotlib")
 
 
 class Stopwatch:
-    """When something has begun, and how long it has taken, even if somebody sets the time."""
+    """When something has begun, and how long it has taken, even if the clock is set meanwhile."""
 
     def __init__(self) -> None:
         """Begin now."""

@@ -14,7 +14,7 @@ from orchestrator.master.hooks.checkpoint import (
 )
 from orchestrator.runs.preparation import Prepared
 
-#: The folder of checkpoints, in that of the result.
+#: The folder of checkpoints, within the folder of the result.
 FOLDER = "checkpoint"
 
 
@@ -75,7 +75,7 @@ def checkpoints_of(
 def leave(
     kept: Sequence[Checkpoints], is_whole: bool, say: Callable[[str], None] = lambda _: None
 ) -> None:
-    """Remove checkpoints that nobody needs any more, or say where they are.
+    """Remove checkpoints that are not needed any more, or say where they are.
 
     Args:
         kept: of runs that belong together.
@@ -83,7 +83,7 @@ def leave(
         say: takes notes for the user.
 
     """
-    # Those of the first are in the folder that holds the others'.
+    # The folder with the first one's holds the others'.
     for checkpoints in reversed(kept):
         if is_whole:
             checkpoints.remove()

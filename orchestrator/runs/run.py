@@ -1,4 +1,4 @@
-"""One experiment and its files: the table as it is computed, then metrics, figures and record."""
+"""One run and its files: the table as it is computed, then metrics, figures and record."""
 
 from __future__ import annotations
 
@@ -40,12 +40,11 @@ from orchestrator.vehicle.certificates import CertificatesFile
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.signals import Loop, loops_of, suffixes
 
-#: The files of a run, but for its certificates and figures.
+#: The files of a run, except its certificates and figures.
 _NAMES = (*(f"result.{ending}" for ending in FORMATS), METRICS, RECORD)
 
 #: A file that keeps room for what is written last, so that a full disk does not cost the record.
 _SPARE, _SPARE_BYTES = ".spare", 65536
-
 
 #: Exit status of a process that a run has to end with.
 _FAILED = 1
@@ -107,7 +106,7 @@ def run_into(
     """Run a scenario, and those it is compared with, and write the files of all.
 
     Args:
-        folder: for the files of the first; those of the others go into folders below it.
+        folder: for the files of the first; the others go into folders below it.
         runs: the scenario, and those it is compared with.
         files: what to keep.
         command: for the record.
@@ -216,7 +215,7 @@ class _Running:
         self._folder, self._prepared = folder, prepared
         loops = loops_of(prepared.system)
         self._metrics = Metrics(loops)
-        # Without figures the cautions alone look at what was seen.
+        # Without figures only the cautions look at what was seen.
         seen = watched if files.no_figures else Loop.drawn
         self._seen = VisibleRows({name for loop in loops for name in seen(loop)})
         self._table = FORMATS[files.format](folder / f"result.{files.format}")

@@ -58,7 +58,7 @@ def read_events(
 def shared_events(
     tables: Sequence[Mapping[str, Any]], system: System
 ) -> tuple[Mapping[str, Any], ...]:
-    """Those events that can happen to another system as well."""
+    """The events that can happen to another system as well."""
 
     def can_happen(table: Mapping[str, Any]) -> bool:
         try:
@@ -120,7 +120,7 @@ def _condition(text: str, system: System) -> Condition:
 def _ports(
     system: System, text: str, causalities: Sequence[str], alone: bool = False
 ) -> list[PortName]:
-    """The port of a name, or those of a group.
+    """The port of a name, or the ports of a group.
 
     Args:
         system: that has them.
@@ -155,7 +155,7 @@ def _ports(
 
 
 def _routes(system: System, port: PortName) -> list[Connection | None]:
-    """The connections that a signal takes to those that it reaches; None: it is an input itself."""
+    """The connections along which a signal reaches inputs; None: it is an input itself."""
     if system.component(port.component).variable(port.port).causality == "input":
         return [None]
     found: list[Connection | None] = [c for c in system.connections if c.source == port]

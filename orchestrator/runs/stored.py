@@ -34,7 +34,7 @@ def read_result(path: Path, watched: Choice | None = None) -> Drawn:
     Args:
         path: a folder that a run has written, or a table in CSV or Parquet. Of a table without a
             record beside it, no parameters are known.
-        watched: which columns will be drawn; None: those of the paper's figures.
+        watched: which columns will be drawn; None: the ones in the paper's figures.
 
     Raises:
         InputError: there is no result, or it cannot be read.

@@ -107,7 +107,7 @@ class BatchEngine:
         return _job(self._systems[run.scenario], run).setting
 
     def table(self, run: Point) -> Table:
-        """A run with its rows, those of the columns :data:`.kernel.COLUMNS` that it has.
+        """A run with its rows, in those columns :data:`.kernel.COLUMNS` that it has.
 
         Raises:
             InputError: it has no start.
@@ -300,7 +300,7 @@ class _Noise(local):
         self._state, self._uniform = np.random.RandomState(bits), np.random.Generator(bits)
 
     def uniform(self, seed: int) -> np.random.Generator:
-        """Those of a seed."""
+        """The numbers of a seed."""
         self._state.seed([seed % 2**32])
         return self._uniform
 

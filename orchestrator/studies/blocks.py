@@ -21,9 +21,9 @@ from orchestrator.machine.workers import Workers
 from orchestrator.machine.workers import workers as workers_of
 from orchestrator.studies.engine import Engine, Outcome, Point
 
-#: How long a block shall take [s]: long beside the millisecond that a task costs, short for who
-#: waits for the last one, or loses it. One that takes so many times as long, because its runs take
-#: longer than those before them, comes back with what is done.
+#: How long a block shall take [s]: long beside the millisecond that a task costs, short for a user
+#: who waits for the last one, or loses it. One that takes so many times as long, because its runs
+#: take longer than the runs before them, comes back with what is done.
 _SECONDS, _OVERTIME = 1.5, 2.0
 
 #: A scheduler shall not have to deal with more blocks a second than this: on large clusters they
@@ -49,7 +49,7 @@ Answer = tuple[float, list[Outcome]]
 
 
 class Crew(Protocol):
-    """Who makes blocks of runs.
+    """The workers that make blocks of runs.
 
     Attributes:
         threads: how many runs are made at a time.
@@ -66,10 +66,13 @@ class Crew(Protocol):
         """Have a block made, or what of it takes no longer than a limit [s]."""
 
     def receive(self) -> tuple[list[Point], Answer | None]:
-        """Wait for a block that was sent, and what has come of it; None: nobody has survived it.
+        """Wait for a block that was sent, and what has come of it.
+
+        Returns:
+            The block, and None where every process that made it has died.
 
         Raises:
-            InputError: nobody is left to make the runs, or the engine cannot.
+            InputError: no worker is left to make the runs, or the engine cannot.
 
         """
         ...
@@ -148,7 +151,7 @@ class _Local:
 
 def _set_up(engine: Engine) -> None:
     _engine.append(engine)
-    # Nothing of it belongs on the terminal of who waits for the study.
+    # Nothing of it belongs on the terminal where the study was started.
     for stream in (1, 2):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
 
@@ -191,7 +194,7 @@ class Making:
                 lost.extend(block)
             else:
                 yield outcomes
-        # Alone, so that none is held to blame for another that ends the process of both.
+        # One by one, so that none is blamed for another that ends the process of both.
         for (run,), outcomes in self._made(([run] for run in lost), lambda: 1):
             yield outcomes or [Outcome(run.number, {}, FATAL)]
 
@@ -228,7 +231,7 @@ class Making:
                     break
                 self._crew.send(block, _OVERTIME * self._seconds)
                 under_way += 1
-            # Now, when there is work again for who has made them.
+            # Now, when there is work again for the workers that have made them.
             yield from done
             if not under_way:
                 return

@@ -108,7 +108,7 @@ def _failure_to_connect(address: str) -> Exception | None:
 
 
 def _forget(client: Client, name: str) -> None:
-    """Have a cluster forget what it was sent, if there is still somebody to tell."""
+    """Have a cluster forget what it was sent, if it can still be reached."""
     with suppress(Exception):
         client.unregister_worker_plugin(name)
 
@@ -137,7 +137,7 @@ class _Share(WorkerPlugin):  # type: ignore[misc]
 
 
 def _task(name: str, runs: bytes, limit: float) -> Answer:
-    """Make some runs, pickled so that nobody looks into them on their way."""
+    """Make some runs, pickled so that nothing on the way looks into them."""
     share: _Share = get_worker().plugins[name]
     return share.answer(pickle.loads(runs), limit)
 

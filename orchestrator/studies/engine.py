@@ -51,8 +51,8 @@ class Engine(Protocol):
     """Makes runs.
 
     It is pickled, and travels to workers with everything that it needs, FMUs included: they share
-    no file system with whoever sends it. What is unpacked or compiled on a worker is kept there for
-    the runs that follow.
+    no file system with the process that sends it. What is unpacked or compiled on a worker is kept
+    there for the runs that follow.
 
     Attributes:
         digest: of what the numbers depend on besides the identities of what is run.

@@ -44,7 +44,7 @@ class FmuEngine:
         """Make some runs, in their order.
 
         Raises:
-            KeyboardInterrupt: somebody wants it to stop.
+            KeyboardInterrupt: a signal has come to stop it.
 
         """
         for run in runs:

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 #: The table of all runs, the record beside it, and what there is until all runs are done.
 TABLE, RECORD, _DATABASE = "runs.parquet", "study.json", "unfinished.sqlite"
 
-#: Columns of the table before and behind what varies and the indices.
+#: Columns of the table before and after what varies and the indices.
 RUN, SCENARIO, FAILURE = "run", "scenario", "failure"
 
 #: Rows that are written at once.
@@ -166,7 +166,7 @@ class Store:
 
 
 def _make_database(path: Path, identity: str) -> None:
-    """Make an empty database that bears an identity, where nobody else looks for it."""
+    """Make an empty database that bears an identity, where no other process looks for it."""
     with closing(sqlite3.connect(path)) as database, database:
         # First of all, so that the identity is where :func:`_is_ours` looks.
         database.execute("CREATE TABLE study (identity TEXT)")

@@ -144,7 +144,7 @@ def read_study(name: str) -> Study:
 
 
 def is_study(path: str) -> bool:
-    """Whether a file is that of a study: a TOML file with a table or entry that no scenario has."""
+    """Whether a file holds a study: a TOML file with a table or entry that no scenario has."""
     if not path.endswith(".toml"):
         return False
     with suppress(InputError, ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""A study as a whole: its runs, who makes them, and what is left of them."""
+"""A study as a whole: its runs, what makes them, and what is left of them."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def swept(
 
     Raises:
         InputError: something about the study is not usable, or its files cannot be written.
-        KeyboardInterrupt: somebody wants it to stop.
+        KeyboardInterrupt: a signal has come to stop it.
 
     """
     check_installed(_NEEDED if means.scheduler is None else (*_NEEDED, "distributed"))
@@ -312,8 +312,8 @@ def _complete(
         unfinished: takes the runs.
         engine: makes them.
         space: all of them.
-        means: who makes them.
-        name: of the study, for a bar; None: without one.
+        means: how they are made.
+        name: of the study, for a bar; None: there is no bar.
 
     """
     runs = (space[number] for number in unfinished.missing(len(space)))

@@ -108,7 +108,7 @@ class Component:
 
     @cached_property
     def starts(self) -> dict[str, Value]:
-        """Start values that the description names, but for nonsense, of use to nobody."""
+        """Start values that the description names, except nonsense, which is of no use."""
         values: dict[str, Value] = {}
         for name in self.variables:
             with suppress(InputError):

@@ -135,7 +135,7 @@ def _misread(file: Path) -> Iterator[str]:
 
 
 def _elements(parent: ElementTree.Element) -> Iterator[ElementTree.Element]:
-    """All elements in another one, but for some."""
+    """All elements in another one, except some."""
     for element in parent:
         if element.tag not in _OTHERS:
             yield element

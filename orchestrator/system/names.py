@@ -75,7 +75,7 @@ def flattened(
 
 
 def file_name(name: str, taken: Collection[str] = ()) -> str:
-    """A name as that of a file or folder, which every system takes and no other name becomes.
+    """A name for a file or folder, which every system takes and no other name becomes.
 
     Args:
         name: of anything.

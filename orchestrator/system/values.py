@@ -70,7 +70,7 @@ def typed(name: str, variable: ModelVariable, value: object) -> Value:
 
 
 def real(text: str) -> float:
-    """A number as every program reads it: Python alone takes 1_000, and digits of any script."""
+    """A number as every program reads it: only Python takes 1_000, and digits of any script."""
     return float(_plain(text))
 
 
@@ -149,7 +149,7 @@ def literal(value: Value) -> str:
 
 
 def same(wanted: Value, held: Value) -> bool:
-    """Whether a value is the one that was set, but for rounding."""
+    """Whether a value is the one that was set, apart from rounding."""
     if isinstance(wanted, float) and isinstance(held, float):
         return isclose(wanted, held, rel_tol=_ROUNDING)
     return wanted == held
@@ -173,7 +173,7 @@ def is_integer(number: float) -> bool:
 
 
 def unit_of(variable: ModelVariable) -> str | None:
-    """The unit of a variable, its own or that of its type."""
+    """The unit of a variable, its own or its type's."""
     declared = variable.declaredType
     unit: str | None = variable.unit or (declared.unit if declared is not None else None)
     return unit

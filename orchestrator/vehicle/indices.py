@@ -41,7 +41,7 @@ class Index(NamedTuple):
     Attributes:
         name: in files; `name.member` in the columns of a study.
         label: in figures and tables.
-        units: of its members; of a single number, that of the member without a name.
+        units: of its members; a single number is a member without a name.
         meaning: what the reference page says.
         needs: what a run must have.
         reducer: takes rows in, for what it is a function of.

@@ -45,7 +45,7 @@ class _Group:
 
 @dataclass(frozen=True)
 class Loop:
-    """A vehicle and what controls it: names of components, and from them those of the signals."""
+    """A vehicle and what controls it: names of components, and from them the names of signals."""
 
     vehicle: str = "plant"
     controller: str = "controller"
@@ -70,7 +70,7 @@ class Loop:
     y_hat, dy_hat = _Group("controller", "y_hat", AXES), _Group("controller", "dy_hat", AXES)
     theta_hat = _Group("controller", "theta_hat", quantities.THETA)
     tau = _Group("controller", "tau", ACTUATORS)
-    #: The parameters of (3), and those of (2).
+    #: The parameters of (3), and of (2).
     lower_limits = _Group("vehicle", "tau_min", ACTUATORS)
     upper_limits = _Group("vehicle", "tau_max", ACTUATORS)
     vehicle_parameters = _Group("vehicle", "", (name.replace("_", ".") for name in Vehicle._fields))

@@ -377,8 +377,8 @@ def test_real_inputs_follow_a_table_as_their_variability_says(tmp_path, variabil
     rows = [(0.0, 0.0), (0.4, 1.0), (0.75, 3.0)]
     file = tmp_path / "inputs.csv"
     file.write_text("time,a.u\n" + "".join(f"{t},{u}\n" for t, u in rows))
-    system, course = read_inputs(Inputs(file), system_of(fmu), ())
-    table = run(system, hooks=[Playback(course)], **way)
+    system, input_table = read_inputs(Inputs(file), system_of(fmu), ())
+    table = run(system, hooks=[Playback(input_table)], **way)
     told = np.array(rows, dtype=[("time", float), ("u", float)])
     theirs = fmpy.simulate_fmu(
         str(fmu), stop_time=1.0, output_interval=0.1, input=told, output=["y"], validate=False

@@ -162,18 +162,18 @@ def test_steps_follow_from_what_is_stated_and_else_from_the_fmus(folder):
     fmus = {"a": relay(folder, step=0.02), "b": relay(folder, step=0.05), "c": relay(folder)}
     system = system_of(fmus, stop_time=1.0)
 
-    def paces_of(system: System, **stated: object) -> tuple[float, dict[str, int]]:
+    def decimations_of(system: System, **stated: object) -> tuple[float, dict[str, int]]:
         prepared = prepare(Scenario("s"), system, Request(**stated))
         step = prepared.experiment.step
         return step, decimations(prepared.system, step)
 
-    assert paces_of(system) == (0.01, {"a": 2, "b": 5, "c": 1})
-    assert paces_of(system, steps={"b": 0.1}) == (0.02, {"a": 1, "b": 5, "c": 1})
-    assert paces_of(system, step=0.05) == (0.05, {"a": 1, "b": 1, "c": 1})
+    assert decimations_of(system) == (0.01, {"a": 2, "b": 5, "c": 1})
+    assert decimations_of(system, steps={"b": 0.1}) == (0.02, {"a": 1, "b": 5, "c": 1})
+    assert decimations_of(system, step=0.05) == (0.05, {"a": 1, "b": 1, "c": 1})
     annotated = replace(system, step=0.05, steps={"c": 0.15})
-    assert paces_of(annotated) == (0.05, {"a": 1, "b": 1, "c": 3})
-    assert paces_of(annotated, steps={"c": 0.1}) == (0.05, {"a": 1, "b": 1, "c": 2})
-    assert paces_of(system_of({"a": relay(folder)}, stop_time=1.0)) == (0.02, {"a": 1})
+    assert decimations_of(annotated) == (0.05, {"a": 1, "b": 1, "c": 3})
+    assert decimations_of(annotated, steps={"c": 0.1}) == (0.05, {"a": 1, "b": 1, "c": 2})
+    assert decimations_of(system_of({"a": relay(folder)}, stop_time=1.0)) == (0.02, {"a": 1})
 
 
 @pytest.mark.parametrize(

@@ -20,5 +20,5 @@ OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/
 #: The annotation of ours that names the inputs that are open on purpose.
 LEFT_OPEN = "LeftOpen"
 
-#: Those of the standard's own elements.
+#: Namespaces of the standard's own elements.
 NAMESPACES = (SSD, SSC, SSV, SSM, SSB)

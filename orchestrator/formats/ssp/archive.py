@@ -119,7 +119,7 @@ class Archive:
         Args:
             source: its address, a relative URI.
             needer: what needs it, for the message.
-            base: the folder to which the address is relative; None: that of the description.
+            base: the folder to which the address is relative; None: the description's folder.
 
         """
         base = self.folder if base is None else base

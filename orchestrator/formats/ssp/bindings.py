@@ -30,8 +30,8 @@ class Given:
 
     Attributes:
         text: the value.
-        unit: of the value; None: that of the node.
-        items: values of its enumeration; empty: those of the variable count.
+        unit: of the value; None: the node's.
+        items: values of its enumeration; empty: the variable's count.
         entry: of the mapping that it came through.
         converts: whether its unit is converted.
 

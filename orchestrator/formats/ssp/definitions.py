@@ -24,7 +24,7 @@ class Definitions:
     enumerations: Mapping[str, Items] = field(default_factory=dict)
 
     def and_those_of(self, inner: Definitions) -> Definitions:
-        """These, and those of another file, which win."""
+        """These definitions and another file's, which win."""
         return Definitions(
             {**self.units, **inner.units}, {**self.enumerations, **inner.enumerations}
         )
@@ -35,7 +35,7 @@ class Definitions:
         return self.units.get(name, Unit(name)) if name else None
 
     def items(self, element: Element) -> Items:
-        """Those of the enumeration that a type or a value names; empty where there is none."""
+        """The items of the enumeration that a type or a value names; empty where there is none."""
         return self.enumerations.get(element.get("name", ""), {})
 
 

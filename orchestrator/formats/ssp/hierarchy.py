@@ -12,7 +12,7 @@ from orchestrator.system.component import Component
 from orchestrator.system.units import Unit, Units, unit_of_port
 from orchestrator.system.values import type_of
 
-#: The names of a system and of those around it, without that of the outermost.
+#: The names of a system and of the systems around it, except the outermost.
 Way: TypeAlias = tuple[str, ...]
 
 #: Which way a value goes, by the kind of an element's connector, seen from the system around it.
@@ -40,7 +40,7 @@ class Node:
 
 @dataclass(frozen=True)
 class Connector:
-    """What a system says about one of its connectors, or of those of an element.
+    """What a system says about one of its connectors, or an element's.
 
     Attributes:
         causality: of the connector; None: it does not say.

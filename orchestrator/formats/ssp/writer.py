@@ -80,7 +80,7 @@ def parameter_set_xml(system: System, component: Component) -> bytes:
 
 
 def _literal(component: Component, name: str, value: Value) -> str:
-    """A value as an SSV has it, which knows those of an enumeration by name."""
+    """A value as an SSV has it, where values of an enumeration have names."""
     declared = component.variable(name).declaredType
     items = () if declared is None else declared.items
     return next((str(item.name) for item in items if int(item.value) == value), literal(value))

@@ -211,7 +211,7 @@ def library_of(component: Component, folder: Path) -> Iterator[Library]:
     """The library of an unpacked FMU, for one more instance of it.
 
     Many libraries hold something of the instances that they have had: each is unloaded with its
-    last one, but for those of which it is known that they do not.
+    last one, except the ones that are known not to.
 
     Raises:
         InputError: it cannot be loaded.

@@ -1,4 +1,4 @@
-"""Messages between this process and that of an FMU.
+"""Messages between this process and the process of an FMU.
 
 A message is a frame of numbers, whose size both sides know, and a note, which is JSON, with bytes
 in base64; the first number of the frame is the note's length. In a step there is nothing to note,

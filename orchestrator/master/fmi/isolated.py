@@ -61,7 +61,7 @@ def isolation_of(isolate: bool, step_timeout: float | None) -> Isolation | None:
     """What a user asks for.
 
     Raises:
-        InputError: a timeout without isolation: nobody could end a call in this process.
+        InputError: a timeout without isolation: a call in this process cannot be ended.
 
     """
     if isolate:

@@ -73,7 +73,7 @@ def placed(
         if apart:
             how = isolation or Isolation()
             for component in apart.values():
-                # Here there is time for it, and somebody to tell.
+                # Here there is time for it, and a caller to tell.
                 make_binary(component, component.folder)
             instances |= stack.enter_context(isolated(apart, log, how, interrupts))
         yield {name: instances[name] for name in components}

@@ -1,7 +1,7 @@
-"""The process that keeps those of isolated FMUs: it starts them and leaves none behind.
+"""The process that starts the processes of isolated FMUs, and leaves none behind.
 
 It runs nothing foreign itself, so that it can be relied on where they crash, hang, or write
-without end; and it outlives whoever has started it for as long as that takes.
+without end; and it outlives the process that has started it for as long as that takes.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ _PR_SET_PDEATHSIG = 1
 
 
 def keep(order: dict[str, Any]) -> None:
-    """Run each component in a process, until all have ended or nobody wants them any more.
+    """Run each component in a process, until all have ended or their run has.
 
     Reads :data:`END` from the standard input, and writes a line with the number of a component
     and its exit status to the standard output when its process has ended.
 
     Args:
         order: `components`, each with its name, FMU, digest, folder and the descriptor of a socket,
-            and `temporary`, folders that nobody else removes if the parent is killed.
+            and `temporary`, folders that no other process removes if the parent is killed.
 
     """
     parent = os.getppid()
@@ -180,7 +180,7 @@ def _kill_group(pid: int) -> None:
 
 
 def _show(text: bytes) -> None:
-    """Write to the standard error, unless nobody takes it."""
+    """Write to the standard error, unless it is closed."""
     with suppress(OSError):
         for first in range(0, len(text), _PIECE):
             _, ready, _ = select.select([], [2], [], 0)

@@ -48,7 +48,7 @@ def put_back() -> None:
 
 @contextmanager
 def default_mode() -> Iterator[None]:
-    """Compute in the default mode, and leave behind the one that was there."""
+    """Compute in the default mode, and restore the one that was there."""
     before = ctypes.create_string_buffer(_SIZE)
     _get(before)
     _take_default()

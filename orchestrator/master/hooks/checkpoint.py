@@ -7,7 +7,7 @@ killed at any time: what it leaves is its last checkpoint. A random identity in 
 them from files of the user's.
 
 Observers have no state there. A run that is resumed tells them all rows again, from the first on,
-so whoever can observe a run can observe one that was resumed.
+so any observer of a run can observe one that was resumed.
 """
 
 from __future__ import annotations
@@ -169,7 +169,7 @@ class Checkpoints:
         self._row_log = RowLog(rows, self._identity, len(self._columns), self._known, digest)
 
     def take(self, rows: np.ndarray) -> None:
-        """Write some rows, but for those that are told again."""
+        """Write some rows, except the ones that are told again."""
         again = min(self._known, len(rows))
         self._known -= again
         new = rows[again:]

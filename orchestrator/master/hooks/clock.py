@@ -12,7 +12,7 @@ from orchestrator.master.hooks.hook import NEVER, Run
 #: The clock is looked at after as many steps as take so long by it [s].
 _GRAIN = 1e-3
 
-#: How often a wait looks about: whether somebody wants the run to stop, or rows are due [s].
+#: How often a wait checks whether the run is to stop, or rows are due [s].
 _GLANCE = 0.02
 
 #: Latenesses are counted in classes that are so much longer one than the other, from the first on

@@ -55,7 +55,7 @@ class Layer(NamedTuple):
     """What an event does at one place.
 
     Attributes:
-        event: its number; that of what was there before any is :data:`_GROUND`.
+        event: its number; what was there before any has :data:`_GROUND`.
         effect: a key of :data:`_EFFECTS`.
         value: that goes with it.
 
@@ -265,7 +265,7 @@ class Event:
         label: its name in figures.
         at: when [s]; None: at a condition.
         when: the condition; it must have been false before.
-        repeat: whether it happens each time that the condition becomes true, or the first alone.
+        repeat: whether it happens each time that the condition becomes true, or only the first.
         lasts: for how long [s]; None: for good.
 
     """

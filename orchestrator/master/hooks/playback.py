@@ -60,17 +60,17 @@ class InputTable:
 class Playback:
     """A hook that supplies inputs with what they have at the beginning of each step.
 
-    Before the first time they have its values, after the last those of the last.
+    Before the first time of the table they have its first values, after the last its last.
     """
 
     def __init__(self, input_table: InputTable) -> None:
-        """Follow a course."""
-        self._course = input_table
+        """Take the table that is followed."""
+        self._input_table = input_table
         self._steps = np.empty(0, dtype=int)
 
     def act(self, run: Run) -> int:
         """Supply the values of now."""
-        input_table = self._course
+        input_table = self._input_table
         if not len(self._steps):
             self._steps = np.array([run.experiment.reaching(time) for time in input_table.times])
         row = int(np.searchsorted(self._steps, run.made, side="right")) - 1

@@ -27,7 +27,7 @@ _TITLE, _BEGIN = b"auv-fmu rows ", 64
 
 
 def begins(path: Path, identity: str) -> bool:
-    """Whether a file of rows is that of an identity."""
+    """Whether a file of rows bears an identity."""
     if path.is_symlink() or not path.is_file():
         return False
     with path.open("rb") as file:

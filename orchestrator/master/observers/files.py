@@ -82,7 +82,7 @@ class _Output(RawIOBase):
         return os.open(self._path, os.O_WRONLY | getattr(os, "O_BINARY", 0) | flags, 0o666)
 
     def _is_open(self) -> bool:
-        """Whether the descriptor is that of the file, and not closed or of another one by now."""
+        """Whether the descriptor is still the file's, not closed nor taken by another one."""
         with suppress(OSError):
             return os.path.samestat(os.fstat(self._descriptor), self._status)
         return False
@@ -146,7 +146,7 @@ class CsvFile:
 
 
 class ParquetFile:
-    """An observer that writes Apache Parquet, all columns as doubles but for those of texts.
+    """An observer that writes Apache Parquet, all columns as doubles except columns of texts.
 
     Without what is written last, nothing of such a file can be read: there is always room for that,
     and for the rows that wait.

@@ -29,7 +29,7 @@ class Header:
     """What is known of a run when its first row has been computed.
 
     Attributes:
-        columns: `component.port` of every value in a row, behind the time.
+        columns: `component.port` of every value in a row, after the time.
         experiment: that is run.
         parameters: of all components, as the FMUs reported them after initialisation.
         loop: which one makes the steps, `python` or `compiled`: the rows are the same.

@@ -83,7 +83,7 @@ class Table:
         return column == "time" or column in self._index
 
     def __getitem__(self, column: str) -> np.ndarray:
-        """The values of one column; those of a String are texts.
+        """The values of one column; a String has texts.
 
         Raises:
             KeyError: there is no such column; the text has a suggestion.
@@ -110,7 +110,7 @@ class Table:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """`component.port` of every column behind the time."""
+        """`component.port` of every column after the time."""
         return self.header.columns
 
     @property
@@ -128,7 +128,7 @@ class Table:
         return np.column_stack([self[column] for column in columns])
 
     def missing(self, columns: Iterable[str], parameters: Iterable[str] = ()) -> list[str]:
-        """Those of some columns and parameters, `component.name`, that are not there."""
+        """The columns and parameters, `component.name`, that are wanted and not there."""
         known = {*map(str, self.parameters)}
         return [column for column in columns if column not in self] + [
             name for name in parameters if name not in known

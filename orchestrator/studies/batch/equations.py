@@ -1,8 +1,8 @@
-"""Equations as numba compiles them: the same text, but for what refusals say.
+"""Equations as numba compiles them: the same text, except what refusals say.
 
 Numba makes no texts, so what compiled equations raise has none. The rest is Python's: each
-operation is rounded by itself, nothing is contracted or reordered, and sine and the like are those
-of the same library.
+operation is rounded by itself, nothing is contracted or reordered, and sine and the like come from
+the same library.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from orchestrator.studies.batch.numbers import overload_all
 #: Where a number is not finite, Python raises in some places; here it is found afterwards.
 OPTIONS: Any = {"nogil": True, "error_model": "numpy"}
 
-#: A call costs as much as what most of them compute. Compiled ones alone call them: what Python
+#: A call costs as much as what most of them compute. Only compiled ones call them: what Python
 #: and C would call them by takes half of the time to compile.
 _WITHIN: Any = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
@@ -103,7 +103,7 @@ class Equations:
         return value
 
 
-#: Those of this process.
+#: The equations of this process.
 EQUATIONS = Equations()
 
 

@@ -23,7 +23,7 @@ from orchestrator.studies.batch.accumulator import RowSignals, StepSignals, take
 from orchestrator.studies.batch.numbers import flat, nought, square
 from orchestrator.vehicle.signals import AXES, DIRECTIONS, STANDARD
 
-#: The controller's part of the loop: whoever compiles this module for another one puts it here.
+#: The controller's part of the loop; :mod:`.kernels` puts another one here before it compiles.
 law: Law = LAWS[Gains]
 
 

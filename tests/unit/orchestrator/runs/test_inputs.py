@@ -35,11 +35,11 @@ def test_a_run_begins_with_what_the_table_says_of_its_start(tmp_path):
 def test_a_straight_line_may_be_steeper_than_any_number(tmp_path):
     """Its ends are finite, and so is all that lies between."""
     text = "time,plant.tau.u,plant.tau.q\n-1,-1.5e308,2.0\n1,1.5e308,4.0\n"
-    system, course = read(tmp_path, text)
+    system, input_table = read(tmp_path, text)
     assert system.parameters[U] == 0.0
     for time, expected in ((-1.0, [-1.5e308, 2.0]), (0.5, [0.75e308, 3.5]), (1.0, [1.5e308, 4.0])):
         row = 1 if time == 1.0 else 0
-        np.testing.assert_allclose(course.at(time, row), expected, rtol=1e-12)
+        np.testing.assert_allclose(input_table.at(time, row), expected, rtol=1e-12)
 
 
 def test_other_tables_have_other_digests(tmp_path):
