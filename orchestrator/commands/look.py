@@ -55,7 +55,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
 def add_view(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu view`."""
     parser.add_argument("result", type=Path, metavar="RESULT", help="folder or table of a run")
-    _add_file(parser, "a .html; default: parser.html beside the table")
+    _add_file(parser, f"a .html; default: {VIEW} beside the table")
     parser.set_defaults(action=_view)
 
 
