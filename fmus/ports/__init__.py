@@ -3,15 +3,14 @@
 ======================== =================================================================
 module                   what it states
 ======================== =================================================================
-:mod:`.units`            SI units, as modelDescription.xml declares them
 :mod:`.quantities`       what passes through groups of ports: members and their units
 :mod:`.port`             one port: its declaration and what values it takes
 :mod:`.groups`           flat values of ports from groups, and groups from flat values
 :mod:`.behaviour`        what a component's behaviour may say: the hooks of both kinds
-:mod:`.vehicle`          parameters of (2)
+:mod:`.vehicle`          parameters of (2) and (3)
 :mod:`.controllers`      what the controllers have in common
 :mod:`.planners`         what the planners have in common
-:mod:`.description`      what modelDescription.xml says in every version of FMI
+:mod:`.description`      what modelDescription.xml says in every version of FMI, SI units
 :mod:`.description_fmi2` modelDescription.xml of FMI 2.0
 :mod:`.description_fmi3` modelDescription.xml and buildDescription.xml of FMI 3.0
 :mod:`.terminals`        terminalsAndIcons.xml of FMI 3.0

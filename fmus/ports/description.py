@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from auv_fmu import __version__
 from auv_fmu.euler import STEP
 from fmus.ports.port import Port, Value
-from fmus.ports.units import UNITS
 
 #: About every component, by the names of the attributes.
 ABOUT = {"author": "auv-fmu", "license": "MIT", "version": __version__}
@@ -30,9 +29,37 @@ CAPABILITIES = {
 #: Statuses that messages are logged with and that have a category.
 _LOGGED = ("Warning", "Discard", "Error", "Fatal")
 
-
 #: How a variable gets its value at the start time; the standard forbids to say so of others.
 _INITIAL = {"output": "calculated", "parameter": "exact"}
+
+
+class Unit(NamedTuple):
+    """A unit, the name of the type that variables of this unit have, and its base units."""
+
+    type_name: str
+    exponents: Mapping[str, int]
+
+
+#: SI units of the ports.
+UNITS: dict[str, Unit] = {
+    "1": Unit("Dimensionless", {}),
+    "1/s": Unit("Rate", {"s": -1}),
+    "s": Unit("Time", {"s": 1}),
+    "m": Unit("Length", {"m": 1}),
+    "m/s": Unit("Velocity", {"m": 1, "s": -1}),
+    "m/s2": Unit("Acceleration", {"m": 1, "s": -2}),
+    "rad": Unit("Angle", {"rad": 1}),
+    "rad/s": Unit("AngularVelocity", {"rad": 1, "s": -1}),
+    "N": Unit("Force", {"kg": 1, "m": 1, "s": -2}),
+    "N.m": Unit("Torque", {"kg": 1, "m": 2, "s": -2}),
+    "W": Unit("Power", {"kg": 1, "m": 2, "s": -3}),
+    "kg": Unit("Mass", {"kg": 1}),
+    "kg/s": Unit("LinearDamping", {"kg": 1, "s": -1}),
+    "N/m": Unit("Stiffness", {"kg": 1, "s": -2}),
+    "kg/m": Unit("QuadraticDamping", {"kg": 1, "m": -1}),
+    "kg.m2": Unit("MomentOfInertia", {"kg": 1, "m": 2}),
+    "kg.m2/s": Unit("AngularDamping", {"kg": 1, "m": 2, "s": -1}),
+}
 
 
 class Dependency(NamedTuple):

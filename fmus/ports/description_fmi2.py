@@ -13,6 +13,7 @@ from fmus.ports.description import (
     ABOUT,
     CAPABILITIES,
     GENERATION_TOOL,
+    UNITS,
     bounds,
     default_experiment,
     dependencies,
@@ -24,7 +25,6 @@ from fmus.ports.description import (
     variable_attributes,
 )
 from fmus.ports.port import FAULT, Port
-from fmus.ports.units import UNITS
 
 _CAPABILITIES = {
     **CAPABILITIES,

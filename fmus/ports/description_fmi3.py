@@ -9,6 +9,7 @@ from fmus.ports.description import (
     ABOUT,
     CAPABILITIES,
     GENERATION_TOOL,
+    UNITS,
     bounds,
     default_experiment,
     dependencies,
@@ -20,7 +21,6 @@ from fmus.ports.description import (
     variable_attributes,
 )
 from fmus.ports.port import FAULT, TIME, Port
-from fmus.ports.units import UNITS
 
 #: What FMI 3.0 calls the types of variables.
 TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String"}
