@@ -18,6 +18,7 @@ from orchestrator.machine.archives import runs_python
 from orchestrator.machine.ledger import RECORD
 from orchestrator.master import identity
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.runs.preparation import Prepared
 from orchestrator.system.names import port_name
@@ -25,6 +26,10 @@ from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
 
 #: The indices of a run.
 METRICS = "metrics.json"
+
+#: The table of a run, in one format or the other, and all files that every run writes.
+TABLES = tuple(f"result.{ending}" for ending in FORMATS)
+FILES = (*TABLES, METRICS, RECORD)
 
 #: Packages whose versions a result depends on.
 PACKAGES = (*identity.PACKAGES, "matplotlib")

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from fmus.kinds import PYTHON
 from orchestrator.figures.plot import plot
 from orchestrator.machine.errors import InputError, did_you_mean, reason
-from orchestrator.machine.ledger import RECORD
 from orchestrator.master.experiment import Order, written_order
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.loop import LOOPS
@@ -25,7 +24,7 @@ from orchestrator.master.observers.table import Table
 from orchestrator.runs.folder import locked, replaced
 from orchestrator.runs.loading import check_brings_its_own, loaded, warned
 from orchestrator.runs.preparation import Prepared, prepare
-from orchestrator.runs.record import METRICS, Stopwatch, write_metrics, write_record
+from orchestrator.runs.record import FILES, Stopwatch, write_metrics, write_record
 from orchestrator.runs.request import Request
 from orchestrator.runs.resume import checkpoints_of, leave
 from orchestrator.runs.scenario import Scenario
@@ -170,8 +169,7 @@ class Result(Table):
         if format not in FORMATS:
             raise InputError(f"format {format!r}: use one of {', '.join(FORMATS)}")
         folder = Path(folder)
-        names = (*(f"result.{ending}" for ending in FORMATS), METRICS, RECORD)
-        with replaced(folder, names, force=force) as unfinished:
+        with replaced(folder, FILES, force=force) as unfinished:
             table = FORMATS[format](unfinished / f"result.{format}")
             table.begin(self.header)
             table.take(self.rows)

@@ -17,7 +17,7 @@ from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
-from orchestrator.machine.ledger import LEDGER, RECORD, Ledger
+from orchestrator.machine.ledger import LEDGER, Ledger
 from orchestrator.machine.locks import process_folder
 from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.hooks.checkpoint import Checkpoints
@@ -29,7 +29,7 @@ from orchestrator.master.observers.progress import Progress
 from orchestrator.master.observers.selection import Selection, check_interval, matches, matching
 from orchestrator.runs.folder import INCOMPLETE, inner, place_of, publish, replaced
 from orchestrator.runs.preparation import Prepared
-from orchestrator.runs.record import METRICS, Stopwatch, write_metrics, write_record
+from orchestrator.runs.record import FILES, Stopwatch, write_metrics, write_record
 from orchestrator.runs.request import Files
 from orchestrator.runs.resume import FOLDER, checkpoints_of, leave
 from orchestrator.runs.scenario import Scenario
@@ -39,9 +39,6 @@ from orchestrator.vehicle.cautions import cautions, cautions_after, cautions_bes
 from orchestrator.vehicle.certificates import CertificatesFile
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.signals import Loop, loops_of, suffixes
-
-#: The files of a run, except its certificates and figures.
-_NAMES = (*(f"result.{ending}" for ending in FORMATS), METRICS, RECORD)
 
 #: A file that keeps room for what is written last, so that a full disk does not cost the record.
 _SPARE, _SPARE_BYTES = ".spare", 65536
@@ -130,7 +127,7 @@ def run_into(
     loops = loops_of(runs[0].system)
     figures = figure_files(runs[0].scenario.figure, runs[0].scenario.stem, loops)
     folders = _folders(runs, figures)
-    names = [*figures, *(Path(below, name).as_posix() for below in folders for name in _NAMES)]
+    names = [*figures, *(Path(below, name).as_posix() for below in folders for name in FILES)]
     names += [
         Path(below, _certificates(vehicle)).as_posix()
         for prepared, below in zip(runs, folders, strict=True)
@@ -318,7 +315,7 @@ def _draw(
 
 def _folders(runs: Sequence[Prepared], figures: Sequence[str]) -> list[str]:
     """The folder of each run, from the first one's on."""
-    taken = [*_NAMES, _certificates(""), *figures, FOLDER, INCOMPLETE, LEDGER]
+    taken = [*FILES, _certificates(""), *figures, FOLDER, INCOMPLETE, LEDGER]
     return ["", *(file_name(prepared.scenario.name, taken) for prepared in runs[1:])]
 
 

@@ -17,9 +17,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.machine.ledger import RECORD, is_changed, located
 from orchestrator.machine.user_files import explained, text_of
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Header
-from orchestrator.runs.record import read_ending, read_header, read_loops
+from orchestrator.runs.record import TABLES, read_ending, read_header, read_loops
 
 #: What a file is not that cannot be read.
 _WHAT = "not the record of a run"
@@ -69,7 +68,7 @@ def table_in(path: Path) -> Path:
 
     """
     with explained(path, "not the name of a result"):
-        for file in (path, *(path / f"result.{ending}" for ending in FORMATS)):
+        for file in (path, *(path / name for name in TABLES)):
             if located(file).is_file():
                 return file
     raise InputError(f"{path}: holds no result.csv or result.parquet")
