@@ -15,6 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from auv_fmu import plant
+from auv_fmu.closed_loop import Instant, Setting
+from auv_fmu.closed_loop import closed_loop as straight_line
+from auv_fmu.output_feedback import ControllerState
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.observers.table import Table
@@ -32,7 +36,6 @@ from orchestrator.studies.study import read_study, ready_studies
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 from support.runs import prepared
-from support.straight import straight_rows
 
 pytest.importorskip("numba", reason="needs numba: the extra `studies`")
 
@@ -67,6 +70,28 @@ def sampled(name: str) -> list[Point]:
 def bits(rows: np.ndarray) -> np.ndarray:
     """As integers: -0.0 is not 0.0."""
     return np.ascontiguousarray(rows).view(np.int64)
+
+
+def straight_rows(setting: Setting, steps: int, delayed: bool) -> np.ndarray:
+    """Time and values after every step: what a row of the FMUs' table holds."""
+    instants = list(straight_line(steps, setting, delayed))
+    start, _ = plant.begin(setting.plant, instants[0].tau, setting.plant.current)
+    acting = [start.tau, *(instant.vehicles.plant.tau for instant in instants[1:])]
+    pairs = zip([instants[0], *instants[:-1]], instants, acting, strict=True)
+    return np.array([_row(*pair) for pair in pairs])
+
+
+def _row(before: Instant, now: Instant, tau: tuple[float, ...]) -> list[float]:
+    seen, state = now.scene.plant, before.controller_state
+    values = [
+        now.t, *now.vehicles.plant.position, *seen.euler, *seen.nu, *now.scene.y, *seen.dy,
+    ]  # fmt: skip
+    for one in now.scene.reference:
+        values += one
+    if isinstance(state, ControllerState):
+        values += before.signals.dy_hat
+        state = state.theta_hat
+    return [*values, *state, *before.signals.tau, *before.command, *tau, *before.tau_w]
 
 
 def compare_with_straight_line(engine: BatchEngine, run: Point) -> None:
