@@ -179,11 +179,10 @@ def test_an_fmu_that_takes_steps_of_one_length_gets_no_other(tmp_path, way):
     assert table.failure is None
     assert table.time.tolist() == [0.0, 0.3, 0.6, 3 * 0.3]
     assert table.ending.messages == (
-        "a: takes steps of one length alone, so the run ends with the last whole step, at "
-        "t = 0.9 s",
+        "a: takes steps of one length only, so the run ends with the last whole step, at t = 0.9 s",
     )
     assert run(system, 0.9, 0.3, **way).ending.messages == ()
-    with pytest.raises(InputError, match="a: takes steps of one length alone, so the run"):
+    with pytest.raises(InputError, match="a: takes steps of one length only, so the run"):
         run(system, 0.2, 0.3, **way)
 
 
