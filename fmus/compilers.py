@@ -17,7 +17,8 @@ from typing import NamedTuple
 
 from fmus.kinds import TARGETS, Platform, this_machine
 
-#: C compilers, the first of which is taken that there is. The orchestrator has the same.
+#: C compilers: the first one that there is, is taken. :mod:`orchestrator.machine.compiler` has the
+#: same.
 COMPILERS = ("cc", "gcc", "clang")
 
 #: How sources are compiled. Contracted or reordered operations would change numbers.
@@ -25,8 +26,8 @@ FLAGS = (
     "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared", "-s",
 )  # fmt: skip
 
-#: Nothing here unwinds the stack, but for the C library of Windows, half of a library there, which
-#: is compiled with the same options: those for a small one.
+#: Nothing here unwinds the stack, except the C library of Windows, half of a library there, which
+#: is compiled with the same options: the ones for a small library.
 _NO_TABLES = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
 _SMALL = ("-Os",)
 

@@ -39,7 +39,7 @@ def ports_of(name: str) -> Sequence[Port]:
 
 
 def fingerprint(kind: str) -> str:
-    """Hash of everything installed that FMUs of a kind depend on, but for a C compiler."""
+    """Hash of everything installed that FMUs of a kind depend on, except a C compiler."""
     digest = hashlib.sha256()
     for package in ("auv_fmu", "fmus", *CONTAINED[kind]):
         root = package_folder(package)

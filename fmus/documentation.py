@@ -100,7 +100,7 @@ def _tables(ports: Sequence[Port], types: Mapping[str, str]) -> Iterator[str]:
 
 
 def _alike(ports: Sequence[Port]) -> Iterable[list[Port]]:
-    """Ports one by one, but those of a list together, as `waypoint[1].x` to `waypoint[9].x`."""
+    """Ports one by one, but the ports of a list together, as `waypoint[1].x` to `waypoint[9].x`."""
     rows: dict[str, list[Port]] = {}
     for port in ports:
         rows.setdefault(_PLACE.sub("[].", port.name), []).append(port)

@@ -69,7 +69,7 @@ def files() -> dict[Path, str]:
 
 
 def filled_in(page: Path, values: Mapping[str, str]) -> str:
-    """The text of a page with values in their places; those of several lines are paragraphs.
+    """The text of a page with values in their places; values of several lines are paragraphs.
 
     Raises:
         ValueError: the page has no place for a value, or a place for none.

@@ -29,5 +29,5 @@ def begin(parameters: Disturbance, inputs: Inputs, t: float) -> tuple[Nothing, O
 def advance(
     parameters: Disturbance, state: Nothing, inputs: Inputs, t: float
 ) -> tuple[Nothing, Outputs]:
-    """Outputs of a step: those of its beginning, held through it."""
+    """Outputs of a step: computed at its beginning, held through it."""
     return state, {"tau_w": disturbance(parameters, inputs.nu, t)}

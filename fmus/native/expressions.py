@@ -22,7 +22,7 @@ _COMPARE = {
     ast.GtE: (">=", _RELATION), ast.Eq: ("==", _EQUALITY), ast.NotEq: ("!=", _EQUALITY),
 }  # fmt: skip
 
-#: Functions that never raise, and those of arithmetic.h for the others.
+#: Functions that never raise, and arithmetic.h's for the others.
 _PLAIN = {
     math.atan: "atan", math.atan2: "atan2", math.copysign: "copysign", math.tanh: "tanh",
     abs: "fabs",

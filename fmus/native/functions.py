@@ -24,7 +24,7 @@ from fmus.ports.port import Refusal
 
 @cache
 def _comments(path: str) -> dict[int, str]:
-    """The comments of a file behind code, by line."""
+    """The comments of a file after code, by line."""
     text = Path(path).read_text(encoding="utf-8")
     tokens = tokenize.generate_tokens(io.StringIO(text).readline)
     return {
@@ -162,7 +162,7 @@ class _Translation:
                 yield self._stored(alike)
 
     def _name_of_all(self, target: ast.expr, value: ast.expr) -> str:
-        """A name for what is taken apart: that of the function it comes from."""
+        """A name for what is taken apart: the name of the function it comes from."""
         name = ast.unparse(value.func).rsplit(".")[-1] if isinstance(value, ast.Call) else "all"
         first = next(n.id for n in ast.walk(target) if isinstance(n, ast.Name) and n.id != "_")
         taken = name in self._in_c.local or name in self._names

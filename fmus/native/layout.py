@@ -35,15 +35,15 @@ def _lines(text: str, indent: str) -> list[str]:
     while text[start + 1] == "{" and _closing(text, start + 1) == end - 1:
         start, end = start + 1, end - 1
     *items, last = _split(text[start + 1 : end])
-    behind = [f"{last},", text[end:]] if text[start] == "{" else [f"{last}{text[end:]}"]
+    after = [f"{last},", text[end:]] if text[start] == "{" else [f"{last}{text[end:]}"]
     lines = [indent + text[: start + 1]]
-    for item in (*(f"{item}," for item in items), behind[0]):
+    for item in (*(f"{item}," for item in items), after[0]):
         lines += _lines(item, indent + INDENT)
-    return lines + [indent + closing for closing in behind[1:]]
+    return lines + [indent + closing for closing in after[1:]]
 
 
 def _wrapped(text: str, indent: str) -> list[str]:
-    """Lines that end behind commas and before operators."""
+    """Lines that end after commas and before operators."""
     wrapper = textwrap.TextWrapper(
         WIDTH,
         initial_indent=indent,

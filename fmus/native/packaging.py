@@ -73,7 +73,7 @@ def fmu_entries(
     Its GUID follows from its description and its sources, and is the same for all platforms.
 
     Args:
-        component: its name, and that of its libraries.
+        component: its name, and its libraries' name.
         package: that its folder is.
         fmi: version.
         platforms: that it has libraries for.

@@ -33,7 +33,7 @@ class Program:
     """All that a set of functions needs: structures, constants and functions in C.
 
     Attributes:
-        structures, constants, functions: their texts, each behind what it needs.
+        structures, constants, functions: their texts, each after what it needs.
 
     """
 
@@ -76,7 +76,7 @@ class Program:
         return shape
 
     def function(self, function: FunctionType) -> Function:
-        """A function in C, behind those that it calls."""
+        """A function in C, after the functions that it calls."""
         if function not in self.functions:
             if function in self._begun:
                 raise Untranslatable(f"{function.__name__} calls itself")
@@ -86,5 +86,5 @@ class Program:
 
 
 def c_name(module: str, name: str) -> str:
-    """The name of something in C: those of several modules stand side by side there."""
+    """The name of something in C, where names of several modules stand side by side."""
     return f"{module.rsplit('.', maxsplit=1)[-1]}_{name.lstrip('_')}"

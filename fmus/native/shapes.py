@@ -24,7 +24,7 @@ class Structure:
 
     Attributes:
         name: of the structure in C.
-        parts: how each element is written behind a name, and its shape.
+        parts: how each element is written after a name, and its shape.
         made: the NamedTuple or TypedDict; None: a plain tuple.
 
     """
@@ -92,7 +92,7 @@ def numbers(shape: Shape) -> int:
 
 
 def inner(shape: Shape) -> Iterator[Structure]:
-    """The structures that a structure needs, and itself behind them."""
+    """The structures that a structure needs, and itself after them."""
     if isinstance(shape, Structure):
         for _, part in shape.parts:
             yield from inner(part)

@@ -65,7 +65,7 @@ def translated(package: str) -> str:
 
 
 class _Glue:
-    """The functions `model_...`, in which the component finds those of a behaviour."""
+    """The functions `model_...`, in which the component finds a behaviour's functions."""
 
     def __init__(self, program: Program, behaviour: Behaviour) -> None:
         self._program, self._behaviour = program, behaviour

@@ -1,6 +1,6 @@
 """What a component's `behaviour.py` may say: the hooks that both kinds of FMU call.
 
-Each public function of a behaviour is one of the :class:`Hooks`. It takes those of the hook's
+Each public function of a behaviour is one of the :class:`Hooks`. It takes the hook's
 arguments that it needs, under their names and in any order; functions that only the behaviour
 itself calls begin with an underscore. All of it is in the language of equations (docs/language.md),
 because the C kind runs its translation.
@@ -123,7 +123,7 @@ class Hooks(Protocol):
 
         They are held against the outputs that are restored with it, which are given to tell what
         else some outputs depend on, such as noise. Without this hook, outputs do not follow from
-        the state alone: a controller's are those of the beginning of its last step.
+        the state only: a controller's belong to the beginning of its last step.
 
         Raises:
             Refusal: no run can have led to the state.

@@ -32,7 +32,7 @@ _CAPABILITIES = {**CAPABILITIES, "canGetAndSetFMUState": "true", "canSerializeFM
 #: The file of a component's sources that includes all others, and what it is written in.
 SOURCE, _LANGUAGE = "fmi3.c", "C99"
 
-#: Platforms where mathematics is in a library apart from that of C.
+#: Platforms where mathematics is in a library apart from the C library.
 _LIBM_APART = ("x86_64-linux", "aarch64-linux")
 
 

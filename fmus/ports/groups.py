@@ -42,7 +42,7 @@ def _sizes(fields: type) -> dict[str, int]:
 
 
 def _hold(fields: type, ports: Sequence[Port], groups: Mapping[str, str]) -> dict[str, slice]:
-    """The slices of the ports, if they are those of the fields."""
+    """The slices of the ports, if they are the fields'."""
     places = slices(ports)
     said = [(groups.get(name, name), size) for name, size in _sizes(fields).items()]
     declared = [(group, place.stop - place.start) for group, place in places.items()]
@@ -118,7 +118,7 @@ class ParameterSet(Generic[T]):
                 in the order that the ports shall have.
 
         Raises:
-            TypeError: the fields are not those of `made`, or not of their sizes.
+            TypeError: the fields are not `made`'s, or not of their sizes.
 
         """
         sizes = _sizes(made)  # type: ignore[arg-type]
@@ -136,7 +136,7 @@ class ParameterSet(Generic[T]):
         return tuple(port for field in self._fields.values() for port in _ports(field))
 
     def before(self, *later: Port) -> tuple[Port, ...]:
-        """The parameters but for some that have come later: these stand at the end of all ports.
+        """The parameters except some that have come later: these stand at the end of all ports.
 
         So the value references of the others are what they were.
         """

@@ -181,5 +181,5 @@ FAULT = Port(
     "True from the moment the component refused an input, a parameter or a step",
 )
 
-#: What all is a function of. A variable in FMI 3.0 alone.
+#: What all is a function of. A variable only in FMI 3.0.
 TIME = Port("time", "independent", "continuous", "Real", "Time", "s")

@@ -16,7 +16,7 @@ from fmus.ports.port import Port
 from fmus.ports.quantities import member_of
 
 #: All members of an input have to come from somewhere. Not all of an output's need to go there:
-#: a controller takes the angles of the posture alone. Each terminal's rule is its own.
+#: a controller takes only the angles of the posture. Each terminal's rule is its own.
 _MATCHING_RULE = {"input": "plug", "output": "bus"}
 
 #: Outputs for inputs of other names: friction is against the velocity through the water.

@@ -67,7 +67,7 @@ def fmu_entries(script: str, text: str, loader: str, own: Path | None = None) ->
         script: name of the FMU's script.
         text: of the script, which settles a slave (:mod:`fmus.python.loading`).
         loader: `native` or `plain`.
-        own: folder of modules that go into the FMU beside those of this package; None: none.
+        own: folder of modules that go into the FMU beside this package's; None: none.
 
     Raises:
         OSError: the loader cannot be compiled.

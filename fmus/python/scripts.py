@@ -19,7 +19,7 @@ from fmus.python.store import MISSING
 
 Slave = TypeVar("Slave", bound=type)
 
-#: What sealing has put behind the name of every module in the FMU; empty: this is not in one.
+#: What sealing has put after the name of every module in the FMU; empty: this is not in one.
 _SEAL = "".join(re.findall(r"_[0-9a-f]{12}$", __name__.partition(".")[0]))
 
 #: Packages that are in an FMU beside the user's script.

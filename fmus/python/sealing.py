@@ -17,7 +17,7 @@ _RESOURCES = "resources/"
 _SLAVE_MODULE = "resources/slavemodule.txt"
 _DESCRIPTION = "modelDescription.xml"
 
-#: Where the loader finds the GUID: a library knows the folder of resources alone.
+#: Where the loader finds the GUID: a library knows only the folder of resources.
 _GUID_FILE = "resources/guid.txt"
 _GUID = re.compile(rb'guid="[^"]*"')
 

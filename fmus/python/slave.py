@@ -11,7 +11,7 @@ that derives something of its state and may restart becomes
         self._latest, self._derived, outputs = advance(self.parameters, state, derived, inputs, h)
         return self._latest, outputs
 
-and that of a simpler one is shorter by what it lacks.
+and the method of a simpler one is shorter by what it lacks.
 """
 
 from __future__ import annotations

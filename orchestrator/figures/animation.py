@@ -251,7 +251,7 @@ class _Scene:
 
     def _show_body(self, camera: _Camera, row: int, length: float) -> None:
         R = np.array(rotation_from_euler(*self._euler[row].tolist())).T
-        # Of a body whose axes are turned as those of the earth are.
+        # Of a body whose axes are turned as the earth's are.
         R *= np.outer(self._turn, self._turn)
         points = self._y[row] + length * self._body.points @ R.T
         corners = points[self._body.triangles]

@@ -56,7 +56,7 @@ def draw(
 ) -> list[str]:
     """Draw the figures of a scenario, as PNG and SVG, as far as the runs have what they show.
 
-    Of several vehicles each has its own, beside that of its name in the runs it is compared with.
+    Of several vehicles each has its own, together with the vehicle of that name in the other runs.
 
     Args:
         kind: key of :data:`FIGURES`.

@@ -39,7 +39,7 @@ def draw_signal(axes: Axes, table: Table, signal: Signal, **line: Any) -> bool:
     # Below all lines, whichever is drawn first.
     axes.plot(time, values, color=line["color"], linewidth=0.5, alpha=0.35, zorder=1.5)
     if isinstance(table, VisibleRows) and table.means is not None:
-        # Extremes have another mean; means hold from the end of one division to that of the next.
+        # Extremes have another mean; means hold from the end of a division to the end of the next.
         ends, means = signal(table.means)
         time = np.repeat(np.append(table.time[0], ends), 2)[1:-1]
         values = np.repeat(means, 2)

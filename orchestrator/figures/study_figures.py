@@ -41,8 +41,8 @@ _BINS, _LOWER, _UPPER, _ABREAST = 30, 0.1, 0.9, 2
 #: the cells do, for a few that are far off shall dim no others.
 _CELLS, _FAR = 24, 0.01
 
-#: Colours that stay apart for colour-blind eyes and in print, that of a cell without runs, and
-#: those of correlations: blue falls, red grows.
+#: Colours that stay apart for colour-blind eyes and in print, the one of a cell without runs, and
+#: the scale of correlations: blue falls, red grows.
 _VALUES, _EMPTY, _CORRELATIONS = "cividis", "lightgrey", "RdBu_r"
 
 #: Influence: numbers are white upon colours as dark as from here on; smaller ones are not printed.

@@ -56,7 +56,7 @@ def _saturated(columns: Columns) -> np.ndarray:
     return saturated
 
 
-#: What is true or false of a run: of several, figures show the share of those of which it is true.
+#: What is true or false of a run: of several, figures show the share of runs of which it is true.
 VERDICTS: Mapping[str, tuple[str, Callable[[Columns], np.ndarray]]] = {
     "failed": ("share of failed runs", _failed),
     "lost": (f"share of runs not kept within {REACHED:g} m", _lost),

@@ -16,12 +16,12 @@ from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 
-#: What of an FMU surprises who runs it, by the flag of its description and what that is then.
+#: What surprises the user of an FMU, by the flag of its description and what that is then.
 _SURPRISES = {
     ("canBeInstantiatedOnlyOncePerProcess", True): "one instance a process: a further one gets a "
     "process of its own",
     ("needsExecutionTool", True): "needs the program that it was made with",
-    ("canHandleVariableCommunicationStepSize", False): "takes steps of one length alone: the stop "
+    ("canHandleVariableCommunicationStepSize", False): "takes steps of one length only: the stop "
     "time must be a multiple of the step",
     ("canRunAsynchronuously", True): "may compute a step while its host goes on",
     ("canGetAndSetFMUstate", False): "gives no state: a run of it cannot be resumed",
@@ -108,7 +108,7 @@ def _could_feed(source: Component, variable: ModelVariable) -> bool:
 def _flaws(fmu: Path) -> list[str]:
     """What the standard's schema and rules have against the description."""
     if not (unpacked(fmu).folder / "modelDescription.xml").is_file():
-        # Who reads the FMU says so.
+        # What reads the FMU says so.
         return []
     try:
         return [str(problem) for problem in validate_fmu(str(fmu))]
@@ -144,4 +144,4 @@ def _aliases(component: Component) -> Iterator[str]:
     for variable in (*component.having("input"), *component.having("parameter")):
         other = seen.setdefault((variable.type, variable.valueReference), variable.name)
         if other != variable.name:
-            yield f"{other} and {variable.name} are one: who sets one sets both"
+            yield f"{other} and {variable.name} are one: to set one sets both"

@@ -233,7 +233,7 @@ def check_place(folder: Path) -> None:
         InputError: it cannot; the text says what to do.
 
     """
-    # PythonFMU 0.7 does not decode the URI of its folder, but for spaces, and crashes its host. Our
+    # PythonFMU 0.7 does not decode the URI of its folder, except spaces, and crashes its host. Our
     # loader, which has PythonFMU's library beside it, does that for it.
     loader = any((folder / "binaries").glob("*/*_pythonfmu.*"))
     if (

@@ -100,7 +100,7 @@ class Findings:
     """
 
     def __init__(self, strict: bool = False) -> None:
-        """Begin with none; for who is strict, everything is a problem."""
+        """Begin with none; where it is strict, everything is a problem."""
         self._strict = strict
         self.problems: list[str] = []
         self.notes: list[str] = []

@@ -46,7 +46,7 @@ class _Part:
 
     Attributes:
         gather: what others of the ring, or it itself, feed it.
-        unknowns: its inputs that they feed, as places among those of the ring.
+        unknowns: its inputs that they feed, as places among the ring's inputs.
         feeds: the inputs that it feeds with Reals, as places among those of the ring.
         block: of these and the unknowns in a matrix.
 

@@ -52,7 +52,7 @@ class Choice(NamedTuple):
         name: what it is.
         options: ways to fill it in.
         ours: which of them the scenarios have.
-        of_proposed: whether it is the proposed controller's alone.
+        of_proposed: whether only the proposed controller has it.
 
     """
 

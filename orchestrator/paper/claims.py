@@ -251,7 +251,7 @@ def final_error_proposed(five: KeptRun) -> Finding:
 
 @claim("4.2: the same with eps_t = 1 instead of 10", f"{numbers(FINAL_ERROR_PROPOSED)} m", SHARP)
 def final_error_sharp(sharp: KeptRun) -> Finding:
-    """The paper may mean 10 for the PD controller alone."""
+    """The paper may mean 10 for the PD controller only."""
     return final_error_proposed(sharp)
 
 

@@ -33,7 +33,7 @@ class KeptRun:
     """What is kept of a run.
 
     Attributes:
-        metrics: as in metrics.json; `failure` alone for a run that could not be made.
+        metrics: as in metrics.json; only `failure` for a run that could not be made.
         table: the rows that can be seen, which are all rows of a run of the paper.
         loops: of its vehicles.
 

@@ -2,8 +2,8 @@
 
 Files are written into a hidden folder within it; the folder's ledger then has them take the places
 of those of an earlier run. What an earlier run has written and this one does not is removed; files
-of others are left alone. A run that came to no end does not take the place of one that did: it goes
-into a folder beside it.
+of others stay as they are. A run that came to no end does not take the place of one that did: it
+goes into a folder beside it.
 """
 
 from __future__ import annotations

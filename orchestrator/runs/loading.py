@@ -85,9 +85,9 @@ def loaded(
         name: of a scenario of the bundle, or path of a .toml file, an SSP, an FMU, or libcosim's
             OspSystemStructure.xml; an SSP and the latter may also be a folder.
         kind: of the bundle's FMUs, `python` or `native`; FMUs that a file names are as they are.
-        fmi: their version of FMI. The master can step those of the first.
+        fmi: their version of FMI. The master can step FMUs of the first only.
         variant: which of the descriptions in an SSP; None: the default.
-        findings: takes what is wrong with it; None: nobody asks for what does no harm.
+        findings: takes what is wrong with it; None: what does no harm is not asked for.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.
@@ -128,7 +128,7 @@ def read_fmu(path: Path, findings: Findings | None = None) -> System:
     )
 
 
-#: Who reads what is no scenario, by the endings of files.
+#: What reads a file that is no scenario, by its ending.
 _READERS: Mapping[str, Callable[..., System]] = {
     ".ssp": read_ssp,
     ".ssd": read_ssp,
@@ -143,7 +143,7 @@ def is_path(name: str) -> bool:
 
 
 def _reader(path: Path) -> Callable[..., System] | None:
-    """Who reads a file or folder; None: it is a scenario."""
+    """What reads a file or folder; None: it is a scenario."""
     if path.suffix in _READERS or str(path) in names() or not is_folder(path):
         return _READERS.get(path.suffix)
     return read_osp if (path / OSP).is_file() and not (path / SSD).is_file() else read_ssp
@@ -157,7 +157,7 @@ def left_behind(scenario: Scenario) -> str | None:
 
 
 def check_brings_its_own(name: str, kind: str, fmi: str = FMI_VERSIONS[0]) -> None:
-    """Check that no other FMUs are asked for than those that a system comes with.
+    """Check that no other FMUs are asked for than the ones that a system comes with.
 
     Raises:
         InputError: it would not have any effect.

@@ -16,7 +16,7 @@ from orchestrator.runs.folder import replaced
 
 _TEMPLATES = Path(__file__).with_name("templates")
 
-#: What a script can stand on: PythonFMU alone, or the base that the bundle's components have.
+#: What a script can stand on: plain PythonFMU, or the base that the bundle's components have.
 BASES = ("plain", "hardened")
 
 #: Names in the templates that give way to the user's own.

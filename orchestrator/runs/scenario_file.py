@@ -68,7 +68,7 @@ class EventTable(TomlTable):
     bias: dict[str, Any] = entry("What is added to signals from now on.")
     freeze: Names = entry("Signals that keep what they were last.")
     drop: Names = entry(
-        "Sensors that fail: who listens keeps what it heard last, as with `freeze`."
+        "Sensors that fail: inputs that they feed keep the last value, as with `freeze`."
     )
     lose: Names = entry("Actuators that fail: overridden with zero.")
     release: Names = entry("Signals that are what they are without events again.")

@@ -83,7 +83,7 @@ def _changed(
     for name in there:
         if not re.fullmatch(r"\w+", name):
             findings.problem(
-                f"{scenario.name}: component {name!r}: write letters, digits and _ alone"
+                f"{scenario.name}: component {name!r}: write letters, digits and _ only"
             )
     for target in scenario.wires.keys() - wires.keys():
         if scenario.wires[target] is False:

@@ -1,4 +1,4 @@
-"""Runs in blocks: how many together, who makes them, and what comes back.
+"""Runs in blocks: how many together, what makes them, and what comes back.
 
 The processes of this machine make them, or the workers of a Dask cluster (:mod:`.cluster`). A block
 whose process is lost is made again by another one.

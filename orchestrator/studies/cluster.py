@@ -92,7 +92,7 @@ def _failure_to_connect(address: str) -> Exception | None:
         secrets = Security().get_connection_args("client")
         if address.startswith(_ENCRYPTED) and secrets["ssl_context"] is None:
             raise ValueError("name certificates in Dask's configuration, distributed.comm.tls")
-        # Who answers need not be a scheduler, and may say nothing.
+        # What answers need not be a scheduler, and may say nothing.
         comm = await asyncio.wait_for(connect(address, seconds, **secrets), 2 * seconds)
         comm.abort()
 
@@ -206,5 +206,5 @@ class _Cluster:
             raise _gone("last worker")
 
 
-def _gone(who: str) -> InputError:
-    return InputError(f"the {who} is gone; what is done is kept: start the study again to go on")
+def _gone(what: str) -> InputError:
+    return InputError(f"the {what} is gone; what is done is kept: start the study again to go on")

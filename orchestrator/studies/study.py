@@ -65,7 +65,7 @@ class Sample(NamedTuple):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the values, those of a norm one by one."""
+        """Names of the values, the ones in a norm one by one."""
         return tuple(name for key in self.ranges for name in members(key))
 
 

@@ -16,7 +16,7 @@ from orchestrator.system.values import is_finite
 #: What makes the runs; the first is the default.
 ENGINES = FMU, BATCH = "fmu", "batch"
 
-#: How values that nobody lists are spread between two ends.
+#: How values that are not listed are spread between two ends.
 SPACINGS = LINEAR, LOG = "linear", "log"
 
 #: How samples are drawn; the first is the default.

@@ -96,7 +96,7 @@ def sweep(
     progress: bool = False,
     force: bool = False,
 ) -> StudyResult:
-    """Make the runs of a study, or those of them that are missing.
+    """Make the runs of a study, or the ones that are missing.
 
         result = sweep("attraction")
         result["plant.eta0.z"], result["failure"], result.to_dataframe()
@@ -274,8 +274,8 @@ def making(
 ) -> Iterator[Iterator[list[Outcome]]]:
     """The outcomes of runs, block by block as they are done, for the time of the context.
 
-    Runs are taken from their iterator as they are needed. Each has one outcome; those that end the
-    process which makes them have one as well, at the very end.
+    Runs are taken from their iterator as they are needed. Each has one outcome, also a run that
+    ends the process which makes it: that comes at the very end.
 
     Args:
         engine: what makes them.
@@ -284,7 +284,7 @@ def making(
         workers: how many processes of this machine; None for one a core.
 
     Raises:
-        InputError: there is no such scheduler, or nobody is left to make the runs.
+        InputError: there is no such scheduler, or no worker is left to make the runs.
 
     """
     if scheduler is not None:

@@ -69,7 +69,7 @@ def splits(setting: Setting, h: float) -> Splits:
 
 
 class Vehicles(NamedTuple):
-    """The vehicle and that of the reference."""
+    """The vehicle, and the reference vehicle."""
 
     plant: PlantState
     rotation: Rotation  #: attitude of the first, body to earth

@@ -65,7 +65,7 @@ def actuator_command(rotation: Rotation, force: Vector3, ell: float) -> Vector3:
         (tau_u [N], tau_q [N.m], tau_r [N.m]).
 
     """
-    f_1, f_2, f_3 = rotate_back(rotation, force)  # the columns of J are those of R
+    f_1, f_2, f_3 = rotate_back(rotation, force)  # the columns of J are R's
     return f_1, -ell * f_3, ell * f_2
 
 

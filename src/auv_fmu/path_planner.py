@@ -18,7 +18,7 @@ it, with a = (t - t_k) / T + 1/2 from 0 to 1,
   corner is cut by 3/32 |v_k+1 - v_k| T.
 - The reference never leaves the hull of the waypoints, and is nowhere faster than its fastest leg;
   |ddy_d| is at most 3/2 of the largest |v_k+1 - v_k| / T where roundings do not overlap.
-- Before the first corner and behind the last one it rests: start and arrival are corners, too.
+- Before the first corner and after the last one it rests: start and arrival are corners, too.
 - Roundings may overlap: where many waypoints lie close together, they are what smooths the curve.
 
 A spline through the waypoints would meet them exactly, and swing out beside long legs, at a speed
@@ -97,7 +97,7 @@ class PathState(NamedTuple):
 class Corner(NamedTuple):
     """A waypoint on the way."""
 
-    k: int  #: its number, from 0; n: behind the last one
+    k: int  #: its number, from 0; n: after the last one
     t: float  #: when it would be passed without roundings [s]
 
 
@@ -125,7 +125,7 @@ def duration(waypoints: Waypoints, k: int) -> float:
 
 
 def velocity(waypoints: Waypoints, k: int) -> Vector3:
-    """v_k [m/s], of the leg to waypoint k: nothing before the first and behind the last one."""
+    """v_k [m/s], of the leg to waypoint k: nothing before the first and after the last one."""
     if not 0 < k < waypoints.n:
         return _AT_REST
     T = duration(waypoints, k)
@@ -145,7 +145,7 @@ def first_corner(waypoints: Waypoints, start: float) -> Corner:
 
 
 def next_corner(waypoints: Waypoints, corner: Corner) -> Corner:
-    """The corner behind one."""
+    """The corner after one."""
     k = corner.k + 1
     if k >= waypoints.n:
         return Corner(waypoints.n, corner.t)

@@ -28,7 +28,7 @@ _SCALE = 2.0 / pi
 #: Largest slope s'_M of Lemma 1 of each.
 MAXIMUM_SLOPE: dict[str, float] = {"tanh": 1.0, "algebraic": 1.0, "arctan": _SCALE}
 
-#: From here on 1 + xi^2 is xi^2 but for rounding, and not much later too large for a float.
+#: From here on 1 + xi^2 is xi^2 apart from rounding, and not much later too large for a float.
 _LARGE = 1e9
 
 

@@ -1,4 +1,4 @@
-"""docs/batch.md: its example runs, and its table is that of the package."""
+"""docs/batch.md: its example runs, and its table is the package's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""docs/scenarios.md: as generated, and with examples that run."""
+"""docs/scenarios.md: its examples run and are drawn."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""docs/studies.md: as generated, and with examples that run."""
+"""docs/studies.md: names all that there is, and its examples run."""
 
 from __future__ import annotations
 

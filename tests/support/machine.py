@@ -57,7 +57,7 @@ def start(
     """The command line in a session of its own.
 
     Args:
-        arguments: behind `auv-fmu`.
+        arguments: after `auv-fmu`.
         limits: of its resources, by their numbers in the module `resource`.
         environment: what is different in it; None: a variable that is not set.
         before: called in the new process.

@@ -13,7 +13,7 @@
 #include "mode.h"
 #include "slave.h"
 
-/* Inputs come first, outputs behind them, and parameters last. */
+/* Inputs come first, outputs after them, and parameters last. */
 enum { PORTS = 64, OUTPUTS = 24, AT = 60, ACT, CALL, MILLISECONDS };
 enum { SET, STEP, GET };
 enum {

@@ -13,7 +13,7 @@ from support.compiled import library_of
 
 _SOURCE = Path(__file__).with_name("relay.c")
 
-#: Ports in the order of the C source: outputs behind two inputs, then parameters.
+#: Ports in the order of the C source: outputs after two inputs, then parameters.
 INPUTS, OUTPUTS, PARAMETERS = ("u", "v"), ("g", "y", "t", "h"), ("a", "c")
 
 _VARIABILITY = {"input": "continuous", "output": "continuous", "parameter": "fixed"}

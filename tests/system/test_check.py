@@ -188,7 +188,7 @@ def test_who_could_feed_a_group_is_named_if_it_is_one(tmp_path):
         '[inputs]\nfile = "dy.csv"\n',
     ],
 )
-def test_inputs_that_somebody_sets_or_leaves_open_are_not_named(workplace, capsys, more):
+def test_inputs_that_are_set_or_left_open_on_purpose_are_not_named(workplace, capsys, more):
     Path("dy.csv").write_text("time,controller.dy.x,controller.dy.y,controller.dy.z\n0,0,0,0\n")
     Path("pd.toml").write_text(_FORGOTTEN + more)
     assert main(["check", "pd.toml"]) == 0

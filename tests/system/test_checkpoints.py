@@ -75,7 +75,7 @@ LEFT = ["fig4", "--stop-time", "1", "--no-figures"]
 
 @pytest.fixture(scope="module")
 def one_left(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What a run leaves that was killed behind its first checkpoint."""
+    """What a run leaves that was killed after its first checkpoint."""
     folder = tmp_path_factory.mktemp("left")
     killed_after(1, *LEFT, *CHECKPOINTS, out=str(folder))
     return folder
@@ -100,7 +100,7 @@ def left(one_left: Path) -> None:
     ],
 )
 def test_a_run_that_is_killed_and_resumed_is_one_that_was_not(scenario, options, then):
-    """Twice killed: behind its second checkpoint, and behind the next but one."""
+    """Twice killed: after its second checkpoint, and after the next but one."""
     if "parquet" in options:
         pytest.importorskip("pyarrow")
     arguments = [scenario, "--stop-time", "2", "--no-figures", *options]

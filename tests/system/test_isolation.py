@@ -86,7 +86,7 @@ def run_isolated(system: System, timeout: float = 20.0, stop_time: float = 0.5) 
 
 
 def rows_until(table: Table, t: float) -> bool:
-    """Whether there is a row for every step until a time, and none behind it."""
+    """Whether there is a row for every step until a time, and none after it."""
     return np.array_equal(table.time, np.arange(round(t / STEP) + 1) * STEP)
 
 

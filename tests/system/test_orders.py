@@ -62,7 +62,7 @@ def test_a_ring_is_opened_before_its_first_component_and_one_line_says_so(folder
 
 
 def test_a_ring_that_feeds_another_is_opened_first(folder):
-    """It stands behind it; what it feeds gets nothing late but what its own ring is opened for."""
+    """It stands after it; what it feeds gets nothing late but what its own ring is opened for."""
     fmus = {name: relay(folder) for name in "abcde"}
     wires = {"a.u": "b.g", "b.u": "a.g", "a.v": "d.g", "c.u": "d.g", "d.u": "c.g", "e.u": "b.g"}
     system = system_of(fmus, wires)

@@ -25,7 +25,7 @@ enum { WHY = 512 };
 
 typedef struct {
     int raised;
-    char why[WHY]; /* the exception's class and text, or the text alone of a refusal */
+    char why[WHY]; /* the exception's class and text, or only the text of a refusal */
 } Error;
 
 static void raise_error(Error *error, const char *format, ...) {

@@ -22,7 +22,7 @@ typedef struct instance instance;
 
 /* A call between its beginning and its end. */
 typedef struct {
-    instance *instance; /* NULL: the handle is not that of a live instance */
+    instance *instance; /* NULL: the handle belongs to no live instance */
     string function;
     int status;  /* what the call is answered with */
     void *entry; /* of the instance in the table of handles */
@@ -42,7 +42,7 @@ static const names version;
 
 /* A handle of a new instance; NULL, with a message that says why, if anything is wrong.
  *
- * wrong: what is, with arguments that the version alone knows; NULL: nothing.
+ * wrong: what is, with arguments that only the version knows; NULL: nothing.
  * token: the FMU's, with braces or without; NULL and "" go with any FMU. */
 static void *instantiate(string function, string wrong, string name, string token, logger host,
                          int logging);

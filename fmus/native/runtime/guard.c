@@ -11,7 +11,7 @@ static call begin(void *handle, string function, when when) {
     int inside;
     entry *it = hold(handle, INSTANCE, &inside);
     if (it == NULL) {
-        /* There is nobody else to tell: a logger that calls would do so again. */
+        /* There is no one else to tell: a logger that calls would do so again. */
         fprintf(stderr, "%s: %s\n", function,
                 inside ? "called by the logger" : "not a live instance of this FMU");
         return this;
@@ -70,7 +70,7 @@ static int lower(char letter) {
     return letter >= 'A' && letter <= 'Z' ? letter - 'A' + 'a' : letter;
 }
 
-/* Whether two tokens are the same but for the case of their letters. */
+/* Whether two tokens are the same except the case of their letters. */
 static int same_token(string one, string other) {
     size_t length = without_braces(&one);
     if (without_braces(&other) != length) return 0;

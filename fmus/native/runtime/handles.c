@@ -154,7 +154,7 @@ static entry *hold(void *handle, thing_kind kind, int *inside) {
     return NULL;
 }
 
-/* Holds an entry again after the logger has come back; NULL: it is no more that of the handle. */
+/* Holds an entry again after the logger has come back; NULL: it is the handle's no more. */
 static entry *hold_after_logger(entry *it, void *handle) {
     int inside;
     if (!swap_shared(&it->thread, LOGGER, this_thread())) return hold(handle, INSTANCE, &inside);

@@ -100,7 +100,7 @@ static void get_unknown(call *this, string kind, const uint32_t references[], si
     }
 }
 
-/* The value of a port as a number; 0.0, if the reference is not that of a port of the type. */
+/* The value of a port as a number; 0.0, if no port of the type has the reference. */
 static double number_of(call *this, uint32_t reference, kind kind) {
     const run *run = &this->instance->run;
     const port *port = port_at(reference);
@@ -114,7 +114,7 @@ static double number_of(call *this, uint32_t reference, kind kind) {
     return run->moments[run->now].outputs.values[port->place];
 }
 
-/* Whether references are those of all inputs, or outputs, in their order. */
+/* Whether references name all inputs, or outputs, in their order. */
 static int are_all(const uint32_t references[], const uint32_t all[], size_t n) {
     return n > 0 && memcmp(references, all, n * sizeof *all) == 0;
 }

@@ -104,7 +104,7 @@ static void append_number(message *it, double number, int exactly) {
     append_text(it, text);
 }
 
-/* A text as Python's repr shows it, but for rare characters that it takes to be unprintable. */
+/* A text as Python's repr shows it, except rare characters that it takes to be unprintable. */
 static void append_quoted(message *it, string text) {
     char quote = strchr(text, '\'') != NULL && strchr(text, '"') == NULL ? '"' : '\'';
     char ends[] = {quote, '\0'};

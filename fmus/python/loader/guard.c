@@ -93,7 +93,7 @@ call begin(component handle, string function, when when) {
         wrong = "the host has ended Python";
     }
     if (wrong != NULL) {
-        /* There is nobody else to tell: a logger that calls would do so again. */
+        /* There is no one else to tell: a logger that calls would do so again. */
         if (this.status != FMI_OK) fprintf(stderr, "%s: %s\n", function, wrong);
         return this;
     }

@@ -116,7 +116,7 @@ typedef struct untold untold;
 struct untold {
     untold *next;
     int status;
-    char *category, *text; /* behind the name of the instance */
+    char *category, *text; /* after the name of the instance */
     char name[1];
 };
 

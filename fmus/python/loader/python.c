@@ -2,7 +2,7 @@
  *
  * Each FMU has a loader of its own, and hosts instantiate FMUs from several threads. What all
  * loaders of a process share is one object: the dynamic linker makes symbols of the type
- * gnu_unique_object the same for all libraries, even those loaded for themselves alone.
+ * gnu_unique_object the same for all libraries, even the ones loaded only for themselves.
  *
  * The interpreter starts isolated: no variable of the environment changes how it starts, and it
  * takes no signal from the host. A start that fails ends in a reason, not in the end of the
@@ -71,7 +71,7 @@ static int note_libpython(struct dl_phdr_info *info, size_t size, void *path) {
 
 static int find_python(char *why) {
     char path[PATH_MAX] = "";
-    /* A libpython that the host has loaded for itself alone is made visible: a second one of
+    /* A libpython that the host has loaded only for itself is made visible: a second one of
      * another version in the same process would not do. */
     if (!has_python() && dl_iterate_phdr(note_libpython, path)) {
         dlopen(path, RTLD_LAZY | RTLD_NOLOAD | RTLD_GLOBAL);

@@ -154,7 +154,7 @@ class Archive:
             return conversion(source, target)
         except UndefinedUnit as error:
             self.note(f"{error}; values are taken as they are")
-            # Said for those who would ask why the units at the ends differ.
+            # Said to explain why the units at the ends differ.
             return Linear()
 
     def required(self, element: Element, name: str, owner: str) -> str:

@@ -31,7 +31,7 @@ _STEPS = (
     ("SimulationInformation", "fixedStepSize"),
 )
 
-#: That of a component.
+#: The same of a component.
 _STEP_OF_A_COMPONENT = ("StepSizeHint", "value")
 
 

@@ -25,7 +25,7 @@ from orchestrator.system.component import Component
 #: any other.
 LONGEST_STATE, LONGEST_NOTE = 1 << 30, 1 << 25
 
-#: What stands for bytes in a note: an object with this key alone, which is no variable's name.
+#: What stands for bytes in a note: an object with only this key, which is no variable's name.
 _BYTES = "\0base64"
 
 

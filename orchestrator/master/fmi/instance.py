@@ -52,7 +52,7 @@ class Part(NamedTuple):
         causality: `input` or `output`.
         fmi_type: one of :data:`orchestrator.master.fmi.transfer.FMI_TYPES`.
         references: value references.
-        place: of their values among those of the component.
+        place: of their values among the component's.
 
     """
 
@@ -65,8 +65,8 @@ class Part(NamedTuple):
 class Instance(Protocol):
     """An instantiated FMU whose inputs and outputs live in a row of floats.
 
-    In every step the calls of `set_inputs`, then `do_step` with time and step size, then those of
-    `get_outputs` are made; those of `get_outputs` once all components of a stage have been stepped.
+    In every step the calls of `set_inputs`, then `do_step` with time and step size, then the calls
+    of `get_outputs` are made, the last once all components of a stage have been stepped.
     Each returns FMI's status: `failed` is for one that is worse than a warning.
 
     Attributes:

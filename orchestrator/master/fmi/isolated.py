@@ -113,7 +113,7 @@ class IsolatedInstance:
         self._text_inputs: list[int] = []
         self._text_outputs: list[int] = []
         self._integer_outputs: list[int] = []
-        # Those of the run, and those of the process there, which numbers its own.
+        # The run's, and the ones in the process there, which numbers its own.
         self._strings, self._theirs, self._told = StringTable(), StringTable(), len(StringTable())
         inputs, outputs = sizes(component)
         self._channel = Channel(connection, 2 + inputs, outputs, self._waited)
@@ -256,7 +256,7 @@ class IsolatedInstance:
             self._status(min(self._timeout, FAREWELL))
 
     def _take_outputs(self) -> int:
-        # Those of a step that has ended the run are there already.
+        # Outputs of a step that has ended the run are there already.
         if self._steps:
             self._steps = False
             try:

@@ -97,7 +97,7 @@ class LoadedInstance:
         self._worst = 0
         self._environment = next(_environments)
         _instances[self._environment] = self
-        # The functions of the library serve all instances; what differs is theirs alone.
+        # The functions of the library serve all instances; only what differs is theirs.
         self._fmu = copy(library.fmu)
         self._fmu.instanceName = component.name
         try:
@@ -183,7 +183,7 @@ class LoadedInstance:
         # No stop time: k h ends beyond it by a rounding error, which many FMUs refuse.
         self._call("setupExperiment", startTime=start_time)
         self._call("enterInitializationMode")
-        # FMI has it that guesses are set before alone.
+        # FMI has it that guesses are set only before.
         variables = self._variables
         self._set({port: v for port, v in values.items() if variables[port].initial == "exact"})
 
@@ -247,7 +247,7 @@ class LoadedInstance:
         self._worst = 0
         with self._held("deSerializeFMUstate", state) as read:
             self._call("setFMUstate", read)
-        # Some say in a message alone that it is none of theirs.
+        # Some say only in a message that it is none of theirs.
         if self._worst >= fmi2Discard:
             raise ComponentFailed(self._complaints[-1])
 
@@ -398,7 +398,7 @@ def _bearing(name: bytes | None) -> LoadedInstance | None:
 
 
 def _shared_callbacks() -> fmi2CallbackFunctions:
-    """Those of all instances: fmpy's proxy, which formats the messages, knows one logger only."""
+    """Callbacks of all instances: fmpy's proxy, which formats messages, knows one logger only."""
     callbacks = fmi2CallbackFunctions()
     callbacks.logger = _log
     # The functions of C themselves: made into callbacks of Python, they would cost an FMU that

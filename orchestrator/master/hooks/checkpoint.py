@@ -239,7 +239,7 @@ class Checkpoints:
         write_whole(self.folder / _STATE, sealed(content._asdict()), self._partial)
 
     def _resume(self, run: Run, found: _Stored) -> None:
-        # First of all what rows mean, who is told them wants to know.
+        # First of all what rows mean: an observer that is told them needs it.
         for one, state in zip(_lasting(run), found.lasting, strict=True):
             one.restore(state)
         first = 1  # which was computed anew

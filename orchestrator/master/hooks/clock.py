@@ -73,7 +73,7 @@ def check_factor(factor: float) -> None:
 class RealTime:
     """A hook that makes a run wait for a clock, and measures by how much it is late.
 
-    A run that is late makes up for it as fast as it can: times are those of one clock, from the
+    A run that is late makes up for it as fast as it can: times are one clock's, from the
     first step on.
 
     Attributes:

@@ -29,7 +29,7 @@ def compiled(gains: type[Any]) -> Callable[..., Moment]:
     It is compiled when it is first called, which takes some ten seconds, unless some process of
     this user has done so before.
     """
-    # Not installed for those who make no studies.
+    # Not installed where no studies are made.
     imported_apart("numba", ".numba_config.yaml")
     import numba  # noqa: PLC0415
 
