@@ -38,7 +38,7 @@ def read_events(
 
     Args:
         where: they are written, for messages.
-        tables: as :func:`check_events` has found them good.
+        tables: as :func:`.scenario.check_events` has found them good.
         system: that they happen to.
 
     Raises:
