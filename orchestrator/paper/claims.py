@@ -1,6 +1,6 @@
 """Every printed number and claim of section 4 that a simulation can be held against.
 
-A claim is a function of the outcomes of the runs that are named beside it. The report makes these
+A claim is a function of the kept runs that are named beside it. The report makes these
 runs, calls every claim, and prints what it finds in the order of this file.
 """
 
@@ -67,7 +67,7 @@ class Claim:
     Attributes:
         title: where it says it, and of what.
         published: what it says.
-        runs: whose outcomes it is judged by.
+        runs: that it is judged by.
         judge: finds what these say.
 
     """
@@ -78,7 +78,7 @@ class Claim:
     judge: Callable[..., Finding]
 
     def finding(self, kept_runs: Sequence[KeptRun]) -> Finding:
-        """What the outcomes of the runs say."""
+        """What the kept runs say."""
         for kept_run in kept_runs:
             if kept_run.failure is not None:
                 return Finding(f"a run ended early: {kept_run.failure}", "none")
@@ -92,7 +92,7 @@ CLAIMS: list[Claim] = []
 def claim(
     title: str, published: str, *runs: Request
 ) -> Callable[[Callable[..., Finding]], Callable[..., Finding]]:
-    """Register a function of the outcomes of some runs as the judge of a claim."""
+    """Register a function of some kept runs as the judge of a claim."""
 
     def register(judge: Callable[..., Finding]) -> Callable[..., Finding]:
         CLAIMS.append(Claim(title, published, runs, judge))

@@ -68,7 +68,7 @@ class Effect:
         name: of the figure's file.
         title: of the section.
         runs: that are compared.
-        show: says and draws what their outcomes show.
+        show: says and draws what they show.
 
     """
 
@@ -85,7 +85,7 @@ EFFECTS: list[Effect] = []
 def effect(
     name: str, title: str, *runs: Request
 ) -> Callable[[Callable[..., Shown]], Callable[..., Shown]]:
-    """Register a function of the outcomes of some runs as an effect."""
+    """Register a function of some kept runs as an effect."""
 
     def register(show: Callable[..., Shown]) -> Callable[..., Shown]:
         EFFECTS.append(Effect(name, title, runs, show))

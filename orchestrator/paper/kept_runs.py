@@ -1,4 +1,4 @@
-"""Outcomes of runs: each made once, and kept from one report to the next."""
+"""Runs of the report: each made once, and kept from one report to the next."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class KeptRun:
 
 
 class KeptRuns:
-    """Outcomes of runs; equal ones, of whatever name, are made once."""
+    """What is kept of runs; equal ones, of whatever name, are made once."""
 
     def __init__(
         self,
@@ -62,7 +62,7 @@ class KeptRuns:
         """Start without any.
 
         Args:
-            folder: in which outcomes are kept.
+            folder: in which they are kept.
             stop_time: of all runs [s]; None: their own.
             kind: of the bundle's FMUs in all runs.
             force: move aside what was changed there.
@@ -75,7 +75,7 @@ class KeptRuns:
         self._kept_runs: dict[str, KeptRun] = {}
 
     def __getitem__(self, run: Request) -> KeptRun:
-        """The outcome of a run that was made."""
+        """What is kept of a run that was made."""
         return self._kept_runs[self._keys[run]]
 
     def label(self, run: Request) -> str:
@@ -131,12 +131,12 @@ class KeptRuns:
 
 
 def _file(key: str) -> str:
-    """The name of the file of an outcome."""
+    """The name of the file of a kept run."""
     return f"{key}.npz"
 
 
 def key_of(prepared: Prepared) -> str:
-    """Digest of all that an outcome depends on."""
+    """Digest of all that a kept run depends on."""
     kept = {
         "what is kept": code_of("orchestrator.vehicle", "orchestrator.figures", "orchestrator.runs")
     }

@@ -33,7 +33,7 @@ from orchestrator.runs.record import PACKAGES, Stopwatch, write_files
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle import gains
 
-#: Folders within the report's: figures, and outcomes that the next report can use again.
+#: Folders within the report's: figures, and runs that the next report can use again.
 _FIGURES, _RUNS, _STUDIES = "figures", "runs", "studies"
 
 #: The files.

@@ -1,4 +1,4 @@
-"""Claims judged by outcomes whose numbers are known by hand."""
+"""Claims judged by runs whose numbers are known by hand."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ELL = 0.35
 ONES, TWOS, THREES = (1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (3.0, 3.0, 3.0)
 
 
-def outcome(table=None, **metrics):
+def kept_run(table=None, **metrics):
     return KeptRun(metrics, table or Table())
 
 
@@ -46,44 +46,44 @@ def test_turning_radius_is_speed_by_yaw_rate():
     """3-4-5: a speed of 0.5 m/s at 2 rad/s is a radius of 0.25 m."""
     table = table_of(np.arange(3.0), plant__nu__u=0.3, plant__nu__v=-0.4, plant__nu__r=-2.0)
     assert turning_radius(table) == pytest.approx(0.25)
-    found = claims.turning(outcome(table))
+    found = claims.turning(kept_run(table))
     assert numbers_in(found.ours) == [0.25, 0.5]
     assert found.verdict.startswith("**differs**") and tells(found.verdict, [0.42])
 
 
 def test_turning_radius_of_the_paper_would_agree():
     table = table_of(np.arange(3.0), plant__nu__u=0.6, plant__nu__v=0.0, plant__nu__r=1.0)
-    verdict = claims.turning(outcome(table)).verdict
+    verdict = claims.turning(kept_run(table)).verdict
     assert verdict.startswith("agrees") and tells(verdict, [1.0])
 
 
 def test_efforts_are_given_in_parts_of_the_published_ones():
-    found = claims.effort_proposed(outcome(l2_effort=(260.0, 20.0, 53.0)))
+    found = claims.effort_proposed(kept_run(l2_effort=(260.0, 20.0, 53.0)))
     assert numbers_in(found.verdict) == [2, 0.5, 1]
     assert numbers_in(found.ours) == [260, 20, 53]
-    published = claims.effort_pd(outcome(l2_effort=(235.0, 163.0, 172.0)))
+    published = claims.effort_pd(kept_run(l2_effort=(235.0, 163.0, 172.0)))
     assert numbers_in(published.verdict) == [1, 1, 1]
 
 
 def test_efforts_by_59_as_printed_differ_unless_both_are_near():
-    near = outcome(rms_effort=(130.0, 40.0, 53.0)), outcome(rms_effort=(235.0, 163.0, 172.0))
+    near = kept_run(rms_effort=(130.0, 40.0, 53.0)), kept_run(rms_effort=(235.0, 163.0, 172.0))
     assert claims.effort_as_printed(*near).verdict.startswith("agrees")
-    far = outcome(rms_effort=(13.0, 4.0, 5.3))
+    far = kept_run(rms_effort=(13.0, 4.0, 5.3))
     assert claims.effort_as_printed(far, near[1]).verdict.startswith("**differs**")
 
 
 def test_efforts_as_a_sum_are_norms_by_the_root_of_h_and_the_time():
     """sqrt(0.02 * 200) is 2."""
     run = {"stop_time": 200.0, "step": 0.02}
-    five = outcome(l2_effort=(260.0, 40.0, 106.0), **run)
-    found = claims.effort_as_a_sum(five, outcome(l2_effort=(470.0, 163.0, 344.0), **run))
+    five = kept_run(l2_effort=(260.0, 40.0, 106.0), **run)
+    found = claims.effort_as_a_sum(five, kept_run(l2_effort=(470.0, 163.0, 344.0), **run))
     assert numbers_in(found.ours)[:7] == [130, 20, 53, 235, 81.5, 172, 200]
     assert numbers_in(found.verdict)[:6] == [1, 0.5, 1] * 2
 
 
 def test_final_errors_are_given_in_parts_of_the_published_ones():
     error = (0.02, 0.02, 0.03)
-    ours = outcome(final_error=error)
+    ours = kept_run(final_error=error)
     assert numbers_in(claims.final_error_proposed(ours).verdict) == [2, 1, 0.5]
     assert numbers_in(claims.final_error_sharp(ours).ours) == [*error]
     assert numbers_in(claims.final_error_pd(ours).verdict) == [5, 20, 30]
@@ -94,52 +94,52 @@ def test_final_errors_are_given_in_parts_of_the_published_ones():
     [
         (
             claims.no_saturation,
-            [outcome(peak_command=ONES, saturated_fraction=(0.0, 0.0, 0.0))],
-            [outcome(peak_command=ONES, saturated_fraction=(0.0, 0.1, 0.0))],
+            [kept_run(peak_command=ONES, saturated_fraction=(0.0, 0.0, 0.0))],
+            [kept_run(peak_command=ONES, saturated_fraction=(0.0, 0.1, 0.0))],
         ),
         (
             claims.convergence,
-            [outcome(final_error=(0.01, 0.09, 0.0))],
-            [outcome(final_error=(0.01, 0.11, 0.0))],
+            [kept_run(final_error=(0.01, 0.09, 0.0))],
+            [kept_run(final_error=(0.01, 0.11, 0.0))],
         ),
         (
             claims.proposed_does_not_saturate,
-            [outcome(peak_command=ONES, saturated_fraction=(0.0, 0.0, 0.0))] * 2,
+            [kept_run(peak_command=ONES, saturated_fraction=(0.0, 0.0, 0.0))] * 2,
             [
-                outcome(peak_command=ONES, saturated_fraction=(0.0, 0.0, 0.0)),
-                outcome(peak_command=ONES, saturated_fraction=(0.0, 0.0, 0.1)),
+                kept_run(peak_command=ONES, saturated_fraction=(0.0, 0.0, 0.0)),
+                kept_run(peak_command=ONES, saturated_fraction=(0.0, 0.0, 0.1)),
             ],
         ),
         (
             claims.pd_saturates,
-            [outcome(peak_command=ONES, saturated_fraction=(0.1, 0.1, 0.1))],
-            [outcome(peak_command=ONES, saturated_fraction=(0.1, 0.0, 0.1))],
+            [kept_run(peak_command=ONES, saturated_fraction=(0.1, 0.1, 0.1))],
+            [kept_run(peak_command=ONES, saturated_fraction=(0.1, 0.0, 0.1))],
         ),
         (
             claims.pd_chatters,
-            [outcome(total_variation=ONES), outcome(total_variation=TWOS)],
-            [outcome(total_variation=TWOS), outcome(total_variation=ONES)],
+            [kept_run(total_variation=ONES), kept_run(total_variation=TWOS)],
+            [kept_run(total_variation=TWOS), kept_run(total_variation=ONES)],
         ),
         (
             claims.pd_is_accurate,
-            [outcome(final_error=TWOS), outcome(final_error=ONES)],
-            [outcome(final_error=(2.0, 0.5, 2.0)), outcome(final_error=ONES)],
+            [kept_run(final_error=TWOS), kept_run(final_error=ONES)],
+            [kept_run(final_error=(2.0, 0.5, 2.0)), kept_run(final_error=ONES)],
         ),
         (
             claims.smoother_and_less_accurate,
             [
-                outcome(total_variation=TWOS, final_error=ONES),
-                outcome(total_variation=ONES, final_error=TWOS),
+                kept_run(total_variation=TWOS, final_error=ONES),
+                kept_run(total_variation=ONES, final_error=TWOS),
             ],
             [
-                outcome(total_variation=TWOS, final_error=TWOS),
-                outcome(total_variation=ONES, final_error=ONES),
+                kept_run(total_variation=TWOS, final_error=TWOS),
+                kept_run(total_variation=ONES, final_error=ONES),
             ],
         ),
         (
             claims.gradual_degradation,
-            [outcome(final_error=error) for error in (ONES, TWOS, THREES)],
-            [outcome(final_error=error) for error in (ONES, THREES, TWOS)],
+            [kept_run(final_error=error) for error in (ONES, TWOS, THREES)],
+            [kept_run(final_error=error) for error in (ONES, THREES, TWOS)],
         ),
     ],
 )
@@ -150,7 +150,7 @@ def test_verdict_follows_from_the_numbers(judge, true, false):
 
 def test_more_accurate_is_said_in_times():
     found = claims.pd_is_accurate(
-        outcome(final_error=(2.0, 3.0, 4.0)), outcome(final_error=(1.0, 0.5, 0.1))
+        kept_run(final_error=(2.0, 3.0, 4.0)), kept_run(final_error=(1.0, 0.5, 0.1))
     )
     assert numbers_in(found.ours) == [2, 6, 40]
 
@@ -170,9 +170,9 @@ def test_total_variation_counts_the_steps_until_a_time():
 
 def test_severe_chattering_is_held_against_the_first_minute():
     smooth, rough = applied([0.0, 1.0, 2.0]), applied([0.0, 1.0, 5.0])
-    found = claims.pd_chatters_severely(outcome(smooth), outcome(rough))
+    found = claims.pd_chatters_severely(kept_run(smooth), kept_run(rough))
     assert found.verdict.startswith("agrees") and numbers_in(found.verdict) == [4]
-    assert claims.pd_chatters_severely(outcome(rough), outcome(smooth)).verdict.startswith("**")
+    assert claims.pd_chatters_severely(kept_run(rough), kept_run(smooth)).verdict.startswith("**")
 
 
 def still(offsets):
@@ -190,7 +190,7 @@ def test_largest_error_forgets_the_start():
     table = still(np.array([9.0, 8.0, 7.0, 0.5, -0.75]))
     assert largest_error_after(table, 40.0) == pytest.approx(0.75)
     assert largest_error_after(table, 100.0) == 0.0
-    runs = [outcome(still(np.array([9.0, 9.0, 9.0, e]))) for e in (0.1, 0.2, 0.3)]
+    runs = [kept_run(still(np.array([9.0, 9.0, 9.0, e]))) for e in (0.1, 0.2, 0.3)]
     assert claims.gradual_degradation_on_the_way(*runs).verdict == "agrees"
     assert claims.gradual_degradation_on_the_way(*runs[::-1]).verdict == "**differs**"
 
@@ -244,14 +244,14 @@ def test_a_way_against_damping_takes_an_impulse_of_its_own(forces):
 
 def test_efforts_are_held_against_the_impulse_of_the_way():
     """1,000 N.s in 200 s: 71 N.s^0.5, which 130 and 235 exceed; 4,000 N.s take 283."""
-    enough, short = outcome(arriving(5.0)), outcome(arriving(20.0))
+    enough, short = kept_run(arriving(5.0)), kept_run(arriving(20.0))
     assert claims.effort_of_the_way(enough, enough).verdict.startswith("agrees")
     found = claims.effort_of_the_way(enough, short)
     assert tells(found.ours, (1000, 200, 4000, 200), (70.7, 283))
     # (1,000 N.s)^2 / 200 s / (130 N)^2, in steps of 20 s.
     assert tells(found.verdict, (0.0148, 0.0724))
     assert found.verdict.startswith("**differs**")
-    away = outcome(still(np.array([9.0, 8.0])))
+    away = kept_run(still(np.array([9.0, 8.0])))
     assert claims.effort_of_the_way(away, enough).verdict == "none"
 
 
@@ -259,7 +259,7 @@ def estimating(largest, **metrics):
     estimates = {k.replace(".", "__"): 0.5 for k in STANDARD.theta_hat} | {
         "controller__theta_hat[2]": largest
     }
-    return outcome(table_of(np.arange(2.0), **estimates), **metrics)
+    return kept_run(table_of(np.arange(2.0), **estimates), **metrics)
 
 
 def test_estimates_are_bounded():
@@ -283,9 +283,9 @@ def test_more_effort_means_effort_gain_and_chattering():
 
 
 def test_intolerable_chattering_is_not_said_to_be_seen_where_it_is_not():
-    quiet = outcome(peak_command=(61.0, 22.9, 22.8), saturated_fraction=(0.0, 0.0, 0.0))
+    quiet = kept_run(peak_command=(61.0, 22.9, 22.8), saturated_fraction=(0.0, 0.0, 0.0))
     assert claims.intolerable_chattering(quiet).verdict.startswith("**not seen**")
-    rough = outcome(peak_command=(610.0, 22.9, 22.8), saturated_fraction=(0.5, 0.0, 0.0))
+    rough = kept_run(peak_command=(610.0, 22.9, 22.8), saturated_fraction=(0.5, 0.0, 0.0))
     assert claims.intolerable_chattering(rough).verdict == "agrees"
 
 
@@ -304,6 +304,6 @@ def test_no_gains_make_the_region_arbitrarily_large():
 
 
 def test_a_run_that_ended_early_gives_no_verdict():
-    stopped = outcome(failure="a mast has broken")
-    found = claim_of(claims.pd_chatters).finding([outcome(total_variation=ONES), stopped])
+    stopped = kept_run(failure="a mast has broken")
+    found = claim_of(claims.pd_chatters).finding([kept_run(total_variation=ONES), stopped])
     assert found.ours.endswith("a mast has broken") and found.verdict == "none"

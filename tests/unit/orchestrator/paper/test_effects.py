@@ -1,4 +1,4 @@
-"""Effects in words and figures, from outcomes whose numbers are known by hand."""
+"""Effects in words and figures, from runs whose numbers are known by hand."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Here:
 @pytest.fixture(scope="module")
 def tables(tmp_path_factory) -> dict[str, list[Table]]:
     """Of some steps of the runs of each effect."""
-    outcomes = KeptRuns(tmp_path_factory.mktemp("runs"), stop_time=0.2)
-    outcomes.make([run for effect in EFFECTS for run in effect.runs], Here())
-    return {effect.name: [outcomes[run].table for run in effect.runs] for effect in EFFECTS}
+    kept_runs = KeptRuns(tmp_path_factory.mktemp("runs"), stop_time=0.2)
+    kept_runs.make([run for effect in EFFECTS for run in effect.runs], Here())
+    return {effect.name: [kept_runs[run].table for run in effect.runs] for effect in EFFECTS}
 
 
 def made(tables, *metrics):

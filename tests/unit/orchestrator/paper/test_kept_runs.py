@@ -1,4 +1,4 @@
-"""Runs, their commands, and outcomes that are made once."""
+"""Runs, their commands, and what is kept of them."""
 
 from __future__ import annotations
 
@@ -126,32 +126,32 @@ def test_a_file_that_was_changed_is_refused(tmp_path):
     with pytest.raises(InputError, match=rf"{file.name} is not a file that auv-fmu wrote"):
         KeptRuns(tmp_path, 0.1).make([QUIET], crew)
     assert file.read_bytes() == before[:100]
-    outcomes = KeptRuns(tmp_path, 0.1, force=True)
-    outcomes.make([QUIET], crew)
+    kept_runs = KeptRuns(tmp_path, 0.1, force=True)
+    kept_runs.make([QUIET], crew)
     assert len(crew.done) == 1
-    assert outcomes[QUIET].failure is None
+    assert kept_runs[QUIET].failure is None
     assert file.with_name(f"{file.name}.~1~").read_bytes() == before[:100]
 
 
 def test_what_no_run_needs_is_forgotten(tmp_path):
     KeptRuns(tmp_path, 0.1).make([QUIET], InThisProcess())
     (tmp_path / "0123.npz").write_bytes(b"mine")
-    outcomes = KeptRuns(tmp_path, 0.2)
-    outcomes.make([QUIET], InThisProcess())
+    kept_runs = KeptRuns(tmp_path, 0.2)
+    kept_runs.make([QUIET], InThisProcess())
     assert len(list(tmp_path.glob("*.npz"))) == 3
-    outcomes.forget_others()
+    kept_runs.forget_others()
     assert len(list(tmp_path.glob("*.npz"))) == 2
     assert (tmp_path / "0123.npz").read_bytes() == b"mine"
 
 
 def test_a_run_that_cannot_be_made_says_why(tmp_path):
     broken = Request("fig4", {"plant.noise.sdt": 0.0})
-    outcomes, crew = KeptRuns(tmp_path), InThisProcess()
-    outcomes.make([broken], crew)
+    kept_runs, crew = KeptRuns(tmp_path), InThisProcess()
+    kept_runs.make([broken], crew)
     assert crew.done == []
-    assert "did you mean noise.std" in outcomes[broken].failure
-    assert outcomes.label(broken) == "fig4 --set plant.noise.sdt=0"
-    assert len(outcomes[broken].table) == 0
+    assert "did you mean noise.std" in kept_runs[broken].failure
+    assert kept_runs.label(broken) == "fig4 --set plant.noise.sdt=0"
+    assert len(kept_runs[broken].table) == 0
 
 
 def test_every_run_of_claims_and_effects_can_be_made():
