@@ -99,12 +99,12 @@ def _headings(tokens: Sequence[Token]) -> Iterator[Heading]:
             yield Heading(int(token.tag[1:]), inline.content, anchor)
 
 
-def contents(text: str, deepest: int = 3) -> str:
-    """Links to the headings of a text below its title, down to a level."""
+def contents(text: str) -> str:
+    """Links to the headings of a text below its title, down to the third level."""
     return "\n".join(
         f"{'  ' * (heading.level - 2)}- [{heading.title}](#{heading.anchor})"
         for heading in headings(text)
-        if 1 < heading.level <= deepest
+        if 1 < heading.level <= 3
     )
 
 

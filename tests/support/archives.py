@@ -135,14 +135,14 @@ def connection(start: str, end: str, inside: str = "", **more: str) -> str:
     return f"<ssd:Connection{ends}>{inside}</ssd:Connection>"
 
 
-def parameter_set(values: Mapping[str, str], name: str = "set") -> str:
+def parameter_set(values: Mapping[str, str]) -> str:
     """A parameter set; a value is the inside of a parameter, such as `Real value="1"`."""
     parameters = "".join(
         f'<ssv:Parameter name="{name}"><ssv:{value}/></ssv:Parameter>'
         for name, value in values.items()
     )
     return (
-        f'<ssv:ParameterSet {_NAMESPACES} version="1.0" name="{name}"><ssv:Parameters>{parameters}'
+        f'<ssv:ParameterSet {_NAMESPACES} version="1.0" name="set"><ssv:Parameters>{parameters}'
         "</ssv:Parameters></ssv:ParameterSet>"
     )
 

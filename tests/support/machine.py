@@ -117,9 +117,9 @@ def is_over(session: int) -> bool:
     return eventually(lambda: not members(session))
 
 
-def eventually(condition: Callable[[], object], patience: float = PATIENCE) -> bool:
+def eventually(condition: Callable[[], object]) -> bool:
     """Whether something comes true before patience ends."""
-    end = time.monotonic() + patience
+    end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
         if condition():
             return True

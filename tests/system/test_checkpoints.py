@@ -267,7 +267,7 @@ WITH_STATES = (
 )
 
 
-def stopped(system: System, stop_time: float = 2.0) -> None:
+def stopped(system: System) -> None:
     """Run a system in a process that is killed when it has made its last step."""
 
     def doomed() -> None:
@@ -276,7 +276,7 @@ def stopped(system: System, stop_time: float = 2.0) -> None:
             os.kill(os.getpid(), signal.SIGKILL)
 
         Checkpoints.end = kill
-        simulate(system, stop_time=stop_time, step=0.1, checkpoint="kept", checkpoint_every=0.6)
+        simulate(system, stop_time=2.0, step=0.1, checkpoint="kept", checkpoint_every=0.6)
 
     assert ended(forked(doomed)) == -signal.SIGKILL
 

@@ -79,9 +79,9 @@ def left_over(mark: str) -> list[Path]:
     return found
 
 
-def run_isolated(system: System, timeout: float = 20.0, stop_time: float = 0.5) -> Table:
+def run_isolated(system: System, timeout: float = 20.0) -> Table:
     table = Table()
-    simulate(planned(system, Experiment(stop_time, STEP)), [table], Isolation(timeout))
+    simulate(planned(system, Experiment(0.5, STEP)), [table], Isolation(timeout))
     return table
 
 

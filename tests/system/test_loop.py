@@ -116,9 +116,9 @@ PAIR = {
 }
 
 
-def pair(folder: Path, act: str, call: str = "STEP", at: int = 7, milliseconds: int = 0) -> System:
+def pair(folder: Path, act: str, call: str = "STEP", milliseconds: int = 0) -> System:
     """The two, of which the first misbehaves in its seventh step."""
-    values = {"act": ACTS[act], "call": CALLS[call], "at": at, "milliseconds": milliseconds}
+    values = {"act": ACTS[act], "call": CALLS[call], "at": 7, "milliseconds": milliseconds}
     return system_of(folder, **PAIR, parameters={f"bad.{k}": v for k, v in values.items()})
 
 

@@ -16,7 +16,7 @@ from orchestrator.master.hooks.hook import NEVER
 
 
 class World:
-    """A clock that moves when somebody sleeps, or computes."""
+    """A clock that moves when a process sleeps, or computes."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now, self.told = 1000.0, 0
@@ -34,14 +34,14 @@ class World:
         self.blocks = SimpleNamespace(due=self.now + 0.2, hand_over=self.hand_over)
         return SimpleNamespace(experiment=experiment, made=made, blocks=self.blocks, interrupts=[])
 
-    def advance(self, pace: RealTime, run: SimpleNamespace, costs: list[float]) -> list[float]:
-        """Make steps that take so long, and say when the pace let each call go [s]."""
+    def advance(self, clock: RealTime, run: SimpleNamespace, costs: list[float]) -> list[float]:
+        """Make steps that take so long, and say when the clock let each call go [s]."""
         let_go = []
         begun, due = self.now, 0
         for cost in [*costs, 0.0]:
             run.time = run.experiment.time(run.made)
             if run.made >= due:
-                due = pace.act(run)
+                due = clock.act(run)
                 let_go.append(self.now - begun)
             self.now += cost
             run.made += 1
@@ -50,49 +50,49 @@ class World:
 
 @pytest.mark.parametrize("factor", [0.5, 1.0, 4.0])
 def test_steps_end_when_the_clock_says_so(monkeypatch, factor):
-    world, pace = World(monkeypatch), RealTime(factor)
+    world, clock = World(monkeypatch), RealTime(factor)
     run = world.run(Experiment(1.0, 0.25))
-    let_go = world.advance(pace, run, [0.01, 0.0, 0.02, 0.01])
+    let_go = world.advance(clock, run, [0.01, 0.0, 0.02, 0.01])
     np.testing.assert_allclose(let_go, np.arange(5) * 0.25 / factor, atol=1e-9)
-    assert pace.lateness.worst < 1e-9
+    assert clock.lateness.worst < 1e-9
     # Rows are told meanwhile.
     assert world.told >= int(1.0 / factor / 0.25) - 1
 
 
 def test_a_step_that_is_late_is_made_up_for(monkeypatch):
     """0.7 s for a step of 0.25 s: the third is still late, the fourth is not."""
-    world, pace = World(monkeypatch), RealTime(1.0)
-    let_go = world.advance(pace, world.run(Experiment(1.0, 0.25)), [0.0, 0.7, 0.0, 0.0])
+    world, clock = World(monkeypatch), RealTime(1.0)
+    let_go = world.advance(clock, world.run(Experiment(1.0, 0.25)), [0.0, 0.7, 0.0, 0.0])
     np.testing.assert_allclose(let_go, [0.0, 0.25, 0.95, 0.95, 1.0], atol=1e-9)
-    assert pace.lateness.worst == pytest.approx(0.45)
-    assert pace.lateness.mean == pytest.approx((0.45 + 0.2) / 4)
+    assert clock.lateness.worst == pytest.approx(0.45)
+    assert clock.lateness.mean == pytest.approx((0.45 + 0.2) / 4)
 
 
 def test_a_resumed_run_begins_at_its_time(monkeypatch):
-    world, pace = World(monkeypatch), RealTime(1.0)
-    let_go = world.advance(pace, world.run(Experiment(10.0, 0.25), made=20), [0.0, 0.0])
+    world, clock = World(monkeypatch), RealTime(1.0)
+    let_go = world.advance(clock, world.run(Experiment(10.0, 0.25), made=20), [0.0, 0.0])
     np.testing.assert_allclose(let_go, [0.0, 0.25, 0.5], atol=1e-9)
 
 
 def test_steps_shorter_than_a_millisecond_are_taken_together(monkeypatch):
-    world, pace = World(monkeypatch), RealTime(10.0)
+    world, clock = World(monkeypatch), RealTime(10.0)
     run = world.run(Experiment(0.05, 1e-3))
-    assert len(world.advance(pace, run, [0.0] * 50)) == 1 + 5
+    assert len(world.advance(clock, run, [0.0] * 50)) == 1 + 5
     run.made = 45
     run.time = run.experiment.time(45)
-    assert pace.act(run) == 50
+    assert clock.act(run) == 50
     run.made = 50
-    assert pace.act(run) == NEVER
+    assert clock.act(run) == NEVER
 
 
 def test_who_stops_a_run_does_not_wait(monkeypatch):
-    world, pace = World(monkeypatch), RealTime(1e-3)
+    world, clock = World(monkeypatch), RealTime(1e-3)
     run = world.run(Experiment(1.0, 0.5))
     run.time = 0.0
-    pace.act(run)
+    clock.act(run)
     run.made, run.time, run.interrupts = 1, 0.5, [2]
     before = world.now
-    pace.act(run)
+    clock.act(run)
     assert world.now == before
 
 
