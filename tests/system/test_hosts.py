@@ -1,4 +1,4 @@
-"""The bundle in other co-simulation tools; those that are not installed are skipped."""
+"""The bundle in other co-simulation tools; a tool that is not installed is skipped."""
 
 from __future__ import annotations
 
@@ -19,46 +19,43 @@ from orchestrator.machine.compiler import machines_compiler
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import PortName
+from orchestrator.system.structure import System
 
 LIBDIR = sysconfig.get_config_var("LIBDIR")
+
+
+def check(system: System, host: str, steps: int) -> None:
+    """Hold all Real outputs of a host against ours; without the host the test is skipped."""
+    if find_spec(HOSTS[host].package) is None:
+        pytest.skip(f"{HOSTS[host].package} is not installed")
+    [verdict] = compare(system, [host], steps, 0.02)
+    assert verdict.failure is None
+    assert verdict.deviation <= HOSTS[host].bound
 
 
 @pytest.mark.parametrize("scenario", ["fig4", "fig5-pd"])
 @pytest.mark.parametrize("host", HOSTS)
 def test_host_gives_the_numbers_of_our_jacobi_master(dist: Path, host: str, scenario: str):
     """Every Real output over 500 steps, to 1e-9; fmpy.ssp ignores parameters, so fig4 only."""
-    if find_spec(HOSTS[host].package) is None:
-        pytest.skip(f"{HOSTS[host].package} is not installed")
     if host == "c-program" and machines_compiler() is None:
         pytest.skip("there is no C compiler")
     if host == "fmpy-ssp" and scenario != "fig4":
         pytest.skip("fmpy.ssp ignores parameter sets")
-    system = closed_loop(dist, read_scenario(scenario))
-    [verdict] = compare(system, [host], 500, 0.02)
-    assert verdict.failure is None
-    assert verdict.deviation <= HOSTS[host].bound
+    check(closed_loop(dist, read_scenario(scenario)), host, 500)
 
 
 @pytest.mark.parametrize("host", ["libcosim-ssp", "ecos"])
 def test_text_in_a_parameter_set_reaches_its_component_without_a_connector(dist: Path, host: str):
     """The other saturation moves the vehicle by 19 cm in these steps."""
-    if find_spec(HOSTS[host].package) is None:
-        pytest.skip(f"{HOSTS[host].package} is not installed")
     system = closed_loop(dist).with_parameters({PortName("controller", "saturation"): "algebraic"})
     assert b'name="saturation"' not in structure_xml(system)
-    [verdict] = compare(system, [host], 300, 0.02)
-    assert verdict.failure is None
-    assert verdict.deviation <= HOSTS[host].bound
+    check(system, host, 300)
 
 
 @pytest.mark.parametrize("host", ["libcosim-ssp", "libcosim-osp"])
 def test_longer_steps_of_components_are_those_of_libcosim(dist: Path, host: str):
-    if find_spec(HOSTS[host].package) is None:
-        pytest.skip(f"{HOSTS[host].package} is not installed")
     system = replace(closed_loop(dist), steps={"controller": 0.06, "disturbance": 0.04})
-    [verdict] = compare(system, [host], 300, 0.02)
-    assert verdict.failure is None
-    assert verdict.deviation <= HOSTS[host].bound
+    check(system, host, 300)
 
 
 def test_missing_host_is_reported_and_does_not_end_the_others(dist: Path, monkeypatch):
