@@ -9,13 +9,13 @@ room                what it is for
 ==================  ==========================================================
 :mod:`.machine`     the operating system: errors, files, processes
 :mod:`.system`      what is simulated
-:mod:`.formats`     how it is written down: SSP, OSP, container, TOML
+:mod:`.formats`     how it is written down: SSP, OSP, container, tables, TOML
 :mod:`.master`      how it is stepped
 :mod:`.vehicle`     this vehicle's signals, indices and certificates
-:mod:`.figures`     figures of a run
+:mod:`.figures`     figures of runs and of studies
 :mod:`.runs`        scenarios, wiring, bundle, one run and its files
-:mod:`.studies`     many runs
 :mod:`.exchange`    other tools: hosts, verification of their tables
+:mod:`.studies`     many runs
 :mod:`.paper`       the paper's numbers and claims beside ours
 :mod:`.commands`    the command line
 ==================  ==========================================================
