@@ -200,7 +200,7 @@ def quick(here: Path) -> Iterator[None]:
         ):
             stack.enter_context(patch.object(what, name, instead))
         if STUDIES:
-            stack.enter_context(patch("orchestrator.studies.cluster.making", making))
+            stack.enter_context(patch("orchestrator.studies.sweep.making", making))
         yield
 
 

@@ -14,7 +14,8 @@ import pytest
 from orchestrator.machine import workers
 from orchestrator.machine.errors import InputError
 from orchestrator.studies import blocks as blocks_module
-from orchestrator.studies.blocks import FATAL, making
+from orchestrator.studies.blocks import FATAL
+from orchestrator.studies.sweep import making
 from support.toy_engine import Toy, expected, numbers_and_squares, run
 
 

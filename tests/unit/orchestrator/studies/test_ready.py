@@ -7,7 +7,8 @@ import pytest
 from orchestrator.runs.loading import loaded
 from orchestrator.studies.figure_entries import read_figures
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import BATCH, read_study, ready_studies
+from orchestrator.studies.study import read_study, ready_studies
+from orchestrator.studies.study_file import BATCH
 
 pytest.importorskip("scipy", reason="needs scipy: the extra `studies`")
 
