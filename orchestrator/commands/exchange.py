@@ -52,10 +52,7 @@ def add_export(parser: argparse.ArgumentParser) -> None:
         default="ssp",
         help="an SSP, libcosim's own folder, or one FMU (needs auv-fmu[hosts]); default: ssp",
     )
-    parser.add_argument(
-        "--step", type=float, metavar="S", help="communication step [s]; default: the scenario's"
-    )
-    add_options(parser, Request, "strict", "kind")
+    add_options(parser, Request, "step", "strict", "kind")
     add_fmi(parser)
     add_set(parser)
     add_out(parser, None, "exports/SCENARIO/")
