@@ -84,7 +84,7 @@ class Space:
             name: known.typed(name, value) for name, value in study.parameters.items()
         }
         self._has = {
-            name: known.those_of(system, (*study.parameters, *study.varied))
+            name: known.had_by(system, (*study.parameters, *study.varied))
             for name, (_, system) in systems.items()
         }
         self.prepared = {
@@ -184,7 +184,7 @@ class _Known:
         return system.component(target.component).variable(target.port)
 
     @staticmethod
-    def those_of(system: System, names: Iterable[str]) -> set[str]:
+    def had_by(system: System, names: Iterable[str]) -> set[str]:
         """The names of parameters that a system has."""
         return {name for name in names if name != STEP and system.has(port_name(name))}
 
