@@ -13,7 +13,7 @@ from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from support.compiled import library_of
-from support.runs import table_of
+from support.runs import run_table
 
 _SOURCE = Path(__file__).with_name("others.c")
 
@@ -104,4 +104,4 @@ def run(
     system: System, stop_time: float = 1.0, step: float = 0.1, order: str = "jacobi", **how: Any
 ) -> Table:
     """All rows of a run."""
-    return table_of(system, Experiment(stop_time, step, order), **how)
+    return run_table(system, Experiment(stop_time, step, order), **how)

@@ -25,7 +25,7 @@ from orchestrator.system.structure import System
 from orchestrator.vehicle.indices import metrics_of
 
 
-def table_of(
+def run_table(
     system: System,
     experiment: Experiment,
     loop: str = "python",
@@ -41,7 +41,7 @@ def table_of(
 
 def whole(system: System, experiment: Experiment, *args: Any, **how: Any) -> Table:
     """All rows of a run that comes to its end."""
-    table = table_of(system, experiment, *args, **how)
+    table = run_table(system, experiment, *args, **how)
     assert table.failure is None
     return table
 
@@ -54,7 +54,7 @@ def run(
     loop: str = "python",
 ) -> Table:
     """All rows of a run, by its times."""
-    return table_of(system, Experiment(stop_time, step, order), loop)
+    return run_table(system, Experiment(stop_time, step, order), loop)
 
 
 def system_of(fmus: Path, scenario: str) -> System:

@@ -29,7 +29,7 @@ from orchestrator.system.structure import System
 from orchestrator.system.units import Linear
 from support.machine import LOOPS
 from support.mixed import ACTS, CALLS, Shape, altered, system_of, systems
-from support.runs import table_of
+from support.runs import run_table
 
 #: Step [s].
 H = 0.5
@@ -53,7 +53,7 @@ def run(
     events: Sequence[Event] = (),
     isolation: Isolation | None = None,
 ) -> Table:
-    table = table_of(system, experiment, loop, isolation, [Events(events)])
+    table = run_table(system, experiment, loop, isolation, [Events(events)])
     assert table.header.loop == loop
     return table
 

@@ -23,7 +23,7 @@ class Definitions:
     units: Units = field(default_factory=dict)
     enumerations: Mapping[str, Items] = field(default_factory=dict)
 
-    def and_those_of(self, inner: Definitions) -> Definitions:
+    def with_inner(self, inner: Definitions) -> Definitions:
         """These definitions and another file's, which win."""
         return Definitions(
             {**self.units, **inner.units}, {**self.enumerations, **inner.enumerations}
