@@ -44,10 +44,11 @@ from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.machine import archives as unpacking
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.locks import _process_folder
-from orchestrator.master.experiment import ORDERS, Exchange, Experiment
+from orchestrator.master.experiment import ORDERS, Exchange
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.observer import Observer
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import Plan
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.scenario import FOLDER as SCENARIOS
 from orchestrator.runs.scenario import read_scenario
@@ -181,13 +182,10 @@ def _tell(observer: Observer, run: Table) -> None:
 
 
 def _replay(
-    runs: Mapping[str, Table],
-    _: object,
-    experiment: Experiment,
-    observers: Sequence[Observer],
-    __: Exchange,
+    runs: Mapping[str, Table], plan: Plan, observers: Sequence[Observer], _: Exchange
 ) -> None:
     """What `verify` meets instead of a new run."""
+    experiment = plan.experiment
     if experiment.stop_time > RECORDED + 1e-9:
         raise InputError("not recorded")
     for observer in observers:

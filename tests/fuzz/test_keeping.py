@@ -33,7 +33,6 @@ from orchestrator.commands import paper
 from orchestrator.commands.main import main
 from orchestrator.figures.drawing import figure_files
 from orchestrator.machine.ledger import LEDGER
-from orchestrator.machine.workers import Workers
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.paper import report
 from orchestrator.paper.sections import Section
@@ -164,13 +163,13 @@ def quick(here: Path) -> Iterator[None]:
         found = [*source.glob("*.fmu"), *source.glob(MANIFEST)]
         return [Path(shutil.copy(path, folder)) for path in found]
 
-    class Alone(Workers):
+    class Alone:
         def results(self, tasks, unit):
             return ((key, task()) for key, task in tasks.items())
 
     @contextmanager
-    def alone() -> Iterator[Workers]:
-        yield Alone(None, 1, None)
+    def alone() -> Iterator[Alone]:
+        yield Alone()
 
     def drawn(
         kind: str, title: str, runs: object, folder: Path, stem: str, **_: object

@@ -64,7 +64,7 @@ def straight(delayed: bool) -> Iterator[dict[str, Any]]:
     setting: Setting = PAPER
     law = LAWS[type(setting.controller)]
     gauss = plant.white_noise(setting.plant.noise.seed).gauss
-    vehicles, before, held, lost, fast = line.begin(setting), None, None, None, True
+    vehicles, before, held, lost, fast = line.vehicles_at_start(setting), None, None, None, True
     for k in range(STEPS + 1):
         if k == 60:
             current = setting.plant._replace(current=(0.3, 0.0, -0.1))
@@ -73,7 +73,7 @@ def straight(delayed: bool) -> Iterator[dict[str, Any]]:
         k_d = 40.0 if k in Span(60, 85) else PAPER.controller.k_d
         setting = setting._replace(controller=setting.controller._replace(k_d=k_d))
         parts = line.splits(setting, H)
-        gains = law.sampled(setting.controller, H / parts.controller)
+        gains = setting.controller
         seen = line.scene(setting, vehicles, k * H, tuple(gauss(0.0, 1.0) for _ in range(3)))
         if lost is None and seen.plant.nu[0] > 0.15 and not fast:
             lost = Span(k, k + 10)
@@ -87,7 +87,7 @@ def straight(delayed: bool) -> Iterator[dict[str, Any]]:
         held = measured.y
         if k in (0, 95):
             control = law.start(gains, measured)
-        control, signals = law.command(gains, control, measured)
+        control, signals = law.command(gains, control, measured, H)
         now = signals.tau, seen.tau_w
         told, tau_w = before if before and delayed else now
         before = now

@@ -45,7 +45,7 @@ def other() -> Iterator[int]:
 
 
 @pytest.fixture
-def shared(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def open_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder that everybody can write into, in which the cache is to be."""
     folder = Path(mkdtemp())
     folder.chmod(0o1777)
@@ -80,7 +80,7 @@ class Mark:
 
 
 @pytest.fixture
-def planted(shared: Path, other: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def planted(open_folder: Path, other: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A cache of another user's, with what it takes to be taken for ours; where marks are left."""
     mark = tmp_path / "mark"
     source = tmp_path / "planted.c"
@@ -90,39 +90,39 @@ def planted(shared: Path, other: int, tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setenv("XDG_CACHE_HOME", str(forged))
     keep("loop", stepper._key(), {"stepper.so": (tmp_path / "planted.so").read_bytes()})
     keep("batch", "0", {"kernel": pickle.dumps(Mark(mark))})
-    monkeypatch.setenv("XDG_CACHE_HOME", str(shared))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(open_folder))
     for path in (forged, *forged.rglob("*")):
         path.chmod(0o777)
 
     def plant() -> None:
         for folder in (forged / "auv-fmu").iterdir():
-            shutil.copytree(folder, shared / "auv-fmu" / folder.name)
+            shutil.copytree(folder, open_folder / "auv-fmu" / folder.name)
 
     # As it was made with umask 0, or by the other user.
-    (shared / "auv-fmu").mkdir()
-    (shared / "auv-fmu").chmod(0o777)
+    (open_folder / "auv-fmu").mkdir()
+    (open_folder / "auv-fmu").chmod(0o777)
     assert done_by(other, plant)
     shutil.rmtree(forged)
     return mark
 
 
 @pytest.mark.parametrize("owner", ["root", "other"])
-def test_what_another_user_has_put_into_the_cache_is_not_run(planted, shared, other, owner):
+def test_what_another_user_has_put_into_the_cache_is_not_run(planted, open_folder, other, owner):
     if owner == "other":
-        os.chown(shared / "auv-fmu", other, other)
+        os.chown(open_folder / "auv-fmu", other, other)
     status, said = called("run", "fig4", "--stop-time", "0.1", "--loop", "compiled")
     assert status == 0
     [line] = said
     assert line.startswith("auv-fmu: warning: nothing is kept for later, because ")
-    assert str(shared / "auv-fmu") in line
+    assert str(open_folder / "auv-fmu") in line
     assert not planted.exists()
     with pytest.warns(UserWarning, match="only you can write"):
         assert not kept("batch", "0")
 
 
-def test_once_the_folder_is_mended_files_of_another_user_are_not_run(planted, shared):
-    subprocess.run(["chmod", "-R", "go-w", shared / "auv-fmu"], check=True)
-    for folder in (shared / "auv-fmu").iterdir():
+def test_once_the_folder_is_mended_files_of_another_user_are_not_run(planted, open_folder):
+    subprocess.run(["chmod", "-R", "go-w", open_folder / "auv-fmu"], check=True)
+    for folder in (open_folder / "auv-fmu").iterdir():
         os.chown(folder, 0, 0)
     assert stepper.kept() is None
     assert not kept("batch", "0")
@@ -130,8 +130,8 @@ def test_once_the_folder_is_mended_files_of_another_user_are_not_run(planted, sh
     assert not planted.exists()
 
 
-def test_a_folder_cannot_be_made_before_us(shared, other):
-    assert done_by(other, lambda: (shared / "auv-fmu").mkdir(0o755))
+def test_a_folder_cannot_be_made_before_us(open_folder, other):
+    assert done_by(other, lambda: (open_folder / "auv-fmu").mkdir(0o755))
     with pytest.warns(UserWarning, match="only you can write"):
         [path] = keep("loop", "0", {"a": b""})
     assert path.is_relative_to(process_folder())
