@@ -16,7 +16,7 @@ import shutil
 import signal
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from contextlib import ExitStack, contextmanager, nullcontext, redirect_stderr, redirect_stdout
 from importlib.util import find_spec
 from io import StringIO
 from math import modf
@@ -41,6 +41,7 @@ from orchestrator.runs.bundle import MANIFEST, current_fmus
 from orchestrator.studies.engine import Engine, Outcome, Point
 from orchestrator.studies.store import Store
 from support.machine import contents, ended, forked
+from support.runs import InThisProcess
 
 #: Examples of each command; with the profile `attack` some hundred times as many.
 EXAMPLES = max(settings.default.max_examples // 10, 8)
@@ -163,14 +164,6 @@ def quick(here: Path) -> Iterator[None]:
         found = [*source.glob("*.fmu"), *source.glob(MANIFEST)]
         return [Path(shutil.copy(path, folder)) for path in found]
 
-    class Alone:
-        def results(self, tasks, unit):
-            return ((key, task()) for key, task in tasks.items())
-
-    @contextmanager
-    def alone() -> Iterator[Alone]:
-        yield Alone()
-
     def drawn(
         kind: str, title: str, runs: object, folder: Path, stem: str, **_: object
     ) -> list[str]:
@@ -192,7 +185,7 @@ def quick(here: Path) -> Iterator[None]:
             (own_controller, "run_fmus", copied),
             (run, "draw", drawn),
             (report, "draw_section", shown),
-            (report, "workers", alone),
+            (report, "workers", lambda: nullcontext(InThisProcess())),
             (report, "CLAIMS", ()),
             (report, "EFFECTS", ()),
             (paper, "names", lambda: ["fig3a"]),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,20 @@ from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.structure import System
 from orchestrator.vehicle.indices import metrics_of
+
+
+class InThisProcess:
+    """What :class:`orchestrator.machine.workers.Workers` does, one after the other, and counted."""
+
+    def __init__(self) -> None:
+        self.done: list[Any] = []
+
+    def results(
+        self, tasks: Mapping[Any, Callable[[], Any]], unit: str
+    ) -> Iterator[tuple[Any, Any]]:
+        for key, task in tasks.items():
+            self.done.append(key)
+            yield key, task()
 
 
 def run_table(

@@ -16,6 +16,7 @@ from orchestrator.paper.measures import approach_of
 from orchestrator.paper.printed_table import NUMBERS
 from orchestrator.paper.sensitivity import FARTHEST, PUBLISHED
 from orchestrator.paper.variants import all_variants
+from support.runs import InThisProcess
 
 pytest.importorskip("numba", reason="needs the extra `studies`")
 
@@ -29,12 +30,6 @@ def reduced(choice: Choice) -> Choice:
     return choice._replace(options=choice.options[: 2 if choice.name in TRIED else 1])
 
 
-class Here:
-    def results(self, tasks, unit):
-        for key, task in tasks.items():
-            yield key, task()
-
-
 #: Starts of five degrees of freedom that are compared, and others that are printed.
 SEARCHED, SHOWN = range(3), range(3, 6)
 
@@ -42,7 +37,7 @@ SEARCHED, SHOWN = range(3), range(3, 6)
 @pytest.fixture(scope="module")
 def found():
     six, five = ([reduced(choice) for choice in choices] for choices in (OF_RUNS, OF_RUNS_OF_FIVE))
-    return all_variants(Here(), six, five, SEARCHED, SHOWN)
+    return all_variants(InThisProcess(), six, five, SEARCHED, SHOWN)
 
 
 def test_ours_is_what_the_scenarios_give(found):

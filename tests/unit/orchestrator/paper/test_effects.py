@@ -9,20 +9,15 @@ from orchestrator.master.observers.table import Table
 from orchestrator.paper import effects
 from orchestrator.paper.effects import EFFECTS, LAMBDAS, NOISE_LEVELS, STEPS, show_effect
 from orchestrator.paper.kept_runs import KeptRun, KeptRuns
+from support.runs import InThisProcess
 from support.texts import tells
-
-
-class Here:
-    def results(self, tasks, unit):
-        for key, task in tasks.items():
-            yield key, task()
 
 
 @pytest.fixture(scope="module")
 def tables(tmp_path_factory) -> dict[str, list[Table]]:
     """Of some steps of the runs of each effect."""
     kept_runs = KeptRuns(tmp_path_factory.mktemp("runs"), stop_time=0.2)
-    kept_runs.make([run for effect in EFFECTS for run in effect.runs], Here())
+    kept_runs.make([run for effect in EFFECTS for run in effect.runs], InThisProcess())
     return {effect.name: [kept_runs[run].table for run in effect.runs] for effect in EFFECTS}
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -15,19 +12,7 @@ from orchestrator.paper.kept_runs import KeptRuns, key_of
 from orchestrator.paper.sections import companions
 from orchestrator.runs.preparation import prepared_of, with_companion
 from orchestrator.runs.request import Request
-
-
-class InThisProcess:
-    """Does what workers do, and counts."""
-
-    def __init__(self):
-        self.done = []
-
-    def results(self, tasks: Mapping[Any, Callable[[], Any]], unit: str) -> Iterator[Any]:
-        for key, task in tasks.items():
-            self.done.append(key)
-            yield key, task()
-
+from support.runs import InThisProcess
 
 QUIET = Request("fig4", {"plant.noise.std": 0.0})
 
