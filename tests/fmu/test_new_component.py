@@ -74,6 +74,8 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     left_out = [package.split(".")[1] for package in components().values() if package != OTHER]
     ignored = shutil.ignore_patterns("__pycache__", "dist", *left_out)
     shutil.copytree(ROOT / "fmus", tree / "fmus", ignore=ignored)
+    # Both packages come from one folder, as in any installation.
+    shutil.copytree(ROOT / "src/auv_fmu", tree / "auv_fmu", ignore=ignored)
     for name in READ:
         (tree / name).parent.mkdir(parents=True, exist_ok=True)
         copied = shutil.copytree if (ROOT / name).is_dir() else shutil.copyfile

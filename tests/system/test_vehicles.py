@@ -117,7 +117,7 @@ def test_names_of_components_may_have_dots():
     assert (certificates(found, loop) == certificates(flat)).all()
 
 
-def test_each_vehicle_is_drawn(results, capsys):
+def test_each_vehicle_is_drawn(results):
     names = {path.name for path in (results / "two").iterdir()}
     for name in ("plant", "tow"):
         figures = (
@@ -129,6 +129,10 @@ def test_each_vehicle_is_drawn(results, capsys):
     assert (
         len({(results / "two" / f"two-{name}.png").read_bytes() for name in ("plant", "tow")}) == 2
     )
+
+
+def test_each_vehicle_has_a_page(results, capsys):
+    pytest.importorskip("plotly")
     assert main(["view", str(results / "two")]) == 0
     pages = [results / "two" / f"view-{name}.html" for name in ("plant", "tow")]
     assert capsys.readouterr().out.split() == list(map(str, pages))
