@@ -22,7 +22,7 @@ _ROLLS = Port(
     "parameter",
     "fixed",
     "Boolean",
-    "Whether the vehicle rolls; if not, it is that of (1) and (2). Not in the paper",
+    "Whether the vehicle rolls; if not, it follows (1) and (2). Not in the paper",
     start=_ROLL.rolls,
 )
 _CURRENT = parameters(
@@ -36,7 +36,7 @@ _LAGS = parameters(
     "actuator.T",
     _DEFAULTS.T,
     LAG,
-    "Time constant of the actuator behind its limits, 0: none; not in the paper (Remark 2)",
+    "Time constant of the actuator after its limits, 0: none; not in the paper (Remark 2)",
     minimum=0.0,
 )
 _INTEGRATOR = Port(
@@ -60,7 +60,7 @@ PARAMETERS = ParameterSet(
             "righting.roll",
             _ROLL.righting_roll,
             "N.m",
-            "Righting moment in roll; the paper gives none, ours is that of pitch",
+            "Righting moment in roll; the paper gives none, ours is as in pitch",
         ),
         rolls=_ROLLS,
     ),

@@ -29,7 +29,7 @@ _COUNT = Port(
     "parameter",
     "fixed",
     "Integer",
-    "Number of waypoints; those behind them are not used",
+    "Number of waypoints; later ones are not used",
     start=_WAYPOINTS.n,
     minimum=2,
     maximum=MOST,

@@ -86,7 +86,7 @@ def described(fmu: Path, folder: Path, versions: Sequence[str]) -> Described:
         raise InputError(f"{fmu}: not a readable FMU: {reason(error)}") from error
     implementation = found.description.coSimulation
     if implementation is None:
-        raise InputError(f"{fmu}: is for model exchange alone; only co-simulation is supported")
+        raise InputError(f"{fmu}: is for model exchange only; only co-simulation is supported")
     if found.description.guid is None:
         raise InputError(f"{fmu}: not a readable FMU: its description has no guid")
     if not re.fullmatch(r"[^/\\]+", implementation.modelIdentifier or ""):

@@ -22,7 +22,7 @@ it, with a = (t - t_k) / T + 1/2 from 0 to 1,
 - Roundings may overlap: where many waypoints lie close together, they are what smooths the curve.
 
 A spline through the waypoints would meet them exactly, and swing out beside long legs, at a speed
-that nobody has chosen.
+that was not chosen.
 """
 
 from __future__ import annotations

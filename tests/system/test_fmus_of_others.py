@@ -218,7 +218,7 @@ def test_a_machine_for_which_there_is_no_library_is_named(tmp_path: Path, way):
     with pytest.raises(InputError) as error:
         run(system_of(fmu), **way)
     assert "a: plain.fmu has no others.so for this machine, linux64" in str(error.value)
-    assert str(error.value).endswith("it has binaries for win64 alone")
+    assert str(error.value).endswith("it has binaries for win64 only")
 
 
 def test_a_library_of_another_name_is_named(tmp_path: Path):

@@ -169,7 +169,7 @@ def check_binary(component: Component, folder: Path) -> None:
     others = sorted({path.parent.name for path in binaries.glob(f"*/{glob.escape(identifier)}.*")})
     named_otherwise = sorted(path.name for path in (binaries / fmpy.platform).glob(f"*{suffix}"))
     if others:
-        there = f"binaries for {', '.join(others)} alone"
+        there = f"binaries for {', '.join(others)} only"
     elif named_otherwise:
         there = f"{', '.join(named_otherwise)} instead"
     else:
