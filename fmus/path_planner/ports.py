@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from fmus.ports.groups import ParameterSet
-from fmus.ports.planners import reference
 from fmus.ports.port import POSITIVE, Port, parameter
-from fmus.ports.vehicle import CONTROL_POINT, LIMITS, VEHICLE
+from fmus.ports.vehicle import CONTROL_POINT, LIMITS, VEHICLE, reference
 
 DESCRIPTION = "Path planner: reference through waypoints with velocity and acceleration"
 
