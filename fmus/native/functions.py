@@ -127,7 +127,7 @@ def _comments(path: str) -> dict[int, str]:
 def _checked(path: str) -> ast.Module:
     """The tree of a module that is in the language."""
     for one in foreign(Path(path)):
-        raise Untranslatable(str(one))
+        raise Untranslatable(one)
     return ast.parse(Path(path).read_text(encoding="utf-8"))
 
 
