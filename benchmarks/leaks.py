@@ -24,7 +24,7 @@ import fmpy
 from fmpy.fmi2 import FMU2Slave
 from pythonfmu import FmuBuilder
 
-from fmus.python.loader import compiler
+from fmus.python.packaging import loader_compiler
 from orchestrator.runs import bundle
 
 _PAGE = os.sysconf("SC_PAGE_SIZE")
@@ -113,7 +113,7 @@ def main() -> None:
     with TemporaryDirectory(prefix="auvfmu") as temporary:
         host = Path(temporary, "cycles")
         source = Path(__file__).with_name("cycles.c")
-        subprocess.run([str(compiler()), "-O2", "-o", host, source, "-ldl"], check=True)
+        subprocess.run([str(loader_compiler()), "-O2", "-o", host, source, "-ldl"], check=True)
         for name, folder in rows(Path(temporary)):
             if options.only not in name:
                 continue

@@ -5,8 +5,7 @@ module                 what it states
 ====================== ======================================================================
 :mod:`.ports`          what a port is, the groups that ports come in, a behaviour's hooks
 :mod:`.kinds`          kinds of FMU, versions of FMI, platforms that there can be libraries for
-:mod:`.discovery`      which components there are, and what FMUs are made from
-:mod:`.archive`        FMU files: reproducible archives, and the licences in them
+:mod:`.discovery`      which components there are, what FMUs are made from, their archives
 :mod:`.documentation`  the page of each component
 :mod:`.compilers`      what makes libraries
 :mod:`.python`         the Python kind of FMU, on PythonFMU

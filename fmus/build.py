@@ -10,9 +10,8 @@ import argparse
 import hashlib
 import json
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from fmus.compilers import compiler_for
 from fmus.discovery import components, fingerprint
@@ -24,27 +23,7 @@ from fmus.python.packaging import LOADERS, PythonKind, best_loader
 MANIFEST = "build.json"
 
 
-class Kind(Protocol):
-    """How FMUs of one kind are built."""
-
-    @property
-    def name(self) -> str:
-        """One of :data:`fmus.kinds.KINDS`."""
-
-    @property
-    def settings(self) -> Mapping[str, str]:
-        """What they depend on besides their sources."""
-
-    def write(self, component: str, package: str, path: Path) -> None:
-        """Write the FMU of a component, whose folder is a package.
-
-        Raises:
-            OSError: it cannot be built or written.
-
-        """
-
-
-def build(destination: Path, kind: Kind) -> list[Path]:
+def build(destination: Path, kind: PythonKind | NativeKind) -> list[Path]:
     """Bring a folder of FMUs up to date.
 
     Returns:
@@ -56,7 +35,7 @@ def build(destination: Path, kind: Kind) -> list[Path]:
     """
     destination.mkdir(parents=True, exist_ok=True)
     manifest = destination / MANIFEST
-    made_from = {"fingerprint": fingerprint(kind.name), "settings": dict(kind.settings)}
+    made_from = {"fingerprint": fingerprint(kind.name), "settings": kind.settings}
     before = built_before(manifest)
     current = {key: before.get(key) for key in made_from} == made_from
     digests = before["sha256"] if current else {}
@@ -114,7 +93,7 @@ def main() -> int:
     return 0
 
 
-def _kind(options: argparse.Namespace) -> Kind:
+def _kind(options: argparse.Namespace) -> PythonKind | NativeKind:
     """The kind that the options ask for.
 
     Raises:

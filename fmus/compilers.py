@@ -74,7 +74,7 @@ def machines_compiler() -> str | None:
 
 
 def run_compiler(
-    command: Sequence[str], folder: Path | None, limit: float = 120.0
+    command: Sequence[str], folder: Path | None, limit: float = _LIMIT
 ) -> subprocess.CompletedProcess[str]:
     """Run a C compiler, and end it with all that it has started if it takes too long.
 

@@ -1,17 +1,21 @@
-"""What there is to build FMUs from: every folder that declares ports, and all that they need."""
+"""What FMUs are made from: component folders and all that they need. What they become: archives."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+import uuid
+import zipfile
+from collections.abc import Mapping, Sequence
 from importlib import import_module
-from importlib.metadata import version
+from importlib.metadata import distribution, version
 from importlib.util import find_spec
 from pathlib import Path
 
-from fmus.archive import licences
 from fmus.kinds import CONTAINED
 from fmus.ports.port import Port
+
+#: The oldest time a zip archive can hold: the time of a build is no part of its result.
+_EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 def package_folder(package: str) -> Path:
@@ -38,6 +42,15 @@ def ports_of(name: str) -> Sequence[Port]:
     return ports
 
 
+def licences(kind: str) -> str:
+    """Licence of the bundle, and of what else FMUs of a kind contain."""
+    heads = {"auv-fmu": "auv-fmu", "pythonfmu": "PythonFMU, contained in resources and binaries"}
+    return "\n\n".join(
+        f"{heads[package]}\n\n{distribution(package).read_text('licenses/LICENSE') or ''}"
+        for package in ("auv-fmu", *CONTAINED[kind])
+    )
+
+
 def fingerprint(kind: str) -> str:
     """Hash of everything installed that FMUs of a kind depend on, except a C compiler."""
     digest = hashlib.sha256()
@@ -52,3 +65,33 @@ def fingerprint(kind: str) -> str:
     for text in (licences(kind), version("markdown-it-py")):
         digest.update(text.encode())
     return digest.hexdigest()
+
+
+def write_archive(path: Path, entries: dict[str, bytes]) -> None:
+    """Write a zip archive whose bytes depend on nothing but its entries, all at once."""
+    partial = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+    try:
+        with zipfile.ZipFile(partial, "w") as archive:
+            for name in sorted(entries):
+                info = zipfile.ZipInfo(name, _EPOCH)
+                info.compress_type = zipfile.ZIP_DEFLATED
+                info.create_system = 3
+                info.external_attr = 0o644 << 16
+                archive.writestr(info, entries[name], compresslevel=9)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def digest_of(contents: Mapping[str, bytes]) -> bytes:
+    """What tells contents from all others."""
+    digest = hashlib.sha256()
+    for name in sorted(contents):
+        digest.update(f"{name}\0{len(contents[name])}\0".encode())
+        digest.update(contents[name])
+    return digest.digest()
+
+
+def guid_of(digest: bytes) -> str:
+    """A GUID made from a digest."""
+    return f"{{{uuid.UUID(bytes=digest[:16])}}}"

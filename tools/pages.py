@@ -24,7 +24,7 @@ from pydantic.json_schema import GenerateJsonSchema
 from auv_fmu.control_point import ELL
 from auv_fmu.output_feedback import Gains
 from auv_fmu.proof.attraction import Theorem, ball, theorem
-from auv_fmu.proof.zetas import at_least, coupling
+from auv_fmu.proof.gain_conditions import at_least, coupling
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from auv_fmu.vehicle import Vehicle
 from fmus.discovery import components

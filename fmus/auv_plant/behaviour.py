@@ -8,7 +8,7 @@ from auv_fmu import plant
 from auv_fmu.actuators import limit
 from auv_fmu.attitude import rotation_from_quaternion
 from auv_fmu.plant import Parameters, PlantState
-from auv_fmu.types import Rotation, Vector3, Vector6
+from auv_fmu.vectors import Rotation, Vector3, Vector6
 from fmus.ports.port import Refusal
 
 #: By how much the square of the length of a normalised quaternion is off.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from auv_fmu.plant import ETA_0, INTEGRATORS, NU_0, Localisation, Parameters, RollAxis
 from fmus.ports.groups import ParameterSet
-from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters
+from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters, setting
 from fmus.ports.quantities import ETA, LAG, NU, POSITION, TAU, TAU_W, VELOCITY
 from fmus.ports.vehicle import CONTROL_POINT, LIMITS, VEHICLE
 
@@ -17,13 +17,10 @@ _FARTHEST = 1e6
 
 _COMMAND = inputs("tau", TAU, "Commanded force and moments")
 
-_ROLLS = Port(
+_ROLLS = setting(
     "roll",
-    "parameter",
-    "fixed",
-    "Boolean",
+    _ROLL.rolls,
     "Whether the vehicle rolls; if not, it follows (1) and (2). Not in the paper",
-    start=_ROLL.rolls,
 )
 _CURRENT = parameters(
     "current",
@@ -39,14 +36,11 @@ _LAGS = parameters(
     "Time constant of the actuator after its limits, 0: none; not in the paper (Remark 2)",
     minimum=0.0,
 )
-_INTEGRATOR = Port(
+_INTEGRATOR = setting(
     "integrator",
-    "parameter",
-    "fixed",
-    "String",
+    "euler",
     "Scheme that integrates (1) and (2): euler, as in the paper, or rk4",
-    start="euler",
-    choices=INTEGRATORS,
+    INTEGRATORS,
 )
 
 PARAMETERS = ParameterSet(
@@ -78,14 +72,7 @@ PARAMETERS = ParameterSet(
             minimum=0.0,
             maximum=_FARTHEST,
         ),
-        seed=Port(
-            "noise.seed",
-            "parameter",
-            "fixed",
-            "Integer",
-            "Seed of the noise",
-            start=_LOCALISATION.seed,
-        ),
+        seed=setting("noise.seed", _LOCALISATION.seed, "Seed of the noise"),
     ),
     current=_CURRENT,
     T=_LAGS,

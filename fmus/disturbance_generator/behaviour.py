@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple, TypedDict
 
 from auv_fmu.disturbance import Disturbance, disturbance
-from auv_fmu.types import Vector6
+from auv_fmu.vectors import Vector6
 from fmus.ports.groups import Nothing
 
 

@@ -6,7 +6,7 @@ from typing import TypedDict
 
 from auv_fmu import motion_planner
 from auv_fmu.motion_planner import Motion, Parameters, PlannerState
-from auv_fmu.types import Vector3, Vector5
+from auv_fmu.vectors import Vector3, Vector5
 
 
 class Outputs(TypedDict):

@@ -10,8 +10,18 @@ from collections.abc import Callable
 from types import FunctionType, ModuleType
 from typing import Any, NamedTuple
 
-from fmus.native.program import Function, Program, Untranslatable, c_name
-from fmus.native.shapes import DOUBLE, INTEGER, TEXT, Shape, Structure, structure
+from fmus.native.program import (
+    DOUBLE,
+    INTEGER,
+    TEXT,
+    Function,
+    Program,
+    Shape,
+    Structure,
+    Untranslatable,
+    c_name,
+    structure,
+)
 
 #: How tightly the operators of C bind.
 _TERNARY, _OR, _AND, _EQUALITY, _RELATION, _SUM, _PRODUCT, _UNARY, _POSTFIX = range(9)

@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
+from operator import itemgetter
 from pathlib import Path
-from typing import Any, NamedTuple
 
 #: Functions of `math` that equations may use.
 MATHEMATICS = frozenset(
@@ -38,23 +38,13 @@ _CONSTANTS = (float, int, bool)
 _MODULE_LEVEL = (ast.Import, ast.ImportFrom, ast.Assign, ast.AnnAssign)
 
 
-class Foreign(NamedTuple):
-    """Something that is not in the language."""
-
-    path: Path
-    line: int
-    what: str
-
-    def __str__(self) -> str:
-        """One line that an editor can jump to."""
-        return f"{self.path}:{self.line}: {self.what} is not in the language of equations"
-
-
-def foreign(path: Path) -> list[Foreign]:
-    """What is outside the language in a module, in the order of its lines."""
+def foreign(path: Path) -> list[str]:
+    """What is outside the language in a module: one line each that an editor can jump to."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    found = [Foreign(path, line, what) for line, what in _module(tree, path.stem)]
-    return sorted(found, key=lambda one: one.line)
+    return [
+        f"{path}:{line}: {what} is not in the language of equations"
+        for line, what in sorted(_module(tree, path.stem), key=itemgetter(0))
+    ]
 
 
 _Found = Iterator["tuple[int, str]"]
@@ -159,32 +149,19 @@ def _raised(node: ast.Raise) -> _Found:
 
 
 #: What expressions consist of.
-_PARTS: dict[type[ast.expr], Callable[[Any], Sequence[ast.expr]]] = {
-    ast.Constant: lambda node: (),
-    ast.Name: lambda node: (),
-    ast.BinOp: lambda node: (node.left, node.right),
-    ast.UnaryOp: lambda node: (node.operand,),
-    ast.BoolOp: lambda node: node.values,
-    ast.Compare: lambda node: (node.left, *node.comparators),
-    ast.IfExp: lambda node: (node.test, node.body, node.orelse),
-    ast.Tuple: lambda node: node.elts,
-    ast.Dict: lambda node: node.values,
-    ast.Attribute: lambda node: (node.value,),
-    ast.Starred: lambda node: (node.value,),
-    ast.Subscript: lambda node: (node.value, node.slice),
-    ast.Call: lambda node: (node.func, *node.args),
-}
+_EXPRESSIONS = (
+    ast.Constant, ast.Name, ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.Compare, ast.IfExp, ast.Tuple,
+    ast.Dict, ast.Attribute, ast.Starred, ast.Subscript, ast.Call,
+)  # fmt: skip
 
 
 def _expression(node: ast.expr) -> _Found:
-    if type(node) not in _PARTS:
-        yield node.lineno, _kind(node)
-        return
-    wrong = _wrong(node)
+    wrong = _wrong(node) if isinstance(node, _EXPRESSIONS) else _kind(node)
     if wrong:
         yield node.lineno, wrong
-    for part in _PARTS[type(node)](node):
-        yield from _expression(part)
+    for part in ast.iter_child_nodes(node):
+        if isinstance(part, ast.expr) and isinstance(node, _EXPRESSIONS):
+            yield from _expression(part)
 
 
 def _wrong(node: ast.expr) -> str | None:

@@ -2,56 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
 
-from fmus import documentation, native
-from fmus.archive import digest_of, guid_of, licences, write_archive
+from fmus import documentation
 from fmus.compilers import Compiler, library
-from fmus.kinds import NATIVE, Platform
-from fmus.ports import description_fmi2, description_fmi3
+from fmus.discovery import digest_of, guid_of, licences, write_archive
+from fmus.kinds import FMI_VERSIONS, NATIVE, Platform
+from fmus.native.translator import tables, translated
+from fmus.ports import description, description_fmi3
 from fmus.ports.port import Port
-from fmus.ports.terminals import terminals_and_icons
 
-Ports = Sequence[Port]
+_FOLDER = Path(__file__).parent
 
-_PICTURES = Path(__file__).parent
+#: What is the same for all components.
+RUNTIME = _FOLDER / "runtime"
 
+#: The file to compile, by the version of FMI: it includes all others.
+MAIN = dict(zip(FMI_VERSIONS, (description.SOURCE, description_fmi3.SOURCE)))
 
-def _fmi2_files(name: str, ports: Ports) -> dict[str, bytes]:
-    return {"model.png": documentation.ICON.read_bytes()}
-
-
-def _fmi3_files(name: str, ports: Ports) -> dict[str, bytes]:
-    folder = "terminalsAndIcons"
-    return {
-        "sources/buildDescription.xml": description_fmi3.fmi3_build_description(name),
-        f"{folder}/terminalsAndIcons.xml": terminals_and_icons(ports),
-        f"{folder}/icon.png": documentation.ICON.read_bytes(),
-        f"{folder}/terminal.png": (_PICTURES / "terminal.png").read_bytes(),
-    }
-
-
-class Version(NamedTuple):
-    """A version of FMI.
-
-    Attributes:
-        describe: writes modelDescription.xml.
-        files: that an FMU of this version has besides, from its name and ports.
-
-    """
-
-    describe: Callable[[str, str, str, Ports], bytes]
-    files: Callable[[str, Ports], dict[str, bytes]]
-
-
-_VERSIONS = {
-    "2": Version(description_fmi2.fmi2_description, _fmi2_files),
-    "3": Version(description_fmi3.fmi3_description, _fmi3_files),
-}
+_DESCRIBE = dict(
+    zip(FMI_VERSIONS, (description.fmi2_description, description_fmi3.fmi3_description))
+)
 
 _IDENTITY = """\
 /* Which FMU this is. */
@@ -63,6 +37,39 @@ _IDENTITY = """\
 
 #endif
 """
+
+
+def _pictures(name: str, ports: Sequence[Port], fmi: str) -> dict[str, bytes]:
+    """What a version of FMI has besides, nearly all of it to be drawn."""
+    icon = documentation.ICON.read_bytes()
+    if fmi == FMI_VERSIONS[0]:
+        return {"model.png": icon}
+    return {
+        "sources/buildDescription.xml": description_fmi3.fmi3_build_description(name),
+        "terminalsAndIcons/terminalsAndIcons.xml": description_fmi3.terminals_and_icons(ports),
+        "terminalsAndIcons/icon.png": icon,
+        "terminalsAndIcons/terminal.png": (_FOLDER / "terminal.png").read_bytes(),
+    }
+
+
+def sources(package: str, fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:
+    """The C sources of a component by their names, all but identity.h.
+
+    Args:
+        package: of the component, for example `fmus.auv_plant`.
+        fmi: version of FMI.
+
+    """
+    others = {name for version, name in MAIN.items() if version != fmi}
+    return {
+        **{
+            path.name: path.read_text(encoding="utf-8")
+            for path in sorted(RUNTIME.glob("*.[ch]"))
+            if path.name not in others
+        },
+        "equations.c": translated(package),
+        "ports.h": tables(package),
+    }
 
 
 def fmu_entries(
@@ -84,26 +91,22 @@ def fmu_entries(
 
     """
     declared = import_module(f"{package}.ports")
-    version = _VERSIONS[fmi]
-    written = native.sources(package, fmi)
-    sources = {name: content.encode() for name, content in written.items()}
+    written = {name: content.encode() for name, content in sources(package, fmi).items()}
 
-    def description(guid: str) -> bytes:
-        return version.describe(component, declared.DESCRIPTION, guid, declared.PORTS)
+    def described(guid: str) -> bytes:
+        return _DESCRIBE[fmi](component, declared.DESCRIPTION, guid, declared.PORTS)
 
-    guid = guid_of(digest_of({**sources, "modelDescription.xml": description("")}))
-    identity = _IDENTITY.format(name=component, guid=guid)
-    sources["identity.h"] = identity.encode()
-    page = documentation.html(component, NATIVE, fmi)
+    guid = guid_of(digest_of({**written, "modelDescription.xml": described("")}))
+    written["identity.h"] = _IDENTITY.format(name=component, guid=guid).encode()
     return {
-        "modelDescription.xml": description(guid),
-        **version.files(component, declared.PORTS),
-        "documentation/index.html": page.encode(),
+        "modelDescription.xml": described(guid),
+        **_pictures(component, declared.PORTS, fmi),
+        "documentation/index.html": documentation.html(component, NATIVE, fmi).encode(),
         "documentation/licenses/license.txt": licences(NATIVE).encode(),
-        **{f"sources/{name}": content for name, content in sources.items()},
+        **{f"sources/{name}": content for name, content in written.items()},
         **{
             f"binaries/{platform.name}/{component}{platform.ending}": library(
-                compiler, platform, component, sources, native.MAIN[fmi]
+                compiler, platform, component, written, MAIN[fmi]
             )
             for platform in platforms
         },

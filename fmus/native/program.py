@@ -1,13 +1,131 @@
-"""All that a set of functions needs in C: structures, constants and functions."""
+"""What a set of functions needs in C: the shapes of its types, structures, constants, functions.
+
+A shape is what a type is in C: a number, or a structure of them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import inspect
+import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import FunctionType
-from typing import Any
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
-from fmus.native.shapes import DOUBLE, INTEGER, Shape, declaration, inner, shape_of, structure
+from auv_fmu import vectors
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A number, or a text of a refusal."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A tuple: an array `v` where its elements are alike, else one member an element.
+
+    Attributes:
+        name: of the structure in C.
+        parts: how each element is written after a name, and its shape.
+        made: the NamedTuple or TypedDict; None: a plain tuple.
+
+    """
+
+    name: str
+    parts: tuple[tuple[str, Shape], ...]
+    made: Any = None
+
+    @property
+    def is_array(self) -> bool:
+        """Whether its elements stand in an array."""
+        return bool(self.parts) and self.parts[0][0] == ".v[0]"
+
+
+Shape = Union[Scalar, Structure]
+
+DOUBLE, INTEGER, TEXT = Scalar("double"), Scalar("int"), Scalar("const char *")
+
+_SCALARS = {float: DOUBLE, int: INTEGER, bool: INTEGER, str: TEXT}
+
+#: Names of tuples that the equations have given them.
+_NAMES = {kind: name for name, kind in vars(vectors).items() if get_origin(kind) is tuple}
+
+
+def shape_of(kind: Any) -> Shape:
+    """What a type is in C.
+
+    Raises:
+        TypeError: it is nothing there.
+
+    """
+    if kind in _SCALARS:
+        return _SCALARS[kind]
+    if get_origin(kind) is tuple:
+        return structure([shape_of(k) for k in get_args(kind)], _NAMES.get(kind))
+    if isinstance(kind, type) and hasattr(kind, "__annotations__"):
+        hints = get_type_hints(kind)
+        parts = tuple((f".{name}", shape_of(hint)) for name, hint in hints.items())
+        return Structure(kind.__name__, parts, kind)
+    raise TypeError(f"{kind} is no type of the language of equations")
+
+
+def structure(items: list[Shape], name: str | None = None) -> Structure:
+    """The structure of a plain tuple."""
+    if all(item == items[0] for item in items):
+        first = items[0]
+        own = f"Vector{len(items)}" if first == DOUBLE else f"{first.name}x{len(items)}"
+        return Structure(name or own, tuple((f".v[{i}]", item) for i, item in enumerate(items)))
+    joined = "_".join(item.name for item in items)
+    return Structure(name or joined, tuple((f".m{i}", item) for i, item in enumerate(items)))
+
+
+def numbers(shape: Shape) -> int:
+    """How many numbers a shape holds.
+
+    Raises:
+        TypeError: some of them are not doubles.
+
+    """
+    if isinstance(shape, Structure):
+        return sum(numbers(part) for _, part in shape.parts)
+    if shape != DOUBLE:
+        raise TypeError(f"{shape.name} among numbers")
+    return 1
+
+
+def inner(shape: Shape) -> Iterator[Structure]:
+    """The structures that a structure needs, and itself after them."""
+    if isinstance(shape, Structure):
+        for _, part in shape.parts:
+            yield from inner(part)
+        yield shape
+
+
+def declaration(shape: Structure) -> str:
+    """The definition of a structure, with the comments of a class."""
+    about = _comments(shape.made)
+    members = [f"{part.name} {suffix[1:]};{about.get(suffix, '')}" for suffix, part in shape.parts]
+    if shape.is_array:
+        members = [f"{shape.parts[0][1].name} v[{len(members)}];"]
+    lines = [f"    {line}" for line in members or ["char nothing; /* C has no empty structure */"]]
+    text = inspect.cleandoc(shape.made.__doc__).splitlines()[0] if shape.made else ""
+    head = f"/* {plain(text)} */\n" if text else ""
+    return head + "\n".join(["typedef struct {", *lines, f"}} {shape.name};"])
+
+
+def _comments(made: Any) -> dict[str, str]:
+    """What `#:` says of the fields of a class, as comments."""
+    if made is None:
+        return {}
+    found = re.findall(r"^    (\w+):.*#: (.*)$", inspect.getsource(made), re.MULTILINE)
+    return {f".{name}": f" /* {plain(text)} */" for name, text in found}
+
+
+def plain(text: str) -> str:
+    """A text without the marks that Sphinx reads."""
+    return re.sub(r"(?::\w+:)?`+[~.]?([^`]*)`+", r"\1", text).replace("*/", "* /")
 
 
 class Untranslatable(Exception):

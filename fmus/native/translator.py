@@ -1,15 +1,16 @@
-"""The equations of a component in C, from the text that its Python kind runs."""
+"""The C sources of a component: its equations, translated, and its ports, as tables."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import import_module
 
-from fmus.native.functions import function_in_c
-from fmus.native.layout import laid_out
-from fmus.native.program import Function, Program
-from fmus.native.shapes import Structure, numbers
+from auv_fmu import euler
+from fmus.native.functions import function_in_c, laid_out
+from fmus.native.program import Function, Program, Structure, numbers
 from fmus.ports.behaviour import Behaviour, read_behaviour
+from fmus.ports.port import FAULT, H_MAX, Port, Value
 
 _HEAD = """\
 /* {title}
@@ -52,10 +53,9 @@ def translated(package: str) -> str:
     """
     behaviour = read_behaviour(import_module(f"{package}.behaviour"))
     program = Program(function_in_c)
-    glue = _Glue(program, behaviour).text()
-    title = import_module(f"{package}.ports").DESCRIPTION
+    glue = _glue(program, behaviour)
     sections = [
-        _HEAD.format(title=title),
+        _HEAD.format(title=import_module(f"{package}.ports").DESCRIPTION),
         *program.structures.values(),
         *program.constants.values(),
         *(function.text for function in program.functions.values()),
@@ -64,121 +64,185 @@ def translated(package: str) -> str:
     return "\n\n".join(sections) + "\n"
 
 
-class _Glue:
-    """The functions `model_...`, in which the component finds a behaviour's functions."""
-
-    def __init__(self, program: Program, behaviour: Behaviour) -> None:
-        self._program, self._behaviour = program, behaviour
-
-    def text(self) -> str:
-        """All of them, also those for what this component has not."""
-        parts = [self._begin(), self._advance(), *self._others()]
-        return "\n\n".join(["/* What the component calls. */", self._types(), *parts])
-
-    def _function(self, name: str) -> Function | None:
-        hook = self._behaviour.hooks[name]
-        return None if hook is None else self._program.function(hook)
-
-    def _called(self, function: Function) -> str:
-        return function.call([_GIVEN.get(name, name) for name in function.arguments])
-
-    def _types(self) -> str:
-        shape, said = self._program.shape, self._behaviour
-        state, inputs = shape(said.state), shape(said.inputs)
-        parameters, outputs = shape(said.parameters), shape(said.outputs)
-        derived = f"    {shape(said.derived).name} derived;\n" if self._derives else ""
-        return (
-            f"typedef {parameters.name} model_parameters;\n"
-            f"typedef {inputs.name} model_inputs;\n"
-            f"typedef {outputs.name} model_outputs;\n"
-            f"typedef struct {{\n    {state.name} state;\n{derived}}} model_state;\n\n"
-            f"enum {{ MODEL_INPUTS = {numbers(inputs)}, MODEL_OUTPUTS = {numbers(outputs)}, "
-            f"MODEL_STATE = {numbers(state)} }};"
-        )
-
-    @property
-    def _derives(self) -> bool:
-        return self._behaviour.derived is not None
-
-    def _begin(self) -> str:
-        return self._moved("begin", f"{_P}, {_I}, double t, {_S}, {_O}, {_E}")
-
-    def _advance(self) -> str:
-        arguments = f"{_P}, {_S}, {_I}, double t, double h, int n, {_O}, {_E}"
-        return self._moved("advance", arguments)
-
-    def _moved(self, name: str, arguments: str) -> str:
-        """A function that gives state and outputs."""
-        function = self._function(name)
-        assert function is not None and isinstance(function.returns, Structure)
-        names = ["state->state", *(["state->derived"] if self._derives else []), "*outputs"]
-        parts = [suffix for suffix, _ in function.returns.parts]
-        stores = [f"{name} = result{part};" for name, part in zip(names, parts)]
-        result = f"const {function.returns.name} result = {self._called(function)};"
-        return _defined("void", f"model_{name}", arguments, [result, *stores])
-
-    def _others(self) -> list[str]:
-        derive, expected = self._function("derive"), self._function("expected")
-        credible, restarted = self._function("credible"), self._function("restarted")
-        check, seed, measured = map(self._function, ("check", "seed", "measured"))
-        draws = self._behaviour.draws
-        said = self._behaviour.restarted.replace("{t:g}", "%g")
-        restart = [f"state->state = {self._called(restarted)};"] if restarted else []
-        if restart and derive:
-            restart.append(f"state->derived = {self._called(derive)};")
-        check_call = [f"{self._called(check)};"] if check else []
-        derived = [f"state->derived = {self._called(derive)};"] if derive else []
-        return [
-            f"enum {{ MODEL_EXPECTS = {int(bool(expected))}, MODEL_DRAWS = {draws} }};\n"
-            f'#define MODEL_RESTARTED "{said}"',
-            _defined("void", "model_check", f"{_P}, {_E}", check_call),
-            _defined("void", "model_derive", f"{_P}, {_S}, {_E}", derived),
-            _defined(
-                "void",
-                "model_expected",
-                f"{_P}, const {_S}, const {_O}, model_outputs *expected, {_E}",
-                [f"*expected = {self._called(expected) if expected else '*outputs'};"],
-            ),
-            _defined(
-                "int",
-                "model_credible",
-                f"{_P}, const {_S}, {_I}, {_E}",
-                [f"return {self._called(credible) if credible else 1};"],
-            ),
-            _defined("void", "model_restart", f"{_P}, {_S}, {_I}, {_E}", restart),
-            _defined(
-                "unsigned long",
-                "model_seed",
-                _P,
-                # A negative seed is the number 2^32 above it.
-                [f"return (unsigned int){self._called(seed) if seed else 0};"],
-            ),
-            self._measure(measured, draws),
-        ]
-
-    def _measure(self, measured: Function | None, draws: int) -> str:
-        arguments = f"{_P}, const double draws[], {_O}"
-        if measured is None:
-            return _defined("void", "model_measure", arguments, [])
-        group = f"outputs->{self._behaviour.noisy}"
-        drawn = ", ".join(f"draws[{i}]" for i in range(draws))
-        n = f"({measured.arguments['n'].name}){{{{{drawn}}}}}"
-        given = {**_GIVEN, "n": n, self._behaviour.noisy: group}
-        call = measured.call([given[name] for name in measured.arguments])
-        return _defined("void", "model_measure", arguments, [f"{group} = {call};"])
+def _glue(program: Program, said: Behaviour) -> str:
+    """The functions `model_...`, in which the component finds all hooks, also those it has not."""
+    functions = {name: program.function(hook) for name, hook in said.hooks.items() if hook}
+    calls = {
+        name: function.call([_GIVEN.get(argument, argument) for argument in function.arguments])
+        for name, function in functions.items()
+    }
+    derive = [f"state->derived = {calls['derive']};"] if said.derived else []
+    restart = [f"state->state = {calls['restarted']};", *derive] if said.restarted else []
+    steps = f"{_P}, {_S}, {_I}, double t, double h, int n, {_O}, {_E}"
+    expects = f"{_P}, const {_S}, const {_O}, model_outputs *expected, {_E}"
+    expected = [f"*expected = {calls.get('expected', '*outputs')};"]
+    # A negative seed is the number 2^32 above it.
+    seed = [f"return (unsigned int){calls.get('seed', 0)};"]
+    restarted = said.restarted.replace("{t:g}", "%g")
+    parts = [
+        "/* What the component calls. */",
+        _types(program, said),
+        f"enum {{ MODEL_EXPECTS = {int('expected' in calls)}, MODEL_DRAWS = {said.draws} }};\n"
+        f'#define MODEL_RESTARTED "{restarted}"',
+        _defined(
+            "void begin",
+            f"{_P}, {_I}, double t, {_S}, {_O}, {_E}",
+            _moved(said, functions["begin"], calls["begin"]),
+        ),
+        _defined("void advance", steps, _moved(said, functions["advance"], calls["advance"])),
+        _defined("void check", f"{_P}, {_E}", [f"{calls['check']};"] if "check" in calls else []),
+        _defined("void derive", f"{_P}, {_S}, {_E}", derive),
+        _defined("void expected", expects, expected),
+        _defined(
+            "int credible", f"{_P}, const {_S}, {_I}, {_E}", [f"return {calls.get('credible', 1)};"]
+        ),
+        _defined("void restart", f"{_P}, {_S}, {_I}, {_E}", restart),
+        _defined("unsigned long seed", _P, seed),
+        _defined(
+            "void measure",
+            f"{_P}, const double draws[], {_O}",
+            _measured(said, functions["measured"]) if said.noisy else [],
+        ),
+    ]
+    return "\n\n".join(parts)
 
 
-def _defined(returns: str, name: str, arguments: str, body: list[str]) -> str:
-    """A function; arguments that it does not use are marked so."""
+def _types(program: Program, said: Behaviour) -> str:
+    types = (said.parameters, said.inputs, said.outputs, said.state)
+    parameters, inputs, outputs, state = map(program.shape, types)
+    derived = f"    {program.shape(said.derived).name} derived;\n" if said.derived else ""
+    return (
+        f"typedef {parameters.name} model_parameters;\n"
+        f"typedef {inputs.name} model_inputs;\n"
+        f"typedef {outputs.name} model_outputs;\n"
+        f"typedef struct {{\n    {state.name} state;\n{derived}}} model_state;\n\n"
+        f"enum {{ MODEL_INPUTS = {numbers(inputs)}, MODEL_OUTPUTS = {numbers(outputs)}, "
+        f"MODEL_STATE = {numbers(state)} }};"
+    )
+
+
+def _moved(said: Behaviour, function: Function, call: str) -> list[str]:
+    """What takes over the state and the outputs that a function gives."""
+    assert isinstance(function.returns, Structure)
+    names = ["state->state", *(["state->derived"] if said.derived else []), "*outputs"]
+    return [
+        f"const {function.returns.name} result = {call};",
+        *(f"{name} = result{part};" for name, (part, _) in zip(names, function.returns.parts)),
+    ]
+
+
+def _measured(said: Behaviour, function: Function) -> list[str]:
+    """What gives a group of outputs its noise."""
+    group = f"outputs->{said.noisy}"
+    drawn = ", ".join(f"draws[{i}]" for i in range(said.draws))
+    n = f"({function.arguments['n'].name}){{{{{drawn}}}}}"
+    given = {**_GIVEN, "n": n, said.noisy: group}
+    return [f"{group} = {function.call([given[name] for name in function.arguments])};"]
+
+
+def _defined(name: str, arguments: str, body: list[str]) -> str:
+    """A function with what it returns before its name; arguments it does not use are marked so."""
+    returns, _, name = name.rpartition(" ")
     text = " ".join(body)
     names = [argument.rstrip("[]").split()[-1].lstrip("*") for argument in arguments.split(", ")]
     unused = [f"(void){n};" for n in names if n != "error" and not _uses(text, n)]
     if "Error" in arguments and "error" not in text:
         unused.append("(void)error;")
     lines = [line for part in (*unused, *body) for line in laid_out(part, "    ")]
-    return "\n".join([*laid_out(f"static {returns} {name}({arguments}) {{", ""), *lines, "}"])
+    return "\n".join([*laid_out(f"static {returns} model_{name}({arguments}) {{", ""), *lines, "}"])
 
 
 def _uses(text: str, name: str) -> bool:
     separated = "".join(c if c.isalnum() or c == "_" else " " for c in text)
     return name in separated.split()
+
+
+_PORTS_HEAD = f"""\
+/* The ports: a value reference is a place in the first table.
+ *
+ * Made from the declaration of the ports. The columns are name, type, causality, variability,
+ * place of the value, start, minimum, maximum, choices; inputs and outputs lie at their numbers.
+ */
+#include <float.h>
+#include <stddef.h>
+
+/* From auv_fmu/euler.py. */
+static const double ROUNDING = {euler.ROUNDING!r};
+static const double LARGEST_STATE = {euler.LARGEST_STATE!r};
+static const double MOST_INTERNAL_STEPS = {float(euler.MOST_INTERNAL_STEPS)!r};
+
+#define PARAMETER_AT(member) offsetof(parameter_values, member)
+"""
+
+
+def tables(package: str) -> str:
+    """The file ports.h of a component, for example of `fmus.auv_plant`."""
+    module = import_module(f"{package}.ports")
+    ports: Sequence[Port] = (*module.PORTS, FAULT)
+    places = {FAULT.name: "0", H_MAX.name: "PARAMETER_AT(h_max)"}
+    for name, path in module.PARAMETERS.paths.items():
+        places[name] = f"PARAMETER_AT(model.{_member(path)})"
+    references = {
+        causality: [
+            i for i, port in enumerate(ports) if (port.causality, port.kind) == (causality, "Real")
+        ]
+        for causality in ("input", "output")
+    }
+    for found in references.values():
+        places |= {ports[reference].name: str(place) for place, reference in enumerate(found)}
+    rows = "".join(f"    {{{_row(port, places)}}},\n" for port in ports)
+    return "\n".join(
+        (
+            _PORTS_HEAD,
+            *(_choices(port) for port in ports if port.choices),
+            f"static const port ports[] = {{\n{rows}}};\n",
+            f"enum {{ N_PORTS = {len(ports)} }};\n",
+            *(_references(causality, found) for causality, found in references.items()),
+        )
+    )
+
+
+def _member(path: Sequence[str | int]) -> str:
+    """The member of a structure: a tuple of Python is one with an array `v`."""
+    first, *rest = path
+    return str(first) + "".join(f".v[{p}]" if isinstance(p, int) else f".{p}" for p in rest)
+
+
+def _row(port: Port, places: Mapping[str, str]) -> str:
+    choices = _choices_name(port) if port.choices else "NULL"
+    return ", ".join(
+        (
+            f'"{port.name}"',
+            port.kind.upper(),
+            port.causality.upper(),
+            port.variability.upper(),
+            places[port.name],
+            _number(port, port.start or 0.0),
+            "-DBL_MAX" if port.minimum is None else _number(port, port.minimum),
+            "DBL_MAX" if port.maximum is None else _number(port, port.maximum),
+            choices,
+            str(len(port.choices)),
+        )
+    )
+
+
+def _number(port: Port, value: Value) -> str:
+    """The number that stands for a value."""
+    meant = port.meaning(value)
+    assert isinstance(meant, (float, int))
+    return repr(float(meant))
+
+
+def _choices_name(port: Port) -> str:
+    return f"choices_of_{port.name.replace('.', '_')}"
+
+
+def _choices(port: Port) -> str:
+    rows = ", ".join(f'{{"{text}", {number}}}' for text, number in port.choices.items())
+    return f"static const choice {_choices_name(port)}[] = {{{rows}}};\n"
+
+
+def _references(causality: str, places: Sequence[int]) -> str:
+    """The value references of the Real ports of a causality; C has no empty arrays."""
+    numbers = ", ".join(f"FIRST_REFERENCE + {place}" for place in places or [0])
+    return f"static const uint32_t {causality}_references[] = {{{numbers}}};\n"

@@ -10,7 +10,7 @@ from typing import TypedDict
 
 from auv_fmu import output_feedback
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement, Signals
-from auv_fmu.types import Vector3, Vector4
+from auv_fmu.vectors import Vector3, Vector4
 
 #: What is said, at time t [s], of a measurement that is not credible.
 RESTARTED = (

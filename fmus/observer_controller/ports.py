@@ -6,20 +6,17 @@ from auv_fmu.observer import FORMS
 from auv_fmu.output_feedback import Gains
 from auv_fmu.saturation import SATURATIONS
 from fmus.ports.controllers import (
-    EPS_T,
-    GAMMA,
+    ADAPTATION,
     INPUTS,
     MEASURED_ANGLES,
     PRINTED_JACOBIAN,
-    SIGMA,
-    THETA_0,
     THETA_HAT,
     TRACKING_ERROR,
     Y,
     command,
 )
 from fmus.ports.groups import ParameterSet
-from fmus.ports.port import H_MAX, POSITIVE, Port, outputs, parameter, parameters
+from fmus.ports.port import H_MAX, POSITIVE, Port, outputs, parameter, parameters, setting
 from fmus.ports.quantities import POSITION, VELOCITY, per_axis
 from fmus.ports.vehicle import CONTROL_POINT
 
@@ -27,14 +24,11 @@ DESCRIPTION = "Saturated output-feedback tracking controller with velocity obser
 
 _GAINS = Gains()
 
-_OBSERVER = Port(
+_OBSERVER = setting(
     "observer",
-    "parameter",
-    "fixed",
-    "String",
+    "euler",
     "Form of the observer: (51) by Euler's scheme, with k_d exact over a step, or (24) as printed",
-    start="euler",
-    choices=FORMS,
+    FORMS,
 )
 
 PARAMETERS = ParameterSet(
@@ -43,19 +37,13 @@ PARAMETERS = ParameterSet(
     K2=parameters("K2", _GAINS.K2, per_axis("N"), "Diagonal of K_2", POSITIVE, tunable=True),
     lambda_=parameter("lambda", _GAINS.lambda_, "m/s", "Lambda = lambda I", POSITIVE, tunable=True),
     k_d=parameter("k_d", _GAINS.k_d, "1/s", "Gain of the observer", POSITIVE, tunable=True),
-    gamma=GAMMA,
-    sigma=SIGMA,
-    theta_0=THETA_0,
-    eps_t=EPS_T,
+    **ADAPTATION,
     ell=CONTROL_POINT,
-    s=Port(
+    s=setting(
         "saturation",
-        "parameter",
-        "fixed",
-        "String",
+        "tanh",
         "Saturation function of Definition 2: tanh, algebraic or arctan",
-        start="tanh",
-        choices=SATURATIONS,
+        SATURATIONS,
     ),
     printed_jacobian=PRINTED_JACOBIAN,
     innovation_gate=parameter(

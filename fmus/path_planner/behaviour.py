@@ -6,7 +6,7 @@ from typing import TypedDict
 
 from auv_fmu import path_planner
 from auv_fmu.path_planner import Corner, Parameters, PathState
-from auv_fmu.types import Vector3, Vector5
+from auv_fmu.vectors import Vector3, Vector5
 
 
 class Outputs(TypedDict):

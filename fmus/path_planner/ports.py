@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from fmus.ports.groups import ParameterSet
-from fmus.ports.planners import reference
-from fmus.ports.port import POSITIVE, Port, parameter
-from fmus.ports.vehicle import CONTROL_POINT, LIMITS, VEHICLE
+from fmus.ports.port import POSITIVE, Port, parameter, setting
+from fmus.ports.vehicle import CONTROL_POINT, LIMITS, VEHICLE, reference
 
 DESCRIPTION = "Path planner: reference through waypoints with velocity and acceleration"
 
@@ -24,23 +23,17 @@ def _of_each_waypoint(member: str, unit: str, description: str) -> tuple[Port, .
 _X, _Y, _Z = (_of_each_waypoint(axis, "m", f"Waypoint: {axis}") for axis in "xyz")
 _T = _of_each_waypoint("t", "s", "When it is passed, if `timed`")
 
-_COUNT = Port(
+_COUNT = setting(
     "count",
-    "parameter",
-    "fixed",
-    "Integer",
+    _WAYPOINTS.n,
     "Number of waypoints; later ones are not used",
-    start=_WAYPOINTS.n,
     minimum=2,
     maximum=MOST,
 )
-_TIMED = Port(
+_TIMED = setting(
     "timed",
-    "parameter",
-    "fixed",
-    "Boolean",
+    _WAYPOINTS.timed,
     "Whether waypoints are passed at their times; if not, at the cruise speed",
-    start=_WAYPOINTS.timed,
 )
 _CRUISE = parameter(
     "cruise", _WAYPOINTS.cruise, "m/s", "Speed between waypoints without times", POSITIVE

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypedDict
 
 from auv_fmu import pd
 from auv_fmu.pd import PdGains, PdMeasurement, PdSignals
-from auv_fmu.types import Vector3, Vector4
+from auv_fmu.vectors import Vector3, Vector4
 
 
 class PdState(NamedTuple):

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from auv_fmu.pd import PdGains
 from fmus.ports.controllers import (
-    EPS_T,
-    GAMMA,
+    ADAPTATION,
     INPUTS,
     MEASURED_ANGLES,
     PRINTED_JACOBIAN,
-    SIGMA,
-    THETA_0,
     THETA_HAT,
     TRACKING_ERROR,
     command,
@@ -29,10 +26,7 @@ PARAMETERS = ParameterSet(
     PdGains,
     K1=parameters("K1", _GAINS.K1, per_axis("kg/s"), "Diagonal of K_1", POSITIVE, tunable=True),
     lambda_=parameter("lambda", _GAINS.lambda_, "1/s", "Lambda = lambda I", POSITIVE, tunable=True),
-    gamma=GAMMA,
-    sigma=SIGMA,
-    theta_0=THETA_0,
-    eps_t=EPS_T,
+    **ADAPTATION,
     ell=CONTROL_POINT,
     printed_jacobian=PRINTED_JACOBIAN,
 )

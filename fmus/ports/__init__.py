@@ -7,13 +7,10 @@ module                   what it states
 :mod:`.port`             one port: its declaration and what values it takes
 :mod:`.groups`           flat values of ports from groups, and groups from flat values
 :mod:`.behaviour`        what a component's behaviour may say: the hooks of both kinds
-:mod:`.vehicle`          parameters of (2) and (3)
+:mod:`.vehicle`          parameters of (2) and (3), and the reference
 :mod:`.controllers`      what the controllers have in common
-:mod:`.planners`         what the planners have in common
-:mod:`.description`      what modelDescription.xml says in every version of FMI, SI units
-:mod:`.description_fmi2` modelDescription.xml of FMI 2.0
-:mod:`.description_fmi3` modelDescription.xml and buildDescription.xml of FMI 3.0
-:mod:`.terminals`        terminalsAndIcons.xml of FMI 3.0
+:mod:`.description`      modelDescription.xml of FMI 2.0, what all versions share, SI units
+:mod:`.description_fmi3` what a host reads of FMI 3.0: description, build, terminals
 ======================== =================================================================
 
 `ports.py` of a component declares

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from auv_fmu.output_feedback import Gains
-from fmus.ports.port import POSITIVE, Port, inputs, outputs, parameter, parameters
+from fmus.ports.groups import Field
+from fmus.ports.port import POSITIVE, Port, inputs, outputs, parameter, parameters, setting
 from fmus.ports.quantities import ACCELERATION, EULER, POSITION, TAU, THETA, VELOCITY, member_name
 
 _GAINS = Gains()
@@ -24,34 +25,31 @@ INPUTS: tuple[Port, ...] = (
 #: The equations call the measured angles by another name than the ports, whose eta is the posture.
 MEASURED_ANGLES: Mapping[str, str] = {"euler": "eta"}
 
+_OUTPUT = ("output", "continuous", "Real")
+
 THETA_HAT: tuple[Port, ...] = tuple(
-    Port(
-        member_name("theta_hat", i),
-        "output",
-        "continuous",
-        "Real",
-        f"Estimated parameter [{i}]",
-        unit,
-    )
+    Port(member_name("theta_hat", i), *_OUTPUT, f"Estimated parameter [{i}]", unit)
     for i, unit in THETA.items()
 )
 
 TRACKING_ERROR: tuple[Port, ...] = outputs("e", POSITION, "Tracking error y - y_d", (*Y, *_Y_D))
 
-GAMMA = parameter("gamma", _GAINS.gamma, "1", "Gamma = gamma I, in SI units", 0.0, tunable=True)
-SIGMA = parameter("sigma", _GAINS.sigma, "1/s", "Sigma = sigma I", minimum=0.0, tunable=True)
-THETA_0 = parameters("theta_0", _GAINS.theta_0, THETA, "Prior of the parameters")
-EPS_T = parameter(
-    "eps_t", _GAINS.eps_t, "W", "Boundary layer of tanh(nu rho r)", POSITIVE, tunable=True
-)
+#: Fields of the gains that belong to the adaptive law.
+ADAPTATION: Mapping[str, Field] = {
+    "gamma": parameter(
+        "gamma", _GAINS.gamma, "1", "Gamma = gamma I, in SI units", 0.0, tunable=True
+    ),
+    "sigma": parameter("sigma", _GAINS.sigma, "1/s", "Sigma = sigma I", 0.0, tunable=True),
+    "theta_0": parameters("theta_0", _GAINS.theta_0, THETA, "Prior of the parameters"),
+    "eps_t": parameter(
+        "eps_t", _GAINS.eps_t, "W", "Boundary layer of tanh(nu rho r)", POSITIVE, tunable=True
+    ),
+}
 
-PRINTED_JACOBIAN = Port(
+PRINTED_JACOBIAN = setting(
     "printed_jacobian",
-    "parameter",
-    "fixed",
-    "Boolean",
+    _GAINS.printed_jacobian,
     "Use (11) as printed, for zero roll, instead of the full attitude",
-    start=_GAINS.printed_jacobian,
 )
 
 

@@ -1,4 +1,8 @@
-"""What modelDescription.xml says in every version of FMI and for both kinds of component."""
+"""modelDescription.xml of FMI 2.0 for both kinds of component, and what all versions say alike.
+
+PythonFMU and we ourselves write a description's frame each in their own way; what is in it follows
+from the ports.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +12,10 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from auv_fmu import __version__
 from auv_fmu.euler import STEP
-from fmus.ports.port import Port, Value
+from fmus.ports.port import FAULT, Port, Value
 
 #: About every component, by the names of the attributes.
 ABOUT = {"author": "auv-fmu", "license": "MIT", "version": __version__}
-
-#: What wrote the description of a component that no other tool has built.
-GENERATION_TOOL = f"auv-fmu {__version__}"
 
 #: Start, end and step of an experiment when the host names none [s].
 EXPERIMENT = (0.0, 100.0, STEP)
@@ -73,11 +74,25 @@ class Dependency(NamedTuple):
     initial: list[int]  #: what its value at the start time depends on
 
 
-def literal(value: Value) -> str:
+def _literal(value: Value) -> str:
     """A value as XML writes it."""
     if isinstance(value, bool):
         return str(value).lower()
     return f"{value:.16g}" if isinstance(value, float) else str(value)
+
+
+def root_of(version: str, name: str, description: str, **identity: str) -> Element:
+    """The root of a description that no other tool has written, with guid or token."""
+    said = {
+        "fmiVersion": version,
+        "modelName": name,
+        **identity,
+        "description": description,
+        **ABOUT,
+        "generationTool": f"auv-fmu {__version__}",
+        "variableNamingConvention": "structured",
+    }
+    return Element("fmiModelDescription", said)
 
 
 def text(root: Element) -> bytes:
@@ -101,10 +116,16 @@ def variable_attributes(reference: int, port: Port) -> dict[str, str]:
     return attributes
 
 
-def bounds(port: Port) -> dict[str, str]:
-    """The range of a variable's values."""
-    limits = {"min": port.minimum, "max": port.maximum}
-    return {name: literal(limit) for name, limit in limits.items() if limit is not None}
+def value_attributes(port: Port) -> dict[str, str]:
+    """What is said of a variable's values."""
+    said = {
+        "declaredType": UNITS[port.unit].type_name if port.unit else None,
+        "unit": port.unit,
+        "start": port.start,
+        "min": port.minimum,
+        "max": port.maximum,
+    }
+    return {name: _literal(value) for name, value in said.items() if value is not None}
 
 
 def units_of(ports: Sequence[Port]) -> list[str]:
@@ -136,6 +157,14 @@ def dependencies(ports: Sequence[Port]) -> Iterator[Dependency]:
             yield Dependency(places[port.name], direct, initial)
 
 
+def dependent_on(known: Sequence[int]) -> dict[str, str]:
+    """What is said of an output that depends on variables at these places."""
+    return {
+        "dependencies": " ".join(map(str, known)),
+        "dependenciesKind": " ".join(["dependent"] * len(known)),
+    }
+
+
 def log_categories(fmi: str) -> Element:
     """The categories of messages, with the statuses of a version of FMI such as `fmi2`."""
     categories = Element("LogCategories")
@@ -150,3 +179,82 @@ def default_experiment() -> Element:
     """The experiment that a host runs if nothing else is asked for."""
     start, stop, step = map(str, EXPERIMENT)
     return Element("DefaultExperiment", startTime=start, stopTime=stop, stepSize=step)
+
+
+# FMI 2.0
+
+_CAPABILITIES = {
+    **CAPABILITIES,
+    "canGetAndSetFMUstate": "true",
+    "canSerializeFMUstate": "true",
+    "canNotUseMemoryManagementFunctions": "true",
+}
+
+#: The file of a component's sources that includes all others.
+SOURCE = "fmi2.c"
+
+
+def fmi2_description(name: str, description: str, guid: str, ports: Sequence[Port]) -> bytes:
+    """The description of a component that is a library.
+
+    Args:
+        name: of the component, and of the library.
+        description: one line.
+        guid: as the library knows it.
+        ports: all but `fault`, in the order of their value references.
+
+    """
+    root = root_of("2.0", name, description, guid=guid)
+    implementation = SubElement(root, "CoSimulation", modelIdentifier=name)
+    SubElement(SubElement(implementation, "SourceFiles"), "File", name=SOURCE)
+    root.extend((log_categories("fmi2"), default_experiment()))
+    SubElement(root, "ModelVariables")
+    SubElement(root, "ModelStructure")
+    return text(complete(root, (*ports, FAULT)))
+
+
+def complete(root: Element, ports: Sequence[Port]) -> Element:
+    """Fill in what the ports of a component say.
+
+    Args:
+        root: fmiModelDescription with the elements CoSimulation, ModelVariables and
+            ModelStructure.
+        ports: all, in the order of their value references.
+
+    """
+    implementation = root.find("CoSimulation")
+    variables = root.find("ModelVariables")
+    structure = root.find("ModelStructure")
+    assert implementation is not None and variables is not None and structure is not None
+    implementation.attrib.update(_CAPABILITIES)
+    variables[:] = [_variable(reference, port) for reference, port in enumerate(ports)]
+    structure[:] = _structure(ports)
+    units = units_of(ports)
+    root.insert(1, unit_definitions(units))
+    root.insert(2, _type_definitions(units))
+    return root
+
+
+def _variable(reference: int, port: Port) -> Element:
+    variable = Element("ScalarVariable", variable_attributes(reference, port))
+    SubElement(variable, port.kind, value_attributes(port))
+    return variable
+
+
+def _type_definitions(units: Sequence[str]) -> Element:
+    definitions = Element("TypeDefinitions")
+    for unit in units:
+        name = UNITS[unit].type_name
+        simple_type = SubElement(definitions, "SimpleType", name=name)
+        SubElement(simple_type, "Real", quantity=name, unit=unit)
+    return definitions
+
+
+def _structure(ports: Sequence[Port]) -> tuple[Element, Element]:
+    """Outputs with their direct feedthrough; InitialUnknowns with the parameters as well."""
+    outputs, initial_unknowns = Element("Outputs"), Element("InitialUnknowns")
+    for output in dependencies(ports):
+        for parent, known in ((outputs, output.direct), (initial_unknowns, output.initial)):
+            # FMI 2.0 counts variables from one.
+            SubElement(parent, "Unknown", dependent_on(known), index=str(output.place))
+    return outputs, initial_unknowns

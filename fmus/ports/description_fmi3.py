@@ -1,4 +1,9 @@
-"""What a host reads of a component in FMI 3.0: modelDescription.xml and buildDescription.xml."""
+"""What a host reads of a component in FMI 3.0: its description, its build and its terminals.
+
+A terminal of terminalsAndIcons.xml is a group of ports, as one thing to connect. It has the name of
+its group, or of the group that it is made to take. Components call the members of a group that they
+exchange the same, so a tool that joins two terminals of one name joins the right variables.
+"""
 
 from __future__ import annotations
 
@@ -6,21 +11,22 @@ from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 from fmus.ports.description import (
-    ABOUT,
     CAPABILITIES,
-    GENERATION_TOOL,
     UNITS,
-    bounds,
     default_experiment,
     dependencies,
-    literal,
+    dependent_on,
     log_categories,
+    root_of,
     text,
     unit_definitions,
     units_of,
+    value_attributes,
     variable_attributes,
 )
+from fmus.ports.groups import slices
 from fmus.ports.port import FAULT, TIME, Port
+from fmus.ports.quantities import member_of
 
 #: What FMI 3.0 calls the types of variables.
 TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String"}
@@ -48,18 +54,7 @@ def fmi3_description(name: str, description: str, token: str, ports: Sequence[Po
     """
     variables = (*ports, FAULT, TIME)
     units = units_of(variables)
-    root = Element(
-        "fmiModelDescription",
-        {
-            "fmiVersion": _VERSION,
-            "modelName": name,
-            "instantiationToken": token,
-            "description": description,
-            **ABOUT,
-            "generationTool": GENERATION_TOOL,
-            "variableNamingConvention": "structured",
-        },
-    )
+    root = root_of(_VERSION, name, description, instantiationToken=token)
     SubElement(root, "CoSimulation", _CAPABILITIES, modelIdentifier=name)
     root.extend(
         (
@@ -102,33 +97,94 @@ def _type_definitions(units: Sequence[str]) -> Element:
 def _variables(ports: Sequence[Port]) -> Element:
     variables = Element("ModelVariables")
     for place, port in enumerate(ports, start=1):
-        variable = SubElement(variables, TYPES[port.kind], variable_attributes(place, port))
-        if port.unit is not None:
-            variable.set("declaredType", UNITS[port.unit].type_name)
-            variable.set("unit", port.unit)
+        attributes = {**variable_attributes(place, port), **value_attributes(port)}
+        variable = SubElement(variables, TYPES[port.kind], attributes)
         if isinstance(port.start, str):
-            SubElement(variable, "Start", value=port.start)
-        elif port.start is not None:
-            variable.set("start", literal(port.start))
-        variable.attrib.update(bounds(port))
+            SubElement(variable, "Start", value=variable.attrib.pop("start"))
     return variables
 
 
 def _structure(ports: Sequence[Port]) -> Element:
     """Outputs with their direct feedthrough; InitialUnknowns with the parameters as well."""
-    known = list(dependencies(ports))
+    outputs = list(dependencies(ports))
     structure = Element("ModelStructure")
-    for output in known:
-        structure.append(_unknown("Output", output.place, output.direct))
-    for output in known:
-        structure.append(_unknown("InitialUnknown", output.place, output.initial))
+    for out in outputs:
+        SubElement(structure, "Output", dependent_on(out.direct), valueReference=str(out.place))
+    for out in outputs:
+        known = dependent_on(out.initial)
+        SubElement(structure, "InitialUnknown", known, valueReference=str(out.place))
     return structure
 
 
-def _unknown(tag: str, place: int, known: Sequence[int]) -> Element:
-    return Element(
-        tag,
-        valueReference=str(place),
-        dependencies=" ".join(map(str, known)),
-        dependenciesKind=" ".join(["dependent"] * len(known)),
+#: All members of an input have to come from somewhere. Not all of an output's need to go there:
+#: a controller takes only the angles of the posture. Each terminal's rule is its own.
+_MATCHING_RULE = {"input": "plug", "output": "bus"}
+
+#: Outputs for inputs of other names: friction is against the velocity through the water.
+_TAKES = {"nu": "nu_r"}
+
+#: Corners of the icon, and how many millimetres its units are on a screen.
+_ICON = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
+_SCALE = "0.1"
+
+#: Where the terminals of inputs and of outputs begin, from left to right, and how large they are.
+_LEFT_EDGE = {"input": -110, "output": 100}
+_SIZE = 10
+
+#: What lines between signals look like in Modelica.
+_COLOUR = "0 0 127"
+
+#: The picture of a terminal, beside the file, without its suffix .png.
+_PICTURE = "terminal"
+
+
+def terminals_and_icons(ports: Sequence[Port]) -> bytes:
+    """terminalsAndIcons.xml of a component.
+
+    Args:
+        ports: all but `fault`, which no component takes.
+
+    """
+    root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
+    graphics = SubElement(root, "GraphicalRepresentation")
+    SubElement(graphics, "CoordinateSystem", _ICON, suggestedScalingFactorTo_mm=_SCALE)
+    SubElement(graphics, "Icon", _ICON)
+    terminals = SubElement(root, "Terminals")
+    for causality in _MATCHING_RULE:
+        terminals.extend(_terminals([port for port in ports if port.causality == causality]))
+    return text(root)
+
+
+def _terminals(ports: Sequence[Port]) -> list[Element]:
+    """The terminals of all inputs, or of all outputs, one below the other."""
+    groups = {name: ports[place] for name, place in slices(ports).items()}
+    return [
+        _terminal(name, members, 100 - round(200 * (i + 0.5) / len(groups)))
+        for i, (name, members) in enumerate(groups.items())
+    ]
+
+
+def _terminal(name: str, members: Sequence[Port], centre: int) -> Element:
+    causality = members[0].causality
+    name = _TAKES.get(name, name) if causality == "input" else name
+    terminal = Element("Terminal", name=name, matchingRule=_MATCHING_RULE[causality])
+    for port in members:
+        SubElement(
+            terminal,
+            "TerminalMemberVariable",
+            variableName=port.name,
+            memberName=member_of(port.name),
+            variableKind="signal",
+        )
+    left, lower = _LEFT_EDGE[causality], centre - _SIZE // 2
+    SubElement(
+        terminal,
+        "TerminalGraphicalRepresentation",
+        defaultConnectionColor=_COLOUR,
+        x1=str(left),
+        y1=str(lower),
+        x2=str(left + _SIZE),
+        y2=str(lower + _SIZE),
+        iconBaseName=_PICTURE,
     )
+    return terminal

@@ -133,7 +133,7 @@ class ParameterSet(Generic[T]):
     @property
     def ports(self) -> tuple[Port, ...]:
         """All parameters, in the order of their declaration."""
-        return tuple(port for field in self._fields.values() for port in _ports(field))
+        return tuple(port for port, _ in self._leaves())
 
     def before(self, *later: Port) -> tuple[Port, ...]:
         """The parameters except some that have come later: these stand at the end of all ports.
@@ -145,32 +145,20 @@ class ParameterSet(Generic[T]):
     @property
     def paths(self) -> dict[str, tuple[str | int, ...]]:
         """Where each parameter lies in the set, by its name: fields, and places in tuples."""
-        return {
-            port.name: (name, *path)
-            for name, field in self._fields.items()
-            for port, path in _paths(field)
-        }
+        return {port.name: path for port, path in self._leaves()}
+
+    def _leaves(self) -> Iterator[tuple[Port, tuple[str | int, ...]]]:
+        for name, field in self._fields.items():
+            if isinstance(field, Port):
+                yield field, (name,)
+            elif isinstance(field, tuple):
+                yield from ((port, (name, i)) for i, port in enumerate(field))
+            else:
+                yield from ((port, (name, *path)) for port, path in field._leaves())
 
     def of(self, values: Mapping[str, Value]) -> T:
         """The parameter set with these values of its ports, by name."""
         return self._made(**{name: _taken(field, values) for name, field in self._fields.items()})
-
-
-def _ports(field: Field) -> Iterator[Port]:
-    if isinstance(field, Port):
-        yield field
-    else:
-        yield from field.ports if isinstance(field, ParameterSet) else field
-
-
-def _paths(field: Field) -> Iterator[tuple[Port, tuple[str | int, ...]]]:
-    if isinstance(field, Port):
-        yield field, ()
-    elif isinstance(field, tuple):
-        yield from ((port, (i,)) for i, port in enumerate(field))
-    else:
-        paths = field.paths
-        yield from ((port, paths[port.name]) for port in field.ports)
 
 
 def _taken(field: Field, values: Mapping[str, Value]) -> object:

@@ -90,16 +90,9 @@ class Port:
 
 def inputs(group: str, members: Members, description: str) -> tuple[Port, ...]:
     """Real inputs, one for each member of a group, starting at zero."""
+    about = ("input", "continuous", "Real")
     return tuple(
-        Port(
-            member_name(group, member),
-            "input",
-            "continuous",
-            "Real",
-            f"{description}: {member}",
-            unit=unit,
-            start=0.0,
-        )
+        Port(member_name(group, member), *about, f"{description}: {member}", unit, start=0.0)
         for member, unit in members.items()
     )
 
@@ -119,7 +112,7 @@ def outputs(
             "continuous",
             "Real",
             f"{description}: {member}",
-            unit=unit,
+            unit,
             feedthrough=tuple(port.name for port in feedthrough),
             initially=tuple(port.name for port in initially),
         )
@@ -139,6 +132,20 @@ def parameter(
     """A Real parameter."""
     variability = "tunable" if tunable else "fixed"
     return Port(name, "parameter", variability, "Real", description, unit, start, minimum, maximum)
+
+
+def setting(
+    name: str,
+    start: int | str,
+    description: str,
+    choices: Mapping[str, object] | None = None,
+    minimum: int | None = None,
+    maximum: int | None = None,
+) -> Port:
+    """A fixed parameter that is no Real: of the type that its start value has."""
+    kind = {bool: "Boolean", int: "Integer", str: "String"}[type(start)]
+    about = ("parameter", "fixed", kind, description, None)
+    return Port(name, *about, start, minimum, maximum, choices or {})
 
 
 def parameters(

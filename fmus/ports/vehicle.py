@@ -1,4 +1,4 @@
-"""Parameters of (2) and (3), shared by the components that need them."""
+"""Ports that vehicle and planners share: parameters of (2) and (3), and the reference."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from auv_fmu.actuators import Limits
 from auv_fmu.control_point import ELL
 from auv_fmu.vehicle import Vehicle
 from fmus.ports.groups import ParameterSet
-from fmus.ports.port import POSITIVE, Port, parameter, parameters
-from fmus.ports.quantities import TAU
+from fmus.ports.port import POSITIVE, Port, outputs, parameter, parameters
+from fmus.ports.quantities import ACCELERATION, ETA_WITHOUT_ROLL, POSITION, TAU, VELOCITY
 
 _VEHICLE, _LIMITS = Vehicle(), Limits()
 
@@ -45,3 +45,18 @@ LIMITS = ParameterSet(
 )
 
 CONTROL_POINT = parameter("ell", ELL, "m", "Distance of the control point", POSITIVE)
+
+
+def reference(posture: str) -> tuple[Port, ...]:
+    """The outputs of every planner, so that one can take the other's place.
+
+    Args:
+        posture: what its posture is.
+
+    """
+    return (
+        *outputs("y_d", POSITION, "Desired control point"),
+        *outputs("dy_d", VELOCITY, "Desired velocity"),
+        *outputs("ddy_d", ACCELERATION, "Desired acceleration, in closed form"),
+        *outputs("eta_d", ETA_WITHOUT_ROLL, posture),
+    )

@@ -20,8 +20,7 @@ from pythonfmu import DefaultExperiment
 from pythonfmu.enums import Fmi2Status
 
 from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS, internal_steps, longest_step
-from fmus.ports.description import ABOUT, EXPERIMENT
-from fmus.ports.description_fmi2 import complete
+from fmus.ports.description import ABOUT, EXPERIMENT, complete
 from fmus.ports.groups import ParameterSet, packing, slices, unpacking
 from fmus.ports.port import H_MAX, Refusal, Value
 from fmus.python.callbacks import (
@@ -32,8 +31,15 @@ from fmus.python.callbacks import (
     Callbacks,
     explained,
 )
-from fmus.python.shape import measuring
-from fmus.python.state import Snapshot, checked, from_bytes, nearly_equal, to_bytes, unusable
+from fmus.python.state import (
+    Snapshot,
+    checked,
+    from_bytes,
+    measuring,
+    nearly_equal,
+    to_bytes,
+    unusable,
+)
 
 #: Longest step of a component that has no internal steps [s].
 _NO_LIMIT = 1e300

@@ -14,13 +14,12 @@ from pathlib import Path
 
 from pythonfmu.builder import get_model_class
 
-from fmus.python.packaging import LOADERS, best_loader, fmu_entries
-from fmus.python.sealing import seal
+from fmus.python.packaging import LOADERS, best_loader, fmu_entries, seal
 
 #: The script of the FMU, with a slave that may raise.
 _SCRIPT = """\
 from fmus.python.loading import settle
-from fmus.python.scripts import caught
+from fmus.python.loading import caught
 from {module} import {component}
 
 settle(caught({component}), globals(), locals())

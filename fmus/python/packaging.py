@@ -1,22 +1,23 @@
-"""The Python kind: an FMU that holds Python sources and has PythonFMU run them."""
+"""The Python kind: an FMU that holds Python sources, PythonFMU to run them, and our loader."""
 
 from __future__ import annotations
 
+import re
 import shutil
-import tempfile
+import sys
 import zipfile
 from dataclasses import dataclass
+from functools import cache
 from modulefinder import ModuleFinder
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
 
 import pythonfmu
 
 from fmus import documentation
-from fmus.archive import licences
-from fmus.discovery import package_folder
+from fmus.compilers import machines_compiler, run_compiler
+from fmus.discovery import digest_of, guid_of, licences, package_folder, write_archive
 from fmus.kinds import PYTHON
-from fmus.python.loader import compiler, with_loader
-from fmus.python.sealing import seal
 
 _FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
 
@@ -32,6 +33,32 @@ settle({component}, globals(), locals())
 
 #: How FMUs are loaded: by a library of our own, or by PythonFMU's.
 LOADERS = ("native", "plain")
+
+#: Sources of the native loader, which lets an FMU run in a host that is no Python program; loader.h
+#: says what each is for, and fmi2.c includes all others.
+LOADER = Path(__file__).parent / "loader"
+
+#: How they are compiled, in their folder, into a library.
+LOADER_FLAGS = (
+    "-std=gnu11", "-shared", "-fPIC", "-fvisibility=hidden", "-pthread",
+    # Python holds on to it, so it must stay until the process ends.
+    "-Wl,-z,nodelete",
+    "fmi2.c", "-ldl",
+)  # fmt: skip
+
+#: Where PythonFMU's own library goes when the loader takes its name.
+_LINUX = "binaries/linux64/"
+
+_RESOURCES = "resources/"
+_SLAVE_MODULE = "resources/slavemodule.txt"
+_DESCRIPTION = "modelDescription.xml"
+
+#: Where the loader finds the GUID: a library knows only the folder of resources.
+_GUID_FILE = "resources/guid.txt"
+_GUID = re.compile(rb'guid="[^"]*"')
+
+#: `import`, and the modules after it.
+_IMPORT = re.compile(r"^(\s*import\s+)([\w., \t]*\w)", re.MULTILINE)
 
 
 def _stage(text: str, stage: Path, script: str, own: Path | None) -> Path:
@@ -73,7 +100,7 @@ def fmu_entries(script: str, text: str, loader: str, own: Path | None = None) ->
         OSError: the loader cannot be compiled.
 
     """
-    with tempfile.TemporaryDirectory(prefix="auv_fmu_build_") as temporary:
+    with TemporaryDirectory(prefix="auv_fmu_build_") as temporary:
         stage, built = Path(temporary, "stage"), Path(temporary, "built")
         stage.mkdir()
         path = _stage(text, stage, script, own)
@@ -84,12 +111,116 @@ def fmu_entries(script: str, text: str, loader: str, own: Path | None = None) ->
             entries = {name: archive.read(name) for name in archive.namelist()}
     entries["model.png"] = documentation.ICON.read_bytes()
     entries["documentation/licenses/license.txt"] = licences(PYTHON).encode()
-    return with_loader(entries) if loader == "native" else entries
+    return _with_loader(entries) if loader == "native" else entries
+
+
+# The loader
+
+
+def loader_compiler() -> str | None:
+    """The C compiler, if this is a platform that the loader is for and there is one."""
+    return machines_compiler() if sys.platform.startswith("linux") else None
+
+
+@cache
+def compiled_loader() -> bytes:
+    """The loader as a shared library.
+
+    Raises:
+        OSError: there is no compiler, or it fails.
+
+    """
+    command = loader_compiler()
+    if command is None:
+        raise OSError("the native loader needs Linux and a C compiler; build with --loader plain")
+    with TemporaryDirectory(prefix="auv_fmu_loader_") as folder:
+        library = Path(folder, "loader.so")
+        process = run_compiler(
+            [command, "-O2", "-s", "-Wl,--build-id=none", "-o", str(library), *LOADER_FLAGS], LOADER
+        )
+        if process.returncode != 0:
+            raise OSError(f"the native loader does not compile: {process.stderr.strip()}")
+        return library.read_bytes()
+
+
+def _with_loader(entries: dict[str, bytes]) -> dict[str, bytes]:
+    """The entries of an FMU with the loader in the place of PythonFMU's library."""
+    changed = dict(entries)
+    for name, content in entries.items():
+        if name.startswith(_LINUX) and name.endswith(".so"):
+            changed[name.replace(".so", "_pythonfmu.so")] = content
+            changed[name] = compiled_loader()
+    return changed
 
 
 def best_loader() -> str:
     """The loader for new files: native where it can be compiled."""
-    return "plain" if compiler() is None else "native"
+    return "plain" if loader_compiler() is None else "native"
+
+
+# Sealing
+
+
+def seal(entries: dict[str, bytes], destination: Path) -> None:
+    """Write an FMU sealed: reproducible, and alone in its process.
+
+    All PythonFMU FMUs of a process share one interpreter and import their modules by bare name:
+    of two FMUs that bundle a module of the same name, the second silently runs the first one's
+    code. Sealing gives every top-level module in `resources` a name that carries a hash of the
+    FMU's contents, and the FMU a GUID made from the same hash.
+
+    Args:
+        entries: of the FMU, by their names.
+        destination: file to write.
+
+    """
+    entries = dict(entries)
+    entries[_DESCRIPTION] = _GUID.sub(b'guid=""', entries[_DESCRIPTION], count=1)
+    digest = digest_of(entries)
+    guid = guid_of(digest).encode()
+    entries = _renamed(entries, digest.hex()[:12])
+    entries[_DESCRIPTION] = _GUID.sub(b'guid="' + guid + b'"', entries[_DESCRIPTION], count=1)
+    entries[_GUID_FILE] = guid
+    write_archive(destination, entries)
+
+
+def _renamed(entries: dict[str, bytes], suffix: str) -> dict[str, bytes]:
+    modules = {
+        PurePosixPath(name.removeprefix(_RESOURCES)).parts[0].removesuffix(".py")
+        for name in entries
+        if name.startswith(_RESOURCES) and name.endswith(".py")
+    }
+    alternatives = "|".join(sorted(map(re.escape, modules)))
+    from_module = re.compile(rf"^(\s*from\s+(?:{alternatives}))\b", re.MULTILINE)
+    imported = re.compile(rf"^({alternatives})((?:\.\w+)*)(\s+as\s+\w+)?$")
+
+    def import_statement(found: re.Match[str]) -> str:
+        """The same modules, and the names that the script has for them."""
+        wanted = [
+            imported.sub(lambda one: _under_its_name(one, suffix), name.strip())
+            for name in found[2].split(",")
+        ]
+        return found[1] + ", ".join(wanted)
+
+    resource = re.compile(rf"^({_RESOURCES}(?:{alternatives}))(?=/|\.py$)")
+    renamed = {}
+    for name, content in entries.items():
+        if name.startswith(_RESOURCES) and name.endswith(".py"):
+            text = from_module.sub(rf"\1_{suffix}", content.decode("utf-8"))
+            content = _IMPORT.sub(import_statement, text).encode()
+        elif name == _SLAVE_MODULE:
+            content = content.strip() + f"_{suffix}".encode()
+        renamed[resource.sub(rf"\1_{suffix}", name)] = content
+    return renamed
+
+
+def _under_its_name(imported: re.Match[str], suffix: str) -> str:
+    """One module of an import statement, so that it is still found under its own name."""
+    top, below, other_name = imported.groups(default="")
+    sealed = f"{top}_{suffix}"
+    if other_name:
+        return f"{sealed}{below}{other_name}"
+    return f"{sealed}{below}, {sealed} as {top}" if below else f"{sealed} as {top}"
 
 
 @dataclass(frozen=True)
@@ -113,6 +244,5 @@ class PythonKind:
         """
         text = _SCRIPT.format(package=package, component=component)
         entries = fmu_entries(component, text, self.loader)
-        page = documentation.html(component, PYTHON)
-        entries["documentation/index.html"] = page.encode()
+        entries["documentation/index.html"] = documentation.html(component).encode()
         seal(entries, path)

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from auv_fmu.observer import EXACT, FORMS, exact_gain
-from auv_fmu.proof.gain_conditions import bounds
-from auv_fmu.proof.sampling import observer_rate, robust_rate
+from auv_fmu.proof.gain_conditions import bounds, observer_rate, robust_rate
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.table import Table
 from orchestrator.system.graph import reaching

@@ -8,7 +8,7 @@ from typing import Any
 from auv_fmu.control_point import ELL as CONTROL_POINT
 from auv_fmu.output_feedback import Gains
 from auv_fmu.proof.attraction import Theorem, theorem
-from auv_fmu.proof.sampling import observer_rate
+from auv_fmu.proof.gain_conditions import observer_rate
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from auv_fmu.vehicle import Vehicle
 from orchestrator.machine.errors import InputError

@@ -22,8 +22,7 @@ module                      what it states
 :mod:`.closed_loop`         Fig. 2: all of it as one straight line
 :mod:`.euler`               section 4.1: Euler approximation and its time step
 :mod:`.proof`               what only the proof needs; never runs inside an FMU
-:mod:`.types`               names for the tuples
-:mod:`.vectors`             sums, differences and products of three-vectors
+:mod:`.vectors`             names for the tuples; sums and products of three-vectors
 ==========================  ==========================================================
 
 The functions take and return Python floats and tuples and import nothing but the standard

@@ -5,8 +5,7 @@ from __future__ import annotations
 from math import exp, expm1
 from typing import NamedTuple
 
-from auv_fmu.types import Vector3
-from auv_fmu.vectors import difference, scaled
+from auv_fmu.vectors import Vector3, difference, scaled
 
 
 class Limits(NamedTuple):

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from math import tanh
 
-from auv_fmu.types import Vector3, Vector4
-from auv_fmu.vectors import norm
+from auv_fmu.vectors import Vector3, Vector4, norm
 
 #: The constant of Lemma 2, nu = exp(-(nu + 1)), with the digits the paper gives (reading 9).
 NU = 0.2785

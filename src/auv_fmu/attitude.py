@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import asin, atan2, cos, sin, sqrt
 
-from auv_fmu.types import Rotation, Vector3, Vector4
+from auv_fmu.vectors import Rotation, Vector3, Vector4
 
 
 def rotation_from_euler(phi: float, theta: float, psi: float) -> Rotation:

@@ -17,7 +17,7 @@ from auv_fmu.motion_planner import Motion, PlannerState, Reference
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement, Signals
 from auv_fmu.pd import PdGains, PdMeasurement, PdSignals
 from auv_fmu.plant import PlantOutputs, PlantState
-from auv_fmu.types import Rotation, Vector3, Vector4, Vector6
+from auv_fmu.vectors import Rotation, Vector3, Vector4, Vector6
 
 #: Before the first instant.
 _NO_COMMAND: Vector3 = (0.0, 0.0, 0.0)

@@ -8,8 +8,7 @@ at zero roll. Written with the full R the same three lines hold for a vehicle th
 from __future__ import annotations
 
 from auv_fmu.attitude import rotate, rotate_back
-from auv_fmu.types import Rotation, Vector3, Vector6
-from auv_fmu.vectors import plus_scaled, scaled
+from auv_fmu.vectors import Rotation, Vector3, Vector6, plus_scaled, scaled
 
 #: Distance of the control point from the centre of mass in section 4.1 [m].
 ELL = 0.35

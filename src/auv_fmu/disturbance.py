@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import copysign, sin
 from typing import NamedTuple
 
-from auv_fmu.types import Vector6
+from auv_fmu.vectors import Vector6
 
 
 class Disturbance(NamedTuple):

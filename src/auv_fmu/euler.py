@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import ceil
 
-from auv_fmu.types import Vector4
+from auv_fmu.vectors import Vector4
 
 #: The time step h of section 4.1 [s].
 STEP = 0.02

@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 from auv_fmu.attitude import rotate, rotation_from_euler
 from auv_fmu.control_point import ELL, control_point, control_point_velocity
-from auv_fmu.types import Rotation, Vector3, Vector5
-from auv_fmu.vectors import plus_scaled
+from auv_fmu.vectors import Rotation, Vector3, Vector5, plus_scaled
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 
 #: Driving force and moments (u, q, r) of section 4.1 [N, N.m]; they make the reference a helix.

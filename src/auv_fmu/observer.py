@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from math import expm1
 
-from auv_fmu.types import Vector3
-from auv_fmu.vectors import plus_scaled, scaled, total
+from auv_fmu.vectors import Vector3, plus_scaled, scaled, total
 
 #: A form of the observer as a value: which one of these.
 Form = int

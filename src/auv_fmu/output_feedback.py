@@ -16,8 +16,9 @@ from auv_fmu.control_point import ELL, actuator_command
 from auv_fmu.euler import advance_4
 from auv_fmu.observer import EULER, Form
 from auv_fmu.saturation import TANH, Saturation, saturation, slope
-from auv_fmu.types import Vector3, Vector4
 from auv_fmu.vectors import (
+    Vector3,
+    Vector4,
     difference,
     distance,
     minus_product,
@@ -163,7 +164,7 @@ def step(state: ControllerState, signals: Signals, h: float) -> ControllerState:
     Args:
         state: at the beginning of the step.
         signals: evaluated there.
-        h: step [s]; :func:`auv_fmu.proof.sampling.observer_rate` tells which k_d it can follow.
+        h: step [s]; `observer_rate` of :mod:`.proof.gain_conditions` tells which k_d it can follow.
 
     """
     y_hat, dy_hat_o, theta_hat = state

@@ -33,8 +33,7 @@ from typing import NamedTuple
 from auv_fmu.actuators import Limits
 from auv_fmu.control_point import ELL
 from auv_fmu.motion_planner import STEEPEST, Reference
-from auv_fmu.types import Vector3, Vector5, Vector32
-from auv_fmu.vectors import difference, distance, norm, plus_scaled
+from auv_fmu.vectors import Vector3, Vector5, Vector32, difference, distance, norm, plus_scaled
 from auv_fmu.vehicle import Vehicle
 
 #: Most waypoints of a path, as many as a Vector32 holds; and those that the default leaves over.

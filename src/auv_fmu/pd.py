@@ -8,8 +8,7 @@ from auv_fmu.adaptation import bound, regressor, robust_force, theta_hat_rate
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import ELL, actuator_command
 from auv_fmu.euler import advance_4
-from auv_fmu.types import Vector3, Vector4
-from auv_fmu.vectors import difference, minus_product, norm, plus_scaled
+from auv_fmu.vectors import Vector3, Vector4, difference, minus_product, norm, plus_scaled
 
 
 class PdGains(NamedTuple):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import atan, exp, log, log1p, pi, sqrt, tanh
 
-from auv_fmu.types import Vector3
+from auv_fmu.vectors import Vector3
 
 #: A saturation function as a value: which one of this module it is.
 Saturation = int

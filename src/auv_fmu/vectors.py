@@ -1,4 +1,4 @@
-"""The little algebra of vectors that the equations need.
+"""Names for the tuples that the equations pass around, and the little algebra of three-vectors.
 
 Matrices of gains are diagonal: a diagonal matrix is given as its diagonal, a Vector3.
 """
@@ -7,7 +7,22 @@ from __future__ import annotations
 
 from math import sqrt
 
-from auv_fmu.types import Vector3
+Vector3 = tuple[float, float, float]
+Vector4 = tuple[float, float, float, float]
+Vector5 = tuple[float, float, float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
+
+#: A rotation matrix R from body to earth as its columns (R e1, R e2, R e3): the directions of
+#: the body axes in the earth frame.
+Rotation = tuple[Vector3, Vector3, Vector3]
+
+#: One number for each of as many points as a path may have.
+Vector32 = tuple[
+    float, float, float, float, float, float, float, float,
+    float, float, float, float, float, float, float, float,
+    float, float, float, float, float, float, float, float,
+    float, float, float, float, float, float, float, float,
+]  # fmt: skip
 
 
 def total(a: Vector3, b: Vector3) -> Vector3:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import cos
 from typing import NamedTuple
 
-from auv_fmu.types import Vector3, Vector5
+from auv_fmu.vectors import Vector3, Vector5
 
 
 class Vehicle(NamedTuple):

@@ -18,11 +18,14 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 
 from fmus.discovery import components, package_folder
-from fmus.ports.description_fmi2 import fmi2_description
-from fmus.ports.description_fmi3 import fmi3_build_description, fmi3_description
+from fmus.ports.description import fmi2_description
+from fmus.ports.description_fmi3 import (
+    fmi3_build_description,
+    fmi3_description,
+    terminals_and_icons,
+)
 from fmus.ports.port import TIME
 from fmus.ports.quantities import group_name
-from fmus.ports.terminals import terminals_and_icons
 
 GUID = "{00000000-0000-0000-0000-000000000000}"
 

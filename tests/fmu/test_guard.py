@@ -22,8 +22,8 @@ from typing import Any
 import fmpy
 import pytest
 
-from fmus.python.loader import compiler
 from fmus.python.own import build_own
+from fmus.python.packaging import loader_compiler
 from support.kinds import FIXTURES
 from support.raw_fmi import (
     DISCARD,
@@ -35,7 +35,7 @@ from support.raw_fmi import (
     RawFmu,
 )  # fmt: skip
 
-pytestmark = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
+pytestmark = pytest.mark.skipif(loader_compiler() is None, reason="there is no C compiler")
 
 #: A Real input and the String parameter of the controller, and what is no UTF-8.
 NOT_UTF8 = [b"\xff", b"\xc0\xaf", b"\xed\xa0\x80", b"\xf4\x90\x80\x80", b"\xe2\x82", b"\x80"]

@@ -11,8 +11,8 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.python.loader import FLAGS, FOLDER, compiler
 from fmus.python.own import build_own
+from fmus.python.packaging import LOADER, LOADER_FLAGS, loader_compiler
 from orchestrator.runs import bundle
 from support.settings import NAMES
 from support.tiers import slow
@@ -26,7 +26,7 @@ CHROOT = shutil.which("chroot")
 #: Processes a test with threads.
 REPETITIONS = 8
 
-needs_compiler = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
+needs_compiler = pytest.mark.skipif(loader_compiler() is None, reason="there is no C compiler")
 needs_libpython = pytest.mark.skipif(
     not LIBPYTHON.name.endswith(".so.1.0") or not LIBPYTHON.is_file(),
     reason="no shared library of Python",
@@ -35,7 +35,7 @@ pytestmark = needs_compiler
 
 
 def compile_c(source: Path, target: Path, *options: str) -> Path:
-    command = [str(compiler()), "-Wall", "-Wextra", "-Werror", "-g", "-pthread", *options]
+    command = [str(loader_compiler()), "-Wall", "-Wextra", "-Werror", "-g", "-pthread", *options]
     subprocess.run([*command, "-o", target, source, "-ldl"], check=True)
     return target
 
@@ -316,7 +316,9 @@ def test_sanitizers_find_nothing_whatever_a_host_calls(dist: Path, tmp_path: Pat
     host = compiled_host(tmp_path, *FINDS_LIBPYTHON, *sanitizers, name="random_calls")
     fmpy.extract(dist / f"{name}.fmu", unzipdir=tmp_path / "fmu")
     library = tmp_path / "fmu/binaries/linux64" / f"{name}.so"
-    subprocess.run([str(compiler()), *sanitizers, "-o", library, *FLAGS], cwd=FOLDER, check=True)
+    subprocess.run(
+        [str(loader_compiler()), *sanitizers, "-o", library, *LOADER_FLAGS], cwd=LOADER, check=True
+    )
     for seed in range(3):
         process = run(
             host, str(library), (tmp_path / "fmu/resources").as_uri(), str(seed), "5000",

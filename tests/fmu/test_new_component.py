@@ -30,7 +30,7 @@ OTHER = "fmus.disturbance_generator"
 TESTS = (
     "tests/fmu/test_built_fmu.py",
     "tests/unit/fmus/native/test_equations.py",
-    "tests/unit/fmus/native/test_tables.py",
+    "tests/unit/fmus/native/test_translator.py",
 )
 READ = ("tests/support", "tests/fuzz", "docs/status.md", "pyproject.toml", *TESTS)
 

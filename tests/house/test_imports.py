@@ -25,7 +25,7 @@ FLOORS = {
         "studies", "paper", "commands",
     ),
     "fmus": (
-        "ports", "components", "kinds", "archive", "discovery", "documentation", "compilers",
+        "ports", "components", "kinds", "discovery", "documentation", "compilers",
         "python", "native", "build",
     ),
 }  # fmt: skip

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 from fmus.discovery import ports_of
 from fmus.kinds import PYTHON
-from fmus.ports.description_fmi2 import fmi2_description
+from fmus.ports.description import fmi2_description
 from support import states
 from support.calls import CASES, Call, Draw, Saved, make
 from support.raw import Description, Host, Library, Status, Variable, description_in, instance

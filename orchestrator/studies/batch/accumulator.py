@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_fmu.actuators import Limits
-from auv_fmu.types import Vector3, Vector4
-from auv_fmu.vectors import norm
+from auv_fmu.vectors import Vector3, Vector4, norm
 from orchestrator.vehicle.indices import REACHED
 
 #: Up to where an accumulator goes.

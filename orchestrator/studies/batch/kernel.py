@@ -17,8 +17,7 @@ from auv_fmu.closed_loop import LAWS, Instant, Law, Moment, Setting, Splits
 from auv_fmu.control_point import control_point
 from auv_fmu.euler import LARGEST_STATE
 from auv_fmu.output_feedback import Gains
-from auv_fmu.types import Vector3, Vector6
-from auv_fmu.vectors import difference
+from auv_fmu.vectors import Vector3, Vector6, difference
 from orchestrator.studies.batch.accumulator import RowSignals, StepSignals, take_row, take_step
 from orchestrator.studies.batch.numbers import flat, nought, square
 from orchestrator.vehicle.signals import AXES, DIRECTIONS, STANDARD

@@ -10,8 +10,15 @@ from math import inf, sqrt
 from typing import NamedTuple
 
 from auv_fmu.output_feedback import Gains
-from auv_fmu.proof.gain_conditions import Bounds, Condition, bounds, conditions
-from auv_fmu.proof.zetas import Zetas, at_least, coupling
+from auv_fmu.proof.gain_conditions import (
+    Bounds,
+    Condition,
+    Zetas,
+    at_least,
+    bounds,
+    conditions,
+    coupling,
+)
 from auv_fmu.vehicle import Vehicle
 
 

@@ -1,9 +1,14 @@
-"""The gain conditions of Theorem 1, (30) to (32), and of Theorem 2, (52) to (54).
+"""What is asked of the gains: (30) to (32) of Theorem 1, (52) to (54) of Theorem 2, Euler's scheme.
 
-The zetas of (26) and (29) bound what the paper leaves unknown, and :mod:`.zetas` bounds them from
-below. So a condition is stated as its left side, the known part of the right side, and what the
-zetas take at least. It is violated if they take more than there is, met if it has none, open
-otherwise.
+The zetas of (26) and (29) bound what the paper leaves unknown; here they are bounded from below. At
+|x| = 1, (26) and (29) are |chi_1| <= zeta_1 + zeta_2 and |chi_2| <= zeta_3 + zeta_4, so any state
+with |x| = 1 bounds the sums from below. The states taken here are a level vehicle without sway and
+heave, a reference at rest, and z = 0: then dy_r = -lambda s(e), and with e_1 ahead, e_2 to
+starboard and e_3 down, chi_1 and chi_2 are short products. There are no upper bounds: C_2 has a
+pole at the vertical, where P2.4 fails.
+
+So a condition is stated as its left side, the known part of the right side, and what the zetas take
+at least. It is violated if they take more than there is, met if it has none, open otherwise.
 
 (30) adds N to N m/s, (31) adds N to kg/s, and |x| adds m/s to pure numbers: the paper counts speeds
 in m/s. In another unit v0, with r_1 / v0 and r_2 / v0 in x and with |chi_i| / v0 in (26) and (29),
@@ -13,11 +18,71 @@ the same steps give the same conditions with k_2max v0 for k_2max in (30), and k
 
 from __future__ import annotations
 
+from math import hypot, sqrt
 from typing import NamedTuple
 
-from auv_fmu.proof.zetas import Zetas
-from auv_fmu.types import Vector3
+from auv_fmu.adaptation import NU
+from auv_fmu.vectors import Vector3
 from auv_fmu.vehicle import Vehicle
+
+# Zetas
+
+
+class Zetas(NamedTuple):
+    """What the sums of the zetas are at least [kg/s]."""
+
+    zeta_1_2: float  #: of zeta_1 + zeta_2
+    zeta_3_4: float  #: of zeta_3 + zeta_4
+
+
+def coupling(vehicle: Vehicle, ell: float) -> float:
+    """k [kg/m] with |chi_1| = k |r_1|^2 / 2 for some r_1 of any size, whatever the gains.
+
+    A control point that moves sideways turns the vehicle; turning drives its sway, (7), and sway
+    moves the control point. At dy_r = 0 that is all of chi_1 = -d(r_1), and at
+    r_1 = |r_1| (e_1 + e_2) / sqrt(2), or with e_3 for e_2, it is the larger of these products.
+    Where dy_r is ahead and r_1 is not, |chi_1| = k |dy_r| |r_1|.
+
+    Args:
+        vehicle: parameters.
+        ell: distance of the control point [m].
+
+    """
+    return vehicle.m11 * max(vehicle.m66 / vehicle.m22, vehicle.m55 / vehicle.m33) / ell**3
+
+
+def at_least(vehicle: Vehicle, ell: float, lambda_: float, v0: float = 1.0) -> Zetas:
+    """What zeta_1 + zeta_2 and zeta_3 + zeta_4 are at least, for chi_1 and chi_2 as printed.
+
+    With r_1 = (a, b, 0) and s(e) = (-c, 0, 0), chi_1 = -k b (a + lambda c) e_2 for the k of
+    :func:`coupling`. With r_1 = (0, b, 0), s(e) = (c, 0, 0) and r_2 = (a, 0, 0), chi_2 has the part
+    -b (m66 / ell^3 (a + lambda c (2 - m11 / m22)) + d66 / ell^2) along e_2. Each is taken at the
+    a, b and c at which it is largest. In the plane of e_1 and e_3 pitch and heave stand for yaw and
+    sway.
+
+    Args:
+        vehicle: parameters.
+        ell: distance of the control point [m].
+        lambda_: diagonal entry of Lambda [m/s].
+        v0: unit of speed [m/s]; at 1 it is as printed.
+
+    """
+    square, m11 = ell**2, vehicle.m11
+    yaw = vehicle.m66 / ell**3 * hypot(v0, lambda_ * (2.0 - m11 / vehicle.m22))
+    pitch = vehicle.m55 / ell**3 * hypot(v0, lambda_ * (2.0 - m11 / vehicle.m33))
+    return Zetas(
+        0.5 * coupling(vehicle, ell) * hypot(v0, lambda_),
+        max(_largest(yaw, vehicle.d66 / square), _largest(pitch, vehicle.d55 / square)),
+    )
+
+
+def _largest(turning: float, damping: float) -> float:
+    """The largest b (turning a + damping) with a^2 + b^2 = 1."""
+    a = (sqrt(damping**2 + 8.0 * turning**2) - damping) / (4.0 * turning)
+    return sqrt(1.0 - a * a) * (turning * a + damping)
+
+
+# Conditions
 
 
 class Bounds(NamedTuple):
@@ -123,3 +188,38 @@ def conditions(
             0.5 * zetas.zeta_3_4 / known.lambda_m2,
         ),
     )
+
+
+# What the Euler approximation of section 4.1 asks of the gains; not in the paper. A mode with the
+# rate p is multiplied by 1 - h p in a step: it changes its sign in every step above h p = 1, and
+# grows above h p = 2.
+
+
+def observer_rate(lambda_: float, k_d: float) -> float:
+    """Rate of the fastest mode of the observer near rest [1/s].
+
+    With s(z) = z, (50) and (51) under the acceleration of Remark 3 are, for a vehicle at rest on
+    its reference, d2z/dt2 + (k_d + 2 lambda) dz/dt + k_d lambda z = 0.
+
+    Args:
+        lambda_: diagonal entry of Lambda [m/s].
+        k_d: observer gain [1/s].
+
+    """
+    b = k_d + 2.0 * lambda_
+    return (b + sqrt(b * b - 4.0 * k_d * lambda_)) / 2.0
+
+
+def robust_rate(rho_hat: float, eps_t: float, lambda_m2: float) -> float:
+    """Rate at which the robust term damps the composite error, at most [1/s].
+
+    rho_hat tanh(nu rho_hat r / eps_t) has the slope nu rho_hat^2 / eps_t at r = 0, and acts on
+    inertias of lambda_m2 and more.
+
+    Args:
+        rho_hat: estimated bound [N].
+        eps_t: width of the boundary layer [W].
+        lambda_m2: smallest eigenvalue of M_2 [kg].
+
+    """
+    return NU * rho_hat * rho_hat / (eps_t * lambda_m2)

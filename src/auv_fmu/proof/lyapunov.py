@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 from auv_fmu.control_point import actuated_velocity
 from auv_fmu.saturation import Saturation, integral, saturation
-from auv_fmu.types import Rotation, Vector3
-from auv_fmu.vectors import difference, minus_scaled
+from auv_fmu.vectors import Rotation, Vector3, difference, minus_scaled
 from auv_fmu.vehicle import Vehicle
 
 

@@ -1,16 +1,19 @@
-"""Which compiler makes the libraries, and what it says if it cannot."""
+"""Which compiler makes the libraries, what it says if it cannot, and universal ones of macOS."""
 
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
 from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 
 from fmus import compilers
-from fmus.compilers import compiler_for, library
+from fmus.compilers import compiler_for, library, universal
 from fmus.kinds import platforms
-from fmus.python import loader
+from fmus.python import packaging
 from orchestrator.machine.compiler import COMPILERS, machines_compiler
 
 OWN = "/usr/bin/own-cc"
@@ -71,7 +74,7 @@ def test_apples_compiler_makes_what_a_mac_runs(machine: pytest.MonkeyPatch):
         compiler_for(platforms("2", "linux64,darwin64"))
 
 
-@pytest.mark.skipif(loader.compiler() is None, reason="there is no C compiler")
+@pytest.mark.skipif(packaging.loader_compiler() is None, reason="there is no C compiler")
 @pytest.mark.parametrize("name", COMPILERS)
 def test_any_one_compiler_will_do(name, tmp_path, monkeypatch):
     """By the packaging and by the master, under whichever of its names there is."""
@@ -85,8 +88,8 @@ def test_any_one_compiler_will_do(name, tmp_path, monkeypatch):
     assert compilers.machines_compiler() == machines_compiler() == str(wrapper)
     [own] = platforms("2" if compilers.this_machine() == "x86_64-linux" else "3")
     assert library(compiler_for([own]), own, "Answer", SOURCES, "main.c")
-    loader.compiled.cache_clear()
-    assert b"fmi2DoStep" in loader.compiled()
+    packaging.compiled_loader.cache_clear()
+    assert b"fmi2DoStep" in packaging.compiled_loader()
 
 
 def test_machine_without_a_compiler(machine: pytest.MonkeyPatch):
@@ -136,3 +139,62 @@ def test_zig_makes_libraries_for_other_machines(name: str, tmp_path, monkeypatch
     assert b"answer" in made
     assert str(tmp_path).encode() not in made
     assert list(tmp_path.iterdir()) == []
+
+
+#: CPU_TYPE_X86_64 with CPU_SUBTYPE_X86_64_ALL, and CPU_TYPE_ARM64 with CPU_SUBTYPE_ARM64_ALL.
+PROCESSORS = {"x86_64": (0x01000007, 3), "arm64": (0x0100000C, 0)}
+
+#: Pages of arm64 have 16 KiB, and a part of the file that is not aligned to them is not loaded.
+PAGE = 16384
+
+
+def thin(processor: str, size: int) -> bytes:
+    """The head of a 64-bit Mach-O library without load commands, and what may follow."""
+    kind, model = PROCESSORS[processor]
+    words = (0xFEEDFACF, kind, model, 6, 0, 0, 0, 0)
+    return b"".join(word.to_bytes(4, "little") for word in words).ljust(size, b"\x5a")
+
+
+def read(content: bytes) -> list[tuple[int, int, bytes]]:
+    """Processors and libraries of a universal file."""
+
+    def word(place: int) -> int:
+        return int.from_bytes(content[4 * place : 4 * place + 4], "big")
+
+    assert word(0) == 0xCAFEBABE
+    found, end = [], 8
+    for i in range(word(1)):
+        kind, model, offset, size, align = (word(2 + 5 * i + k) for k in range(5))
+        assert 2**align == PAGE
+        assert offset % PAGE == 0
+        assert offset >= end, "they do not overlap"
+        end = offset + size
+        found.append((kind, model, content[offset:end]))
+    assert len(content) == end
+    return found
+
+
+@pytest.mark.parametrize("sizes", [(100, 200), (PAGE - 48, PAGE), (3 * PAGE + 1, 1000)])
+def test_libraries_come_out_as_they_went_in(sizes):
+    libraries = [thin(name, size) for name, size in zip(PROCESSORS, sizes, strict=True)]
+    expected = [
+        (*processor, library)
+        for processor, library in zip(PROCESSORS.values(), libraries, strict=True)
+    ]
+    assert read(universal(libraries)) == expected
+
+
+@pytest.mark.parametrize("other", [b"\x7fELF" + bytes(60), b"MZ" + bytes(60)])
+def test_other_library_is_refused(other: bytes):
+    with pytest.raises(ValueError, match="Mach-O"):
+        universal([thin("x86_64", 100), other])
+
+
+@pytest.mark.skipif(shutil.which("file") is None, reason="there is no command `file`")
+def test_command_file_knows_it(tmp_path: Path):
+    path = tmp_path / "library"
+    path.write_bytes(universal([thin(name, 100) for name in PROCESSORS]))
+    said = subprocess.run(["file", path], check=True, capture_output=True, text=True).stdout
+    assert "universal binary with 2 architectures" in said
+    assert "x86_64" in said
+    assert "arm64" in said

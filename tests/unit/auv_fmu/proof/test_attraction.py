@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from auv_fmu import motion_planner
 from auv_fmu.output_feedback import Gains
 from auv_fmu.proof.attraction import alpha_1_at_most, alphas, ball, reach, stretch, theorem
-from auv_fmu.proof.gain_conditions import Bounds, bounds, conditions
-from auv_fmu.proof.zetas import Zetas, coupling
+from auv_fmu.proof.gain_conditions import Bounds, Zetas, bounds, conditions, coupling
 from auv_fmu.vehicle import Vehicle
 from support.strategies import speeds, vectors
 

@@ -1,4 +1,4 @@
-"""(4) to (8), (14), (15) and the properties of (15) that the proof rests on."""
+"""(4) to (8), (14), (15), the properties of (15) that the proof rests on, and (20), (25), (28)."""
 
 import numpy as np
 import pytest
@@ -16,12 +16,15 @@ from auv_fmu.proof.control_point_model import (
     J,
     J_delta,
     J_dot,
+    chi_1,
+    chi_2,
     d,
     d_missing,
     drift,
     kinematic_disturbance,
     kinematic_matrix,
     tau_w2,
+    xi,
 )
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 from support.strategies import angles, forces, lengths, pitch_angles, speeds, vectors
@@ -367,3 +370,48 @@ def test_gravity_is_the_force_that_does_the_work_of_the_righting_moment(theta, p
     G = G_2(VEHICLE, theta, psi, ELL)
     np.testing.assert_allclose(J(theta, psi, ELL).T @ G, MODEL.G_1(theta), atol=1e-12)
     assert np.linalg.norm(G) <= VEHICLE.righting_pitch / ELL + 1e-12
+
+
+three = vectors(speeds, 3)
+
+
+@given(
+    theta=pitch_angles,
+    psi=angles,
+    w=vectors(speeds, 2),
+    dy_r=three,
+    ddy_r=three,
+    r_1=three,
+    r_2=three,
+    force=vectors(forces, 3),
+    tau_w2=vectors(forces, 3),
+)
+def test_error_dynamics_are_those_of_15_but_for_p2_3(
+    theta, psi, w, dy_r, ddy_r, r_1, r_2, force, tau_w2
+):
+    """M_2 dr_1/dt of (15) is that of (20); that less k_d M_2 r_2 is (28).
+
+    Each is so but for C_2(x_1) x_2 - C_2(x_2) x_1, which P2.3 takes to be zero.
+    """
+    at = (VEHICLE, theta, psi)
+    w, dy_r, ddy_r, r_1, r_2, force, tau_w2 = map(
+        np.array, (w, dy_r, ddy_r, r_1, r_2, force, tau_w2)
+    )
+    dy = dy_r + r_1
+    M, D = M_2(*at, ELL), D_2(*at, ELL)
+
+    def C(x):
+        return C_2(*at, x, ELL)
+
+    ddy = np.linalg.solve(
+        M, force - C(dy) @ dy - D @ dy - d(*at, w, dy, ELL) - G_2(*at, ELL) - tau_w2
+    )
+    found = M @ (ddy - ddy_r)
+    lumped = xi(*at, w, dy_r, ddy_r, tau_w2, ELL)
+    scale = 1.0 + np.abs(found).max() + np.abs(C(dy)).max() * 10.0
+    by_20 = force - C(dy) @ r_1 - D @ r_1 + chi_1(*at, w, dy_r, r_1, ELL) + lumped
+    crossed = C(dy_r) @ r_1 - C(r_1) @ dy_r
+    np.testing.assert_allclose(found, by_20 + crossed, atol=1e-10 * scale)
+    by_28 = force - C(dy) @ r_2 + chi_2(*at, w, dy_r, r_1, r_2, ELL) + lumped
+    crossed = C(r_1) @ dy_r - C(dy_r) @ r_1
+    np.testing.assert_allclose(found, by_28 + crossed, atol=1e-10 * scale)

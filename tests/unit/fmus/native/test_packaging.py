@@ -6,7 +6,6 @@ from xml.etree import ElementTree
 
 import pytest
 
-from fmus import native
 from fmus.compilers import Compiler
 from fmus.discovery import components
 from fmus.kinds import platforms
@@ -73,14 +72,14 @@ def test_guid_is_the_same_for_all_platforms():
 
 def test_guid_follows_from_sources_and_description(monkeypatch: pytest.MonkeyPatch):
     guids = {guid(entries(name, fmi)) for name in NAMES for fmi in FILES}
-    written = native.sources
+    written = packaging.sources
     for file in written("fmus.auv_plant"):
 
         def changed(package: str, *fmi: int, file: str = file) -> dict[str, str]:
             sources = written(package, *fmi)
             return {**sources, file: sources[file] + "\n"}
 
-        monkeypatch.setattr(native, "sources", changed)
+        monkeypatch.setattr(packaging, "sources", changed)
         guids.add(guid(entries("AuvPlant")))
     assert len(guids) == 2 * len(NAMES) + len(written("fmus.auv_plant"))
 

@@ -16,7 +16,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from fmus.discovery import components
-from fmus.native import MAIN, sources
+from fmus.native.packaging import MAIN, sources
 
 COMPILERS = [command for command in ("gcc", "clang") if shutil.which(command)]
 

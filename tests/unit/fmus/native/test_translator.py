@@ -1,4 +1,4 @@
-"""The translation as a text: complete, reproducible, and refused where it cannot be made."""
+"""The C sources of components: equations complete, or refused; ports as they are declared."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ import ast
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from fmus.discovery import components
-from fmus.native.shapes import plain
-from fmus.native.translator import translated
+from fmus.native.program import plain
+from fmus.native.translator import tables, translated
+from fmus.ports.port import FAULT, H_MAX, Port
 from support.equations import FLAGS, ROOT, RUNTIME
 
 PACKAGES = [*components().values()]
@@ -137,3 +140,88 @@ def test_names_are_given_other_values_one_by_one(tmp_path: Path):
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     assert "    x = atan2(z, 1.0); y = atan2(z, 2.0);\n" in process.stdout
+
+
+ROW = re.compile(
+    r'\{"(?P<name>.+?)", (?P<kind>[A-Z]+), (?P<causality>[A-Z]+), (?P<variability>[A-Z]+), '
+    r"(?P<place>[^,]+), (?P<start>[^,]+), (?P<minimum>[^,]+), (?P<maximum>[^,]+), "
+    r"(?P<choices>\w+), (?P<n>\d+)\},"
+)
+
+
+def rows(package: str) -> list[dict[str, str]]:
+    return [found.groupdict() for found in ROW.finditer(tables(package))]
+
+
+def ports(package: str) -> list[Port]:
+    return [*import_module(f"{package}.ports").PORTS, FAULT]
+
+
+@every
+def test_ports_are_those_of_the_declaration(package: str):
+    for row, port in zip(rows(package), ports(package), strict=True):
+        assert (row["name"], row["kind"]) == (port.name, port.kind.upper())
+        assert row["causality"] == port.causality.upper()
+        assert row["variability"] == port.variability.upper()
+        for bound, none in (("minimum", "-DBL_MAX"), ("maximum", "DBL_MAX")):
+            limit = getattr(port, bound)
+            assert row[bound] == none if limit is None else float(row[bound]) == limit
+        if port.kind != "String":
+            assert float(row["start"]) == float(port.start or 0.0)
+
+
+@every
+def test_inputs_and_outputs_lie_in_their_order(package: str):
+    declared, text = ports(package), tables(package)
+    for causality in ("INPUT", "OUTPUT"):
+        places = [
+            int(row["place"])
+            for row in rows(package)
+            if (row["causality"], row["kind"]) == (causality, "REAL")
+        ]
+        assert places == [*range(len(places))]
+        [found] = re.findall(rf"{causality.lower()}_references\[\] = \{{(.*)\}};", text)
+        names = [declared[int(n)].name for n in re.findall(r"FIRST_REFERENCE \+ (\d+)", found)]
+        if places:
+            real = [p.name for p in declared if p.causality.upper() == causality and p is not FAULT]
+            assert names == real
+
+
+@every
+def test_parameters_lie_where_the_equations_look_for_them(package: str):
+    """Each port gets another value, which is then found at its place."""
+    declared = import_module(f"{package}.ports").PARAMETERS
+    values = {
+        port.name: next(iter(port.choices)) if port.choices else float(i)
+        for i, port in enumerate(declared.ports)
+    }
+    model = declared.of(values)
+    parameters = [row for row in rows(package) if row["causality"] == "PARAMETER"]
+    for row in parameters:
+        [member] = re.findall(r"^PARAMETER_AT\((.*)\)$", row["place"])
+        if row["name"] == H_MAX.name:
+            assert member == "h_max"
+        elif row["kind"] != "STRING":
+            assert at(model, member.removeprefix("model.")) == values[row["name"]]
+    assert len({row["place"] for row in parameters}) == len(parameters)
+
+
+def at(structure: Any, member: str) -> Any:
+    """A member as C names it: a tuple of Python is one with an array `v`."""
+    for field, place in re.findall(r"(\w+)(?:\.v\[(\d+)\])?", member):
+        structure = getattr(structure, field)
+        structure = structure[int(place)] if place else structure
+    return structure
+
+
+def test_choices_are_the_texts_and_the_numbers_of_the_equations():
+    text = tables("fmus.observer_controller")
+    described = [row for row in rows("fmus.observer_controller") if row["kind"] == "STRING"]
+    declared = [port for port in ports("fmus.observer_controller") if port.kind == "String"]
+    for row, port in zip(described, declared, strict=True):
+        [choices] = re.findall(rf"choice {row['choices']}\[\] = \{{(.*)\}};", text)
+        numbers = re.findall(r'\{"(\w+)", (\d+)\}', choices)
+        found = {name: int(number) for name, number in numbers}
+        assert found == dict(port.choices)
+        assert float(row["start"]) == found[str(port.start)]
+        assert int(row["n"]) == len(found)

@@ -5,7 +5,11 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 from auv_fmu import __version__
-from fmus.ports.description_fmi3 import fmi3_build_description, fmi3_description
+from fmus.ports.description_fmi3 import (
+    fmi3_build_description,
+    fmi3_description,
+    terminals_and_icons,
+)
 from fmus.ports.port import FAULT, TIME, Port, inputs, outputs, parameter
 
 A = inputs("a", {"x": "m"}, "Place")[0]
@@ -100,3 +104,49 @@ def test_description_says_what_the_ports_are():
 
 def test_build_description_names_the_one_file():
     assert canonical(fmi3_build_description("It")) == canonical(BUILD)
+
+
+GROUPS = (
+    *inputs("tau", {"u": "N", "q": "N.m"}, "Command"),
+    *inputs("y", {"x": "m"}, "Place"),
+    *outputs("theta", {1: "N", 2: "kg/s"}, "Parameters"),
+    Port("k", "parameter", "fixed", "Real", "Gain", "1", 1.0),
+)
+
+
+def terminals() -> list[ElementTree.Element]:
+    return [*ElementTree.fromstring(terminals_and_icons(GROUPS)).iterfind("Terminals/Terminal")]
+
+
+def test_groups_of_inputs_and_outputs_alone_are_terminals():
+    assert [
+        (
+            terminal.get("name"),
+            terminal.get("matchingRule"),
+            [
+                (member.get("variableName"), member.get("memberName"), member.get("variableKind"))
+                for member in terminal.iterfind("TerminalMemberVariable")
+            ],
+        )
+        for terminal in terminals()
+    ] == [
+        ("tau", "plug", [("tau.u", "u", "signal"), ("tau.q", "q", "signal")]),
+        ("y", "plug", [("y.x", "x", "signal")]),
+        ("theta", "bus", [("theta[1]", "1", "signal"), ("theta[2]", "2", "signal")]),
+    ]
+
+
+def test_inputs_are_on_the_left_and_outputs_on_the_right_of_the_icon():
+    icon = ElementTree.fromstring(terminals_and_icons(GROUPS)).find("GraphicalRepresentation/Icon")
+    assert icon is not None
+    corners = [
+        {key: int(value) for key, value in picture.attrib.items() if key in icon.attrib}
+        for terminal in terminals()
+        for picture in terminal.iterfind("TerminalGraphicalRepresentation")
+    ]
+    left, right = int(icon.attrib["x1"]), int(icon.attrib["x2"])
+    upper, lower, output = corners
+    assert upper["x2"] == lower["x2"] == left
+    assert output["x1"] == right
+    assert upper["y1"] > lower["y2"]
+    assert output["y1"] == -output["y2"]

@@ -21,7 +21,7 @@ from __future__ import annotations
 from math import tanh
 
 from auv_fmu import vectors
-from auv_fmu.types import Vector3
+from auv_fmu.vectors import Vector3
 
 
 class TooLong(ArithmeticError):

@@ -6,7 +6,7 @@ import zipfile
 
 import pytest
 
-from fmus.python.sealing import seal
+from fmus.python.packaging import seal
 
 #: What a script says, and what it says when `a` and `b` of the FMU are sealed with `_x`.
 IMPORTS = {

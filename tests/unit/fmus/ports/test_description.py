@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xml.etree import ElementTree
 
-from fmus.ports.description_fmi2 import complete
+from fmus.ports.description import complete
 from fmus.ports.port import FAULT, Port, inputs, outputs, parameter
 
 A, B = inputs("a", {"x": "m"}, "Place")[0], inputs("b", {1: "N"}, "Force")[0]
