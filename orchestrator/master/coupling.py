@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from orchestrator.machine.errors import InputError, StartError
+from orchestrator.machine.errors import InputError, StartError, shortened
 from orchestrator.master.experiment import (
     DELAY,
     GAUSS_SEIDEL,
@@ -16,18 +16,194 @@ from orchestrator.master.experiment import (
     SOLVE,
     Exchange,
 )
-from orchestrator.master.fmi.instance import Instance
-from orchestrator.master.fmi.log import Log
-from orchestrator.master.gathering import Gathering
-from orchestrator.master.linear import LinearSteps
+from orchestrator.master.fmi.instance import ComponentFailed, Instance, Log
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.plan import Plan, delays, stages
 from orchestrator.master.ring import Ring
-from orchestrator.master.row import Row
-from orchestrator.master.schedule import Stage, StageCall, schedule
-from orchestrator.master.settling import Settling
+from orchestrator.master.row import Gathering, Row
+from orchestrator.master.schedule import Stage, StageCall, member, schedule, step
 from orchestrator.system.graph import has_feedthrough, rings
 from orchestrator.system.names import PortName
+from orchestrator.system.structure import System
+
+#: Values go along all connections so often, until they rest.
+_MOST_ROUNDS = 1000
+
+
+class _Single:
+    """A component of no ring: see :class:`.ring.Ring`."""
+
+    def __init__(self, name: str, system: System, instance: Instance, row: Row) -> None:
+        self.names = [name]
+        self._instance, self._row = instance, row
+        self._gather = Gathering.along(row, system.feeding[name])
+        self.gatherings = [self._gather]
+
+    def renew(self, always: bool = False) -> bool:
+        values, targets = self._row.values, self._gather.targets
+        before = values[targets]
+        self._gather(values)
+        if not always and before.tobytes() == values[targets].tobytes():
+            return False
+        self._instance.exchange()
+        self._row.show(self._instance.name)
+        return True
+
+
+class Settling:
+    """Hands values along the order in which components feed each other directly."""
+
+    def __init__(
+        self,
+        system: System,
+        instances: Mapping[str, Instance],
+        row: Row,
+        sequence: Sequence[Sequence[str]],
+        rings: Iterable[Ring] = (),
+    ) -> None:
+        """Tie it to the row of all values.
+
+        Args:
+            system: whose connections say what feeds what.
+            instances: of its components.
+            row: that they are tied to.
+            sequence: its components in the order of their feedthroughs.
+            rings: of them that are solved, in stages of their own.
+
+        """
+        self._system, self._instances, self._row = system, instances, row
+        ring_of = {ring.names[0]: ring for ring in rings}
+        self._units: list[Ring | _Single] = []
+        for stage in sequence:
+            ringed = [ring_of[name] for name in stage if name in ring_of]
+            self._units += ringed or [_Single(one, system, instances[one], row) for one in stage]
+
+    @property
+    def gatherings(self) -> list[Gathering]:
+        """All that it gathers."""
+        return [gather for unit in self._units for gather in unit.gatherings]
+
+    def begin(self) -> None:
+        """Settle for the first time, when no output has been read.
+
+        Raises:
+            ComponentFailed: values do not come to rest, or a component fails.
+
+        """
+        self._read_ahead()
+        self.hand_on(everything=True)
+        self.settle()
+
+    def settle(self) -> None:
+        """Hand values on until every input has what feeds it.
+
+        Raises:
+            ComponentFailed: values do not come to rest, or a component fails.
+
+        """
+        for _ in range(_MOST_ROUNDS):
+            before = self._row.values.copy()
+            if not self.hand_on():
+                return
+        if restless := self._row.moving(before):
+            raise ComponentFailed(
+                f"values do not come to rest: {shortened(', '.join(map(str, restless)))} in an "
+                "algebraic loop"
+            )
+
+    def hand_on(self, everything: bool = False) -> bool:
+        """Hand values along all connections once.
+
+        Args:
+            everything: also to components whose inputs are what they were.
+
+        Returns:
+            Whether any input has changed.
+
+        """
+        changed = [unit.renew(everything) for unit in self._units]
+        return any(changed)
+
+    def _read_ahead(self) -> None:
+        """Read outputs that feed a component before it is their own component's turn."""
+        row, instances = self._row, self._instances
+        place: dict[str, int] = {}
+        for i, unit in enumerate(self._units):
+            place |= dict.fromkeys(unit.names, i)
+        wanted: dict[str, dict[str, None]] = {}
+        for connection in self._system.connections:
+            source, target = connection.source, connection.target
+            if place[source.component] >= place[target.component]:
+                wanted.setdefault(source.component, {})[source.port] = None
+        for name, ports in wanted.items():
+            held = instances[name].read(list(ports))
+            row.enter({PortName(name, port): value for port, value in held.items()})
+
+
+class LinearSteps:
+    """Makes the steps of a whole system."""
+
+    def __init__(
+        self, system: System, instances: Mapping[str, Instance], row: Row, settling: Settling
+    ) -> None:
+        """Tie it to the row of all values.
+
+        Args:
+            system: that is stepped.
+            instances: of its components.
+            row: that they are tied to.
+            settling: hands values on at one time.
+
+        """
+        self._values, self._settling = row.values, settling
+        self._fed = {name: one for name, one in instances.items() if system.feeding[name]}
+        self._all, self._again = (
+            [member(instance) for instance in some.values()] for some in (instances, self._fed)
+        )
+        self._inputs = [
+            row.columns[PortName(name, variable.name)]
+            for name in self._fed
+            for variable in system.components[name].having("input")
+        ]
+        self._changing: dict[str, tuple[list[int], list[int]]] = {}
+        for name in self._fed:
+            component = system.components[name]
+            targets = [
+                connection.target
+                for connection in system.feeding[name]
+                if component.is_continuous(connection.target.port)
+            ]
+            self._changing[name] = (
+                [component.variables[target.port].valueReference for target in targets],
+                [row.columns[target] for target in targets],
+            )
+
+    def step(self, t: float, h: float) -> None:
+        """Make a step.
+
+        Raises:
+            ComponentFailed: a component fails, or values do not come to rest.
+
+        """
+        values, instances = self._values, self._fed.values()
+        self._settling.settle()
+        begin = values.copy()
+        for instance in instances:
+            instance.keep()
+        step(self._all, t, h, is_final=False)
+        self._settling.settle()
+        slopes = (values - begin) / h
+        values[self._inputs] = begin[self._inputs]
+        for instance in instances:
+            instance.go_back()
+            references, columns = self._changing[instance.name]
+            instance.let_change(references, slopes[columns].tolist())
+        step(self._again, t, h)
+        for instance in instances:
+            references, _ = self._changing[instance.name]
+            instance.let_change(references, [0.0] * len(references))
+        self._settling.settle()
+
 
 #: A value grows without bound if it doubles at least so often in each of so many intervals, one
 #: after the other, and so often in all of them together. What grows with a power of time does not.

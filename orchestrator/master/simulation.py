@@ -12,17 +12,15 @@ from orchestrator.machine.errors import InputError, StartError, reason, unforese
 from orchestrator.machine.interrupts import held_interrupts
 from orchestrator.master.coupling import Coupling, Growth
 from orchestrator.master.experiment import OURS, Exchange
-from orchestrator.master.fmi.instance import ComponentFailed, Ended, Instance
+from orchestrator.master.fmi.instance import ComponentFailed, Ended, Instance, Log
 from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.fmi.log import Log
 from orchestrator.master.fmi.placement import placed
 from orchestrator.master.fmi.surroundings import Surroundings, default_mode
-from orchestrator.master.gathering import Overrides
 from orchestrator.master.hooks.hook import Hook, Hooks, Run
 from orchestrator.master.loop import PYTHON_LOOP, Stepping, to_its_end
 from orchestrator.master.observers.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.plan import Plan
-from orchestrator.master.row import Row
+from orchestrator.master.row import Overrides, Row
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import literal, same, unit_of

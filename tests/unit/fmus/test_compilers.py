@@ -11,7 +11,7 @@ from fmus import compilers
 from fmus.compilers import compiler_for, library
 from fmus.kinds import platforms
 from fmus.python import loader
-from orchestrator.machine.compiler import COMPILERS, machines_compiler
+from orchestrator.machine.children import COMPILERS, machines_compiler
 
 OWN = "/usr/bin/own-cc"
 
