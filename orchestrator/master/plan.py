@@ -32,6 +32,15 @@ from orchestrator.system.graph import delayed, derived_order, has_feedthrough, i
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 
+#: Packages whose versions the rows depend on.
+PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy")
+
+#: All that decides the numbers of a run: by names in words, each as text.
+Identity = Mapping[str, str]
+
+#: Rooms whose code makes the rows.
+_ROOMS = ("machine", "system", "formats", "master")
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -197,16 +206,6 @@ def gathered(
     return found
 
 
-#: Packages whose versions the rows depend on.
-PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy")
-
-#: All that decides the numbers of a run: by names in words, each as text.
-Identity = Mapping[str, str]
-
-#: Rooms whose code makes the rows.
-ROOMS = ("machine", "system", "formats", "master")
-
-
 def identity(plan: Plan, events: Sequence[object] = (), inputs: str = "") -> Identity:
     """What makes a run the one that it is: all that decides its rows, and nothing else.
 
@@ -221,7 +220,7 @@ def identity(plan: Plan, events: Sequence[object] = (), inputs: str = "") -> Ide
     """
     system = plan.system
     return {
-        "the code": code_of(*(f"orchestrator.{room}" for room in ROOMS)),
+        "the code": code_of(*(f"orchestrator.{room}" for room in _ROOMS)),
         "the version of Python": python_version(),
         **{f"the version of {package}": version(package) for package in PACKAGES},
         # Their order is the order of the columns, and says where a ring is opened.

@@ -12,7 +12,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from orchestrator.machine import cache as user_cache
-from orchestrator.machine.children import Compiler, compiler, made_library, of_the_machine
+from orchestrator.machine.children import compiler, made_library, of_the_machine
 from orchestrator.machine.disk import claimed
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.fmi.instance import CALLS
@@ -171,26 +171,16 @@ def made(in_no_time: bool = False) -> CDLL:
             "the compiled loop needs a C compiler: install gcc or clang, or `pip install ziglang`"
         )
     try:
-        return _made(found)
+        with claimed(user_cache.folder_of(_CATEGORY), wait=True):
+            if library := kept():
+                # Another process was first.
+                return library
+            content = made_library(found, *_FLAGS, str(_SOURCE))
+            name = "stepper" + (".dll" if sys.platform == "win32" else ".so")
+            [place] = user_cache.keep(_CATEGORY, _key(), {name: content})
+        return _loaded(place)
     except OSError as error:
         raise InputError(f"the loop cannot be compiled: {reason(error)}") from error
-
-
-def _made(compiler: Compiler) -> CDLL:
-    """The library, compiled and kept.
-
-    Raises:
-        OSError: it cannot be compiled, kept or loaded.
-
-    """
-    with claimed(user_cache.folder_of(_CATEGORY), wait=True):
-        if library := kept():
-            # Another process was first.
-            return library
-        content = made_library(compiler, *_FLAGS, str(_SOURCE))
-        name = "stepper" + (".dll" if sys.platform == "win32" else ".so")
-        [place] = user_cache.keep(_CATEGORY, _key(), {name: content})
-    return _loaded(place)
 
 
 @cache

@@ -145,7 +145,6 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
             given |= set(scenario.parameters)
         with findings.collecting():
             system, input_table = read_inputs(inputs, system, given)
-    system.check()
     events = _events(request)
     if events is None:
         events = scenario.events

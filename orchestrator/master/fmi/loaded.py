@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from copy import copy
 from functools import partial
 from itertools import count
@@ -45,7 +45,6 @@ from orchestrator.master.fmi.instance import (
     DO_STEP,
     ComponentFailed,
     Ended,
-    Instance,
     Listener,
     Part,
 )
@@ -368,18 +367,6 @@ def loaded(
             yield instance
         finally:
             instance.free()
-
-
-@contextmanager
-def all_loaded(
-    components: Mapping[str, Component], listener: Listener
-) -> Iterator[dict[str, Instance]]:
-    """Instances of components by their names, all in this process, freed at the end."""
-    with ExitStack() as stack:
-        yield {
-            name: stack.enter_context(loaded(component, listener))
-            for name, component in components.items()
-        }
 
 
 #: Instances by the component environments that their FMUs hand back with every message.

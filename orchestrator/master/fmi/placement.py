@@ -13,7 +13,7 @@ from orchestrator.machine.interrupts import Interrupts
 from orchestrator.master.fmi.binary import make_binary
 from orchestrator.master.fmi.instance import Instance, Log
 from orchestrator.master.fmi.isolated import IsolatedInstance, Isolation
-from orchestrator.master.fmi.loaded import all_loaded
+from orchestrator.master.fmi.loaded import loaded
 from orchestrator.master.fmi.supervisor import Supervisor
 from orchestrator.system.component import Component
 
@@ -46,18 +46,17 @@ def placed(
 
     """
     with ExitStack() as stack:
-        apart = {
-            name: component
-            for name, component in components.items()
-            if isolation is not None or not stack.enter_context(_has_room(component))
-        }
-        here = {name: it for name, it in components.items() if name not in apart}
-        instances = stack.enter_context(all_loaded(here, log))
-        if apart:
-            how = isolation or Isolation()
-            for component in apart.values():
+        apart: dict[str, Component] = {}
+        instances: dict[str, Instance] = {}
+        for name, component in components.items():
+            if isolation is None and stack.enter_context(_has_room(component)):
+                instances[name] = stack.enter_context(loaded(component, log))
+            else:
+                apart[name] = component
                 # Here there is time for it, and a caller to tell.
                 make_binary(component, component.folder)
+        if apart:
+            how = isolation or Isolation()
             instances |= stack.enter_context(isolated(apart, log, how, interrupts))
         yield {name: instances[name] for name in components}
 
@@ -83,20 +82,7 @@ def _has_room(component: Component) -> Iterator[bool]:
 def isolated(
     components: Mapping[str, Component], log: Log, isolation: Isolation, interrupts: Interrupts
 ) -> Iterator[dict[str, Instance]]:
-    """Instances of components, each in a process of its own; all are gone at the end.
-
-    Args:
-        components: by their names.
-        log: takes what the FMUs say.
-        isolation: how long they may take.
-        interrupts: that end the wait for an FMU.
-
-    Raises:
-        InputError: an FMU cannot be loaded.
-        StartError: no process can be started.
-        ComponentFailed: an FMU has failed while it was instantiated.
-
-    """
+    """Instances as :func:`placed` has them, each in a process of its own; all end with it."""
     with ExitStack() as stack:
         try:
             pairs = [socket.socketpair() for _ in components]
