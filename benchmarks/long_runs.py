@@ -29,8 +29,7 @@ from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.hook import NEVER, Hook, Run
 from orchestrator.master.loop import LOOPS, chosen
 from orchestrator.master.observers.files import CsvFile
-from orchestrator.master.observers.observer import Observer
-from orchestrator.master.observers.selection import Selection
+from orchestrator.master.observers.observer import Observer, Selection
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.vehicle.certificates import CertificatesFile

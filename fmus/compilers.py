@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from fmus.kinds import TARGETS, Platform, this_machine
 
-#: C compilers: the first one that there is, is taken. :mod:`orchestrator.machine.compiler` has the
+#: C compilers: the first one that there is, is taken. :mod:`orchestrator.machine.children` has the
 #: same.
 COMPILERS = ("cc", "gcc", "clang")
 

@@ -15,7 +15,7 @@ from hypothesis import Phase, settings
 from platformdirs import user_cache_path
 
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
-from orchestrator.machine.locks import claimed
+from orchestrator.machine.disk import claimed
 from orchestrator.runs import bundle
 
 # A slow machine is no error, and the same tree gives the same result every time.

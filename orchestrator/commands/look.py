@@ -23,8 +23,7 @@ from orchestrator.figures.style import Drawn, save
 from orchestrator.figures.view import page
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
-from orchestrator.master.observers.observer import Observer
-from orchestrator.master.observers.progress import Progress
+from orchestrator.master.observers.observer import Observer, Progress
 from orchestrator.runs.folder import VIEW, replaced
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Files, Request

@@ -11,7 +11,7 @@ import numpy as np
 from fmpy.model_description import ScalarVariable
 
 from orchestrator.formats.tables import read_columns, read_rows
-from orchestrator.machine.compiler import COMPILERS, LIMIT_OF_ZIG, machines_compiler, run_compiler
+from orchestrator.machine.children import COMPILERS, LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.plan import gathered, stages

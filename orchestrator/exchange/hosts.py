@@ -28,8 +28,8 @@ from orchestrator.formats.osp import write_osp
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.children import run_module
+from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line
-from orchestrator.machine.locks import process_folder
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned

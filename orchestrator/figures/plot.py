@@ -16,7 +16,7 @@ from orchestrator.figures.panels import over_time
 from orchestrator.figures.signal import draw_signal
 from orchestrator.figures.style import COLOURS, STYLES, WIDTH, Drawn, plain, printed_unit, styled
 from orchestrator.machine.errors import InputError
-from orchestrator.master.observers.selection import matches, matching
+from orchestrator.master.observers.observer import matches, matching
 from orchestrator.master.observers.table import Table
 
 #: What is drawn where nothing is asked for, as far as it is there.

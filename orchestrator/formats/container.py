@@ -10,8 +10,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from orchestrator.machine.children import run_module
+from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line
-from orchestrator.machine.locks import process_folder
 from orchestrator.system.names import file_name
 from orchestrator.system.structure import System
 

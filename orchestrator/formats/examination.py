@@ -10,8 +10,8 @@ from fmpy.model_description import ModelVariable
 from fmpy.validation import validate_fmu
 
 from orchestrator.formats.ssp.archive import listed
-from orchestrator.machine.archives import unpacked
 from orchestrator.machine.errors import Findings, InputError, reason
+from orchestrator.machine.user_files import unpacked
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System

@@ -21,8 +21,7 @@ from tempfile import mkdtemp, mkstemp
 
 from platformdirs import user_cache_path
 
-from orchestrator.machine.atomic import to_disk
-from orchestrator.machine.locks import process_folder
+from orchestrator.machine.disk import process_folder, to_disk
 
 #: The folder of the digests, beside one for each category of what is kept.
 _DIGESTS = "digests"

@@ -1,20 +1,35 @@
-"""Modules run in processes that do not outlive this one, none of them from the current folder.
+"""Child processes, which do not outlive this one: Python's modules, and C compilers.
 
-As a module it is what runs in such a process: `python -m orchestrator.machine.children MODULE ...`.
+As a module it is what runs in the process of another one, and never from the current folder:
+`python -m orchestrator.machine.children MODULE ...`.
 """
 
 from __future__ import annotations
 
 import os
 import runpy
-import subprocess
+import shutil
+import signal
 import sys
 import threading
+from collections.abc import Callable, Sequence
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
+from subprocess import PIPE, CompletedProcess, Popen, TimeoutExpired, run
 from tempfile import TemporaryDirectory
 
-from orchestrator.machine.locks import process_folder
+from orchestrator.machine.disk import process_folder
+from orchestrator.machine.errors import last_line
+
+#: C compilers: the first one that there is, is taken. :mod:`fmus.compilers` has the same.
+COMPILERS = ("cc", "gcc", "clang")
+
+#: How long this machine's compiler may take [s], and ziglang, which makes a C library, too.
+_LIMIT, LIMIT_OF_ZIG = 60.0, 600.0
+
+#: A compiler: a call with its arguments.
+Compiler = Callable[..., CompletedProcess[str]]
 
 
 def imported_apart(module: str, file: str) -> None:
@@ -37,7 +52,7 @@ def imported_apart(module: str, file: str) -> None:
 
 def run_module(
     module: str, *arguments: str, folder: Path | None = None, timeout: float | None = None
-) -> subprocess.CompletedProcess[str]:
+) -> CompletedProcess[str]:
     """Run a module to its end; an exception here, such as Ctrl-C, ends it at once.
 
     Without -P it would import from the current folder.
@@ -49,7 +64,7 @@ def run_module(
         timeout: how long it may take [s]; None: as long as it wants.
 
     Raises:
-        subprocess.TimeoutExpired: it took longer, and was ended.
+        TimeoutExpired: it took longer, and was ended.
         OSError: no process can be started.
 
     """
@@ -57,7 +72,7 @@ def run_module(
     end_of_child, end_of_ours = os.pipe()
     try:
         with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
-            return subprocess.run(
+            return run(
                 [sys.executable, "-P", "-m", __name__, module, *arguments],
                 stdin=end_of_child,
                 capture_output=True,
@@ -77,6 +92,70 @@ def _follow() -> None:
     """End with the process that has started this one."""
     os.read(sys.stdin.fileno(), 1)
     os._exit(1)
+
+
+def compiler() -> Compiler | None:
+    """A C compiler: this machine's, or else the package ziglang's; None: there is none."""
+    if found := of_the_machine():
+        return found
+    if find_spec("ziglang") is None:
+        return None
+    return lambda *arguments: run_module("ziglang", "cc", *arguments, timeout=LIMIT_OF_ZIG)
+
+
+def of_the_machine() -> Compiler | None:
+    """The C compiler of this machine, if it has one: it takes a tenth of a second, zig some."""
+    command = machines_compiler()
+    return None if command is None else lambda *arguments: run_compiler([command, *arguments])
+
+
+def machines_compiler() -> str | None:
+    """Its command."""
+    return next(filter(None, map(shutil.which, COMPILERS)), None)
+
+
+def made_library(compiler: Compiler, *arguments: str) -> bytes:
+    """A library that a compiler makes, of sources and options.
+
+    Raises:
+        OSError: it does not; the text is its first error.
+
+    """
+    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
+        path = Path(temporary, "library")
+        process = compiler(*arguments, "-o", str(path))
+        if process.returncode != 0:
+            errors = (line for line in process.stderr.splitlines() if "error" in line)
+            raise OSError(next(errors, last_line(process.stderr)))
+        return path.read_bytes()
+
+
+def run_compiler(command: Sequence[str], limit: float | None = None) -> CompletedProcess[str]:
+    """Run a C compiler, and end it with all that it has started if it takes too long.
+
+    Args:
+        command: with its arguments.
+        limit: how long it may take [s]; None: as long as this machine's.
+
+    Raises:
+        OSError: it does, or it cannot be started.
+
+    """
+    limit = _LIMIT if limit is None else limit
+    # Ctrl-C is for this process only.
+    with Popen(
+        command, stdout=PIPE, stderr=PIPE, text=True, errors="replace", start_new_session=True
+    ) as process:
+        try:
+            said, complaints = process.communicate(timeout=limit)
+        except BaseException as error:
+            if os.name == "posix":
+                os.killpg(process.pid, signal.SIGKILL)
+            process.kill()
+            if isinstance(error, TimeoutExpired):
+                raise TimeoutError(f"{command[0]} has not ended after {limit:g} s") from None
+            raise
+    return CompletedProcess(command, process.returncode, said, complaints)
 
 
 if __name__ == "__main__":

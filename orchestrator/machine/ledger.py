@@ -26,7 +26,7 @@ from stat import S_ISREG
 from typing import NamedTuple
 from uuid import uuid4
 
-from orchestrator.machine.atomic import sealed, to_disk, unsealed, write_new, write_whole
+from orchestrator.machine.disk import sealed, to_disk, unsealed, write_new, write_whole
 from orchestrator.machine.errors import InputError
 
 #: The ledger of a folder; what is being written there begins with the same letters.

@@ -1,18 +1,73 @@
-"""Files that the user names, read with care: none is waited for, and none is without an end."""
+"""Files that the user names, read with care: none is waited for, and none is without an end.
+
+Archives are unpacked once a process and content, into a temporary folder of the process, which ends
+with it. Running a system again then neither unzips an FMU nor loads its library a second time; and
+what was read of a file stays what it was, whatever becomes of the file.
+"""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+import hashlib
+import os
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from pathlib import Path
+from dataclasses import dataclass
+from io import BufferedReader
+from pathlib import Path, PurePosixPath
+from shutil import rmtree
 from stat import S_ISDIR, S_ISREG
-from typing import TextIO
+from tempfile import gettempdir, mkdtemp
+from threading import Lock
+from typing import NamedTuple, TextIO, TypeAlias
+from zipfile import ZipFile, ZipInfo
 
+from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, did_you_mean, reason
 
 #: Longest file that is read as a whole, and longest line of one that is not [characters].
 _LONGEST, _LONGEST_LINE = 10_000_000, 1_000_000
+
+#: An archive that holds more than this is not unpacked, nor one that does so with those in it.
+_MOST_FILES, _MOST_BYTES = 100_000, 2**30
+
+#: Nor one that is longer than this, whatever it says that it holds [bytes].
+_LONGEST_ARCHIVE = 2 * _MOST_BYTES
+
+#: Folders in folders that an archive may have: Python enters them one in the other.
+_MOST_FOLDERS = 100
+
+#: No more than this is unpacked in a process [bytes].
+_MOST_OF_A_PROCESS = 2**33
+
+#: Files of an archive that are read into memory, and how long they may be [bytes].
+_DESCRIPTIONS, _MOST_OF_A_DESCRIPTION = (".xml", ".ssd", ".ssv", ".ssm"), 100_000_000
+
+#: How a file begins that Git has left in the place of another one.
+_POINTER = b"version https://git-lfs.github.com/spec/"
+
+#: Runs in several threads share what is unpacked.
+_LOCK = Lock()
+
+#: A file as it is now; when it is written it gets another one.
+_Version: TypeAlias = tuple[int, ...]
+
+
+@dataclass
+class _Whole:
+    """An archive, and how much it and those in it have been unpacked to."""
+
+    archive: Path
+    files: int = 0
+    bytes: int = 0
+
+
+#: By the folders that they are unpacked into.
+_wholes: dict[Path, _Whole] = {}
+
+#: Digests by the files that had them, and folders by the digests of what is in them.
+_digests: dict[_Version, str] = {}
+_folders: dict[str, Path] = {}
 
 
 @contextmanager
@@ -130,3 +185,158 @@ def path_of(name: str, folder: Path, what: str, files: str) -> Path:
             f"{did_you_mean(name, known)}"
         )
     return folder / f"{name}.toml"
+
+
+class Unpacked(NamedTuple):
+    """An archive as it was read: the folder that it was unpacked into, and its SHA-256."""
+
+    folder: Path
+    digest: str
+
+
+def unpacked(archive: Path) -> Unpacked:
+    """An FMU or SSP as it is now, unpacked.
+
+    Raises:
+        InputError: it cannot be unpacked.
+
+    """
+    check_file(archive)
+    try:
+        with _LOCK, archive.open("rb") as file:
+            if file.peek(len(_POINTER)).startswith(_POINTER):
+                raise InputError(
+                    f"{archive}: is a pointer of Git LFS, not the file that it stands for: get "
+                    "that with `git lfs pull`"
+                )
+            return _unpacked(archive, file)
+    except InputError:
+        raise
+    # What is wrong with an archive, each of Python's decompressors says in exceptions of its own.
+    except Exception as error:
+        raise InputError(f"{archive}: cannot be opened: {reason(error)}") from error
+
+
+def folder_of(archive: Path, digest: str) -> Path:
+    """The folder of an archive as it was read, in this process or in another one.
+
+    Raises:
+        InputError: this process has not read it, and the file is another one now.
+
+    """
+    folder = _folders.get(digest)
+    if folder is None:
+        folder, now = unpacked(archive)
+        _check_same(archive, now, digest)
+    return folder
+
+
+def archive_of(archive: Path, digest: str) -> bytes:
+    """The bytes of an archive as it was read.
+
+    Raises:
+        InputError: the file is another one now.
+
+    """
+    check_file(archive)
+    content = archive.read_bytes()
+    _check_same(archive, hashlib.sha256(content).hexdigest(), digest)
+    return content
+
+
+def _check_same(archive: Path, now: str, digest: str) -> None:
+    if now != digest:
+        raise InputError(f"{archive}: has changed since it was read; begin anew")
+
+
+def _unpacked(archive: Path, file: BufferedReader) -> Unpacked:
+    version = _version_of(file)
+    digest = _digests.get(version)
+    if digest is None:
+        with ZipFile(file) as content:
+            # Before the file is read to its end, which it may not have.
+            _check(content.infolist())
+            if (size := os.fstat(file.fileno()).st_size) > _LONGEST_ARCHIVE:
+                raise ValueError(f"it is {size:,} bytes long, more than {_LONGEST_ARCHIVE:,}")
+            file.seek(0)
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+            if digest not in _folders:
+                folder = _extracted(archive, content)
+                if _version_of(file) != version:
+                    rmtree(folder, ignore_errors=True)
+                    raise InputError(f"{archive}: is being written; try again when it is whole")
+                _folders[digest] = folder
+        _digests[version] = digest
+    return Unpacked(_folders[digest], digest)
+
+
+def _version_of(file: BufferedReader) -> _Version:
+    # A file that is written gets another time of change, whatever is done to the others.
+    it = os.fstat(file.fileno())
+    return it.st_dev, it.st_ino, it.st_size, it.st_mtime_ns, it.st_ctime_ns
+
+
+def _extracted(archive: Path, content: ZipFile) -> Path:
+    archive, entries = archive.resolve(), content.infolist()
+    around = (_wholes.get(folder) for folder in archive.parents)
+    whole = next(filter(None, around), None) or _Whole(archive)
+    files, size = len(entries), sum(entry.file_size for entry in entries)
+    _check_with(whole, files, size)
+    try:
+        folder = Path(mkdtemp(dir=process_folder().resolve()))
+        try:
+            content.extractall(folder)
+        except BaseException:
+            rmtree(folder, ignore_errors=True)
+            raise
+    except OSError as error:
+        raise InputError(
+            f"{archive}: cannot be unpacked into {gettempdir()}: {reason(error)}; set "
+            "TMPDIR to another folder"
+        ) from error
+    _wholes[folder] = whole
+    whole.files += files
+    whole.bytes += size
+    return folder
+
+
+def _check_with(whole: _Whole, files: int, size: int) -> None:
+    """Refuse what fills the disk together with what there is."""
+    within = f"and {whole.archive} with all that is in it to"
+    if (together := whole.files + files) > _MOST_FILES:
+        raise ValueError(
+            f"it unpacks to {files:,} files, {within} {together:,}, more than {_MOST_FILES:,}"
+        )
+    if (together := whole.bytes + size) > _MOST_BYTES:
+        raise ValueError(
+            f"it unpacks to {size:,} bytes, {within} {together:,}, more than {_MOST_BYTES:,}"
+        )
+    others = {id(one): one.bytes for one in _wholes.values()}
+    if (together := sum(others.values()) + size) > _MOST_OF_A_PROCESS:
+        raise ValueError(
+            f"it unpacks to {size:,} bytes, and all archives of this process to {together:,}, more "
+            f"than {_MOST_OF_A_PROCESS:,}: run them in processes of their own"
+        )
+
+
+def _check(entries: Sequence[ZipInfo]) -> None:
+    """Refuse what fills the disk or the memory, and what tools unpack in different ways."""
+    if len(entries) > _MOST_FILES:
+        raise ValueError(f"it holds {len(entries):,} files, more than {_MOST_FILES:,}")
+    if sum(entry.file_size for entry in entries) > _MOST_BYTES:
+        size = sum(entry.file_size for entry in entries)
+        raise ValueError(f"it unpacks to more than {_MOST_BYTES:,} bytes: {size:,}")
+    names = set()
+    for entry in entries:
+        path = PurePosixPath(entry.filename.replace("\\", "/"))
+        if path.is_absolute() or ".." in path.parts:
+            raise ValueError(f"it holds {entry.filename!r}, which leads out of it")
+        if (depth := len(path.parts) - 1) > _MOST_FOLDERS:
+            raise ValueError(
+                f"it holds {path.parts[0]:.40}/…, {depth:,} folders deep, more than {_MOST_FOLDERS}"
+            )
+        if path in names:
+            raise ValueError(f"it holds {entry.filename!r} twice")
+        names.add(path)
+        if path.suffix in _DESCRIPTIONS and entry.file_size > _MOST_OF_A_DESCRIPTION:
+            raise ValueError(f"{entry.filename!r} is longer than {_MOST_OF_A_DESCRIPTION:,} bytes")

@@ -24,9 +24,9 @@ from tqdm import tqdm
 
 from orchestrator.machine import cache
 from orchestrator.machine.children import imported_apart
+from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts, held_interrupts, without_interrupt
-from orchestrator.machine.locks import process_folder
 
 #: How long the loop waits before it asks whether it shall stop [s].
 _PATIENCE = 0.1

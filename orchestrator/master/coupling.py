@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from orchestrator.machine.errors import InputError, StartError
+from orchestrator.machine.errors import InputError, StartError, shortened
 from orchestrator.master.experiment import (
     DELAY,
     GAUSS_SEIDEL,
@@ -16,18 +16,18 @@ from orchestrator.master.experiment import (
     SOLVE,
     Exchange,
 )
-from orchestrator.master.fmi.instance import Instance
-from orchestrator.master.fmi.log import Log
-from orchestrator.master.gathering import Gathering
-from orchestrator.master.linear import LinearSteps
+from orchestrator.master.fmi.instance import ComponentFailed, Instance, Log
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.plan import Plan, delays, stages
 from orchestrator.master.ring import Ring
-from orchestrator.master.row import Row
-from orchestrator.master.schedule import Stage, StageCall, schedule
-from orchestrator.master.settling import Settling
+from orchestrator.master.row import Gathering, Row
+from orchestrator.master.schedule import Stage, StageCall, member, schedule, step
 from orchestrator.system.graph import has_feedthrough, rings
 from orchestrator.system.names import PortName
+from orchestrator.system.structure import System
+
+#: Values go along all connections so often, until they rest.
+_MOST_ROUNDS = 1000
 
 #: A value grows without bound if it doubles at least so often in each of so many intervals, one
 #: after the other, and so often in all of them together. What grows with a power of time does not.
@@ -82,6 +82,123 @@ class Growth:
         """Nothing is kept."""
 
 
+class _Single:
+    """A component of no ring: see :class:`.ring.Ring`."""
+
+    def __init__(self, system: System, instance: Instance, row: Row) -> None:
+        self.names = [instance.name]
+        self._instance, self._row = instance, row
+        self._gather = Gathering.along(row, system.feeding[instance.name])
+        self.gatherings = [self._gather]
+
+    def renew(self, always: bool = False) -> bool:
+        values, targets = self._row.values, self._gather.targets
+        before = values[targets]
+        self._gather(values)
+        if not always and before.tobytes() == values[targets].tobytes():
+            return False
+        self._instance.exchange()
+        self._row.show(self._instance.name)
+        return True
+
+
+class _Settling:
+    """Values handed along all connections at one time, until every input has what feeds it."""
+
+    def __init__(self, units: Sequence[Ring | _Single], row: Row) -> None:
+        """Take what feeds each other, in the order of direct feedthroughs."""
+        self._units, self._row = units, row
+
+    @property
+    def gatherings(self) -> list[Gathering]:
+        """All that it gathers."""
+        return [gather for unit in self._units for gather in unit.gatherings]
+
+    @property
+    def places(self) -> dict[str, int]:
+        """Where in that order each component is."""
+        return {name: i for i, unit in enumerate(self._units) for name in unit.names}
+
+    def settle(self) -> None:
+        """Hand values on until they rest.
+
+        Raises:
+            ComponentFailed: they do not come to rest, or a component fails.
+
+        """
+        for _ in range(_MOST_ROUNDS):
+            before = self._row.values.copy()
+            if not self.hand_on():
+                return
+        if restless := self._row.moving(before):
+            raise ComponentFailed(
+                f"values do not come to rest: {shortened(', '.join(map(str, restless)))} in an "
+                "algebraic loop"
+            )
+
+    def hand_on(self, everything: bool = False) -> bool:
+        """Hand values along all connections once; whether any input has changed.
+
+        Args:
+            everything: also to components whose inputs are what they were.
+
+        """
+        changed = [unit.renew(everything) for unit in self._units]
+        return any(changed)
+
+
+class _LinearSteps:
+    """Steps in which inputs change linearly from one communication point to the next.
+
+    Every step is made twice. The first time all inputs are held, which says what they come to at
+    its end; then the components go back to its beginning, and make it with inputs that change to
+    these values. The error of what is coupled falls with the square of the step, where held inputs
+    give its first power.
+    """
+
+    def __init__(
+        self, system: System, instances: Mapping[str, Instance], row: Row, settling: _Settling
+    ) -> None:
+        self._values, self._settling = row.values, settling
+        self._all = [member(instance) for instance in instances.values()]
+        self._fed = [instance for name, instance in instances.items() if system.feeding[name]]
+        self._again = [member(instance) for instance in self._fed]
+        self._inputs = [
+            row.columns[PortName(instance.name, variable.name)]
+            for instance in self._fed
+            for variable in system.components[instance.name].having("input")
+        ]
+        #: References and columns of the inputs of each that change.
+        self._changing: list[tuple[list[int], list[int]]] = []
+        for instance in self._fed:
+            component = system.components[instance.name]
+            targets = [
+                connection.target
+                for connection in system.feeding[instance.name]
+                if component.is_continuous(connection.target.port)
+            ]
+            references = [component.variables[target.port].valueReference for target in targets]
+            self._changing.append((references, [row.columns[target] for target in targets]))
+
+    def step(self, t: float, h: float) -> None:
+        values = self._values
+        self._settling.settle()
+        begin = values.copy()
+        for instance in self._fed:
+            instance.keep()
+        step(self._all, t, h, is_final=False)
+        self._settling.settle()
+        slopes = (values - begin) / h
+        values[self._inputs] = begin[self._inputs]
+        for instance, (references, columns) in zip(self._fed, self._changing, strict=True):
+            instance.go_back()
+            instance.let_change(references, slopes[columns].tolist())
+        step(self._again, t, h)
+        for instance, (references, _) in zip(self._fed, self._changing, strict=True):
+            instance.let_change(references, [0.0] * len(references))
+        self._settling.settle()
+
+
 class Coupling:
     """The rings of direct feedthroughs of a system, and what follows from them.
 
@@ -127,22 +244,22 @@ class Coupling:
         system, instances, start = self._system, self._instances, self._experiment.start_time
         for name, instance in instances.items():
             instance.enter_initialization(system.parameters_of(name), start)
-            held = instance.read(system.open_inputs(name))
-            self._row.enter({PortName(name, port): value for port, value in held.items()})
-        settling = self._settling(self._rings)
+            self._enter(name, system.open_inputs(name))
         if self._exchange.at_start:
-            settling.begin()
+            settling = self._settling(self._rings)
+            self._read_ahead(settling.places)
+            settling.hand_on(everything=True)
+            settling.settle()
             self._check_finite()
         for instance in instances.values():
             instance.exit_initialization()
         self._solved = self._solvable()
         self.sequence = self._in_stages(self._experiment.order, self._solved)
-        if self._rings:
-            settling = self._settling(self._solved)
         if self._exchange.at_start:
-            settling.hand_on(everything=True)
+            self._settling(self._solved).hand_on(everything=True)
         else:
-            self._read_outputs()
+            for name in instances:
+                self._enter(name, [port.name for port in system.components[name].having("output")])
         self._check_finite()
         if self._log.refusals:
             raise InputError("; ".join(self._log.refusals))
@@ -152,17 +269,11 @@ class Coupling:
         system, instances, row = self._system, self._instances, self._row
         if self._experiment.coupling == LINEAR:
             settling = self._settling(self._solved)
-            steps = LinearSteps(system, instances, row, settling)
+            steps = _LinearSteps(system, instances, row, settling)
             stage = Stage(Gathering.along(row, ()), [StageCall(steps.step).member])
             return [stage], settling.gatherings
-        found = schedule(
-            self._plan,
-            self.sequence,
-            instances,
-            row,
-            self._solved,
-            latest=self._exchange.latest,
-        )
+        latest = self._exchange.latest
+        found = schedule(self._plan, self.sequence, instances, row, self._solved, latest=latest)
         own = [gather for ring in self._solved for gather in ring.gatherings]
         return found, [stage.gather for stage in found] + own
 
@@ -210,17 +321,29 @@ class Coupling:
             return [[name] for name in order]
         return stages(self._system, order, [ring.names for ring in solved])
 
-    def _settling(self, solved: Sequence[Ring]) -> Settling:
-        sequence = self._in_stages(GAUSS_SEIDEL, solved)
-        return Settling(self._system, self._instances, self._row, sequence, solved)
+    def _settling(self, solved: Sequence[Ring]) -> _Settling:
+        ring_of = {ring.names[0]: ring for ring in solved}
+        units: list[Ring | _Single] = []
+        for stage in self._in_stages(GAUSS_SEIDEL, solved):
+            units += [ring_of[name] for name in stage if name in ring_of] or [
+                _Single(self._system, self._instances[name], self._row) for name in stage
+            ]
+        return _Settling(units, self._row)
 
-    def _read_outputs(self) -> None:
-        """Enter what components show whose inputs have not been set."""
-        for name, instance in self._instances.items():
-            outputs = self._system.components[name].having("output")
-            ports = [PortName(name, variable.name) for variable in outputs]
-            held = instance.read([port.port for port in ports if port in self._row.columns])
-            self._row.enter({PortName(name, port): value for port, value in held.items()})
+    def _read_ahead(self, places: Mapping[str, int]) -> None:
+        """Read outputs that feed a component before it is their own component's turn."""
+        wanted: dict[str, dict[str, None]] = {}
+        for connection in self._system.connections:
+            source, target = connection.source, connection.target
+            if places[source.component] >= places[target.component]:
+                wanted.setdefault(source.component, {})[source.port] = None
+        for name, ports in wanted.items():
+            self._enter(name, list(ports))
+
+    def _enter(self, name: str, ports: Sequence[str]) -> None:
+        """Enter into the row what an FMU holds."""
+        held = self._instances[name].read(ports)
+        self._row.enter({PortName(name, port): value for port, value in held.items()})
 
     def _check_finite(self) -> None:
         if wrong := self._row.wrong(self._instances):

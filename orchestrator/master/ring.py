@@ -16,8 +16,7 @@ from fmpy.model_description import ModelVariable
 
 from orchestrator.machine.errors import shortened
 from orchestrator.master.fmi.instance import ComponentFailed, Instance
-from orchestrator.master.gathering import Gathering
-from orchestrator.master.row import Row
+from orchestrator.master.row import Gathering, Row
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System

@@ -22,11 +22,10 @@ from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
 from orchestrator.master.experiment import JACOBI, Order
 from orchestrator.master.fmi.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
 from orchestrator.master.fmi.surroundings import PRODUCT, A, B, C, put_back
-from orchestrator.master.gathering import Gathering
+from orchestrator.master.fmi.transfer import CMember, CMove
 from orchestrator.master.plan import Plan, gathered
 from orchestrator.master.ring import Ring
-from orchestrator.master.row import Row
-from orchestrator.master.stepper_types import CMember, CMove
+from orchestrator.master.row import Gathering, Row
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection

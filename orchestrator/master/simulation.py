@@ -12,17 +12,15 @@ from orchestrator.machine.errors import InputError, StartError, reason, unforese
 from orchestrator.machine.interrupts import held_interrupts
 from orchestrator.master.coupling import Coupling, Growth
 from orchestrator.master.experiment import OURS, Exchange
-from orchestrator.master.fmi.instance import ComponentFailed, Ended, Instance
+from orchestrator.master.fmi.instance import ComponentFailed, Ended, Instance, Log
 from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.fmi.log import Log
 from orchestrator.master.fmi.placement import placed
 from orchestrator.master.fmi.surroundings import Surroundings, default_mode
-from orchestrator.master.gathering import Overrides
 from orchestrator.master.hooks.hook import Hook, Hooks, Run
 from orchestrator.master.loop import PYTHON_LOOP, Stepping, to_its_end
 from orchestrator.master.observers.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.plan import Plan
-from orchestrator.master.row import Row
+from orchestrator.master.row import Overrides, Row
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import literal, same, unit_of
@@ -71,11 +69,13 @@ def simulate(
             row = Row(system, instances, slow)
             coupling = Coupling(plan, instances, row, log, exchange)
             coupling.initialise()
-            names = tuple(map(str, row.columns))
-            parameters = _parameters(system, instances, log)
-            strings = dict.fromkeys(map(str, row.text_ports), row.strings)
             header = Header(
-                names, experiment, parameters, loop.name, strings, _units(system, row.columns)
+                tuple(map(str, row.columns)),
+                experiment,
+                _parameters(system, instances, log),
+                loop.name,
+                dict.fromkeys(map(str, row.text_ports), row.strings),
+                _units(system, row.columns),
             )
         scheduled, gatherings = coupling.schedule()
         if watched := coupling.delayed_ports():
@@ -86,17 +86,9 @@ def simulate(
             blocks.append(experiment.start_time, row.shown)
             overrides = Overrides(row, gatherings, system.connections)
             run = Run(
-                system,
-                experiment,
-                instances,
-                row,
-                scheduled,
-                overrides,
-                blocks,
-                log,
-                interrupts,
+                system, experiment, instances, row, scheduled, overrides, blocks, log, interrupts,
                 hooks,
-            )
+            )  # fmt: skip
             order = [name for names in coupling.sequence for name in names]
             remark = None
             try:
@@ -107,7 +99,10 @@ def simulate(
             except Ended as end:
                 failure, remark = None, str(end)
             if failure is None:
-                _terminate(instances)
+                for instance in instances.values():
+                    # The rows are there whether it can or not.
+                    with suppress(ComponentFailed):
+                        instance.terminate()
             ending = Ending(
                 failure, remark, log.messages, tuple(interrupts.signals), tuple(run.happened)
             )
@@ -172,13 +167,6 @@ def _units(system: System, columns: Iterable[PortName]) -> dict[str, str]:
         for name in columns
     }
     return {name: unit for name, unit in units.items() if unit is not None}
-
-
-def _terminate(instances: Mapping[str, Instance]) -> None:
-    """Let FMUs end what they have begun; the rows are there whether they can or not."""
-    for instance in instances.values():
-        with suppress(ComponentFailed):
-            instance.terminate()
 
 
 def _advance(

@@ -91,8 +91,8 @@ typedef struct {
     int status;
 } failure;
 
-/* Take on the default floating-point mode after calls of an FMU: see mode.py. Whether it was
- * another one, as far as that can be told. */
+/* Take on the default floating-point mode after calls of an FMU: see fmi/surroundings.py.
+ * Whether it was another one, as far as that can be told. */
 #ifdef __x86_64__
 enum { CAN_TELL = 1 };
 static inline int put_back(void) {

@@ -6,29 +6,20 @@ import sys
 import sysconfig
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from ctypes import CDLL, POINTER, c_double, c_int, c_size_t
+from ctypes import CDLL, POINTER, Structure, c_double, c_int, c_size_t, c_void_p
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from orchestrator.machine import cache as user_cache
-from orchestrator.machine.compiler import Compiler, compiler, of_the_machine
-from orchestrator.machine.errors import InputError, last_line, reason
-from orchestrator.machine.locks import claimed, process_folder
+from orchestrator.machine.children import compiler, made_library, of_the_machine
+from orchestrator.machine.disk import claimed
+from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.fmi.instance import CALLS
+from orchestrator.master.fmi.transfer import CMember
 from orchestrator.master.hooks.hook import Run
+from orchestrator.master.observers.observer import CBlock
 from orchestrator.master.schedule import Decimation, Stage
-from orchestrator.master.stepper_types import (
-    DUE,
-    FAILED,
-    CBlock,
-    CFailure,
-    CMapping,
-    CMember,
-    CRun,
-    CStage,
-)
 
 _SOURCE = Path(__file__).with_name("stepper.c")
 
@@ -41,8 +32,62 @@ _CATEGORY = "loop"
 #: Libraries that this process has loaded, by cache folders.
 _in_use: dict[Path, CDLL] = {}
 
+#: Why Python has to look.
+_DUE, _FAILED = range(2)
+
 #: Longest time until Python checks whether the run is to stop [s].
 _GLANCE = 0.02
+
+
+class CMapping(Structure):
+    """Values that become others on their way through one connection."""
+
+    _fields_ = (
+        ("connection", c_size_t),
+        ("n", c_size_t),
+        ("from_values", POINTER(c_double)),
+        ("to_values", POINTER(c_double)),
+    )
+
+
+class CStage(Structure):
+    """Inputs to gather, and the components to step then."""
+
+    _fields_ = (
+        ("targets", c_void_p),
+        ("sources", c_void_p),
+        ("factors", c_void_p),
+        ("offsets", c_void_p),
+        ("mappings", POINTER(CMapping)),
+        ("members", POINTER(CMember)),
+        ("n_connections", c_size_t),
+        ("n_mappings", c_size_t),
+        ("n_members", c_size_t),
+        ("every", c_size_t),
+        ("at_end", c_int),
+    )
+
+
+class CRun(Structure):
+    """What the steps of a run are made of."""
+
+    _fields_ = (
+        ("stages", POINTER(CStage)),
+        ("values", c_void_p),
+        ("n_stages", c_size_t),
+        ("n_shown", c_size_t),
+        ("start_time", c_double),
+        ("step", c_double),
+        ("stop_time", c_double),
+        ("full_steps", c_size_t),
+        ("steps", c_size_t),
+    )
+
+
+class CFailure(Structure):
+    """The first call with a status that is worse than a warning."""
+
+    _fields_ = (("stage", c_size_t), ("member", c_size_t), ("call", c_int), ("status", c_int))
 
 
 def stepped(library: CDLL, run: Run) -> Iterator[None]:
@@ -67,15 +112,15 @@ def stepped(library: CDLL, run: Run) -> Iterator[None]:
         steps,
     )
     block, failure = blocks.block, CFailure()
-    outcome = DUE
-    while outcome == DUE and run.made < steps:
+    outcome = _DUE
+    while outcome == _DUE and run.made < steps:
         if block.n == block.most:
             blocks.hand_over()
         before = block.n
         outcome = advance(plan, run.made, min(run.due, steps), _GLANCE, block, failure)
         run.made += block.n - before
         yield
-    if outcome == FAILED:
+    if outcome == _FAILED:
         member = stages[failure.stage].members[failure.member]
         raise member.instance.failed(failure.status, CALLS[failure.call])
 
@@ -126,29 +171,16 @@ def made(in_no_time: bool = False) -> CDLL:
             "the compiled loop needs a C compiler: install gcc or clang, or `pip install ziglang`"
         )
     try:
-        return _made(found)
+        with claimed(user_cache.folder_of(_CATEGORY), wait=True):
+            if library := kept():
+                # Another process was first.
+                return library
+            content = made_library(found, *_FLAGS, str(_SOURCE))
+            name = "stepper" + (".dll" if sys.platform == "win32" else ".so")
+            [place] = user_cache.keep(_CATEGORY, _key(), {name: content})
+        return _loaded(place)
     except OSError as error:
         raise InputError(f"the loop cannot be compiled: {reason(error)}") from error
-
-
-def _made(compiler: Compiler) -> CDLL:
-    """The library, compiled and kept.
-
-    Raises:
-        OSError: it cannot be compiled, kept or loaded.
-
-    """
-    with claimed(user_cache.folder_of(_CATEGORY), wait=True):
-        if library := kept():
-            # Another process was first.
-            return library
-        with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
-            path = Path(temporary, _name())
-            process = compiler(*_FLAGS, str(_SOURCE), "-o", str(path))
-            if process.returncode != 0:
-                raise OSError(last_line(process.stderr))
-            [place] = user_cache.keep(_CATEGORY, _key(), {path.name: path.read_bytes()})
-    return _loaded(place)
 
 
 @cache
@@ -157,10 +189,6 @@ def _loaded(place: Path) -> CDLL:
     if not hasattr(library, "advance"):
         raise OSError(f"{place} has no function advance")
     return library
-
-
-def _name() -> str:
-    return "stepper" + (".dll" if sys.platform == "win32" else ".so")
 
 
 @cache

@@ -17,9 +17,9 @@ from orchestrator.machine.errors import InputError
 from orchestrator.machine.ledger import Ledger
 from orchestrator.machine.workers import Workers
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.identity import code_of, digest_of
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import code_of, digest_of
 from orchestrator.runs.folder import opened
 from orchestrator.runs.preparation import Prepared, prepared_of
 from orchestrator.runs.request import Request

@@ -22,9 +22,9 @@ from fmus.kinds import CONTAINED, FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.machine.cache import folder_of, keep, kept, users_folder
 from orchestrator.machine.children import run_module
+from orchestrator.machine.disk import claimed, process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.machine.ledger import digest_of
-from orchestrator.machine.locks import claimed, process_folder
 from orchestrator.runs.folder import replaced
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import WRITABLE

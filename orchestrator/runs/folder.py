@@ -16,9 +16,9 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
+from orchestrator.machine.disk import claimed
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.ledger import RECORD, Ledger, Taken, located
-from orchestrator.machine.locks import claimed
 
 #: Where a run that came to no end goes, if there is a whole result already.
 INCOMPLETE = "incomplete"

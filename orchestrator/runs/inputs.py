@@ -10,7 +10,7 @@ import numpy as np
 
 from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.errors import InputError
-from orchestrator.master.hooks.playback import InputTable
+from orchestrator.master.hooks.timing import InputTable
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import type_of, typed

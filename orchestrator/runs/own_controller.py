@@ -9,8 +9,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.locks import process_folder
 from orchestrator.runs.bundle import run_fmus
 from orchestrator.runs.folder import replaced
 

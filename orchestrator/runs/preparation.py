@@ -17,14 +17,12 @@ from orchestrator.master.experiment import (
     with_common_step,
 )
 from orchestrator.master.fmi.isolated import Isolation, isolation_of
-from orchestrator.master.hooks.clock import check_factor
 from orchestrator.master.hooks.events import Alter, Event, Events, Set
 from orchestrator.master.hooks.hook import Hook
-from orchestrator.master.hooks.playback import InputTable, Playback
-from orchestrator.master.identity import Identity, identity
+from orchestrator.master.hooks.timing import InputTable, Playback, check_factor
 from orchestrator.master.loop import PYTHON_LOOP, Stepping, chosen
 from orchestrator.master.observers.observer import Ending, Observer
-from orchestrator.master.plan import Plan, planned
+from orchestrator.master.plan import Identity, Plan, identity, planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.inputs import Inputs, read_inputs
@@ -106,7 +104,8 @@ class Prepared:
     @property
     def identity(self) -> Identity:
         """All that its rows depend on."""
-        return identity(self.system, self.experiment, self.events, self.input_table)
+        inputs = self.input_table.digest if self.input_table else ""
+        return identity(self.plan, self.events, inputs)
 
     def _hooks(self) -> list[Hook]:
         playing: list[Hook] = [] if self.input_table is None else [Playback(self.input_table)]
@@ -146,7 +145,6 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
             given |= set(scenario.parameters)
         with findings.collecting():
             system, input_table = read_inputs(inputs, system, given)
-    system.check()
     events = _events(request)
     if events is None:
         events = scenario.events

@@ -14,10 +14,10 @@ from time import monotonic
 from typing import Any
 
 from fmus.kinds import NATIVE, PYTHON
-from orchestrator.machine.archives import runs_python
 from orchestrator.machine.ledger import RECORD
-from orchestrator.master import identity
+from orchestrator.master import plan as identity
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.fmi.binary import runs_python
 from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.runs.preparation import Prepared

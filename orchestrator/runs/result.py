@@ -18,8 +18,7 @@ from orchestrator.master.experiment import Order, written_order
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.loop import LOOPS
 from orchestrator.master.observers.files import FORMATS
-from orchestrator.master.observers.observer import Observer, Occurrence
-from orchestrator.master.observers.progress import Progress
+from orchestrator.master.observers.observer import Observer, Occurrence, Progress
 from orchestrator.master.observers.table import Table
 from orchestrator.runs.folder import locked, replaced
 from orchestrator.runs.loading import check_brings_its_own, loaded, warned

@@ -15,18 +15,24 @@ import numpy as np
 from orchestrator.figures.drawing import draw, figure_files
 from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
+from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.machine.ledger import LEDGER, Ledger
-from orchestrator.machine.locks import process_folder
 from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.hooks.checkpoint import Checkpoints
-from orchestrator.master.hooks.clock import RealTime
 from orchestrator.master.hooks.hook import Hook
+from orchestrator.master.hooks.timing import RealTime
 from orchestrator.master.observers.files import FORMATS
-from orchestrator.master.observers.observer import Ending, Observer
-from orchestrator.master.observers.progress import Progress
-from orchestrator.master.observers.selection import Selection, check_interval, matches, matching
+from orchestrator.master.observers.observer import (
+    Ending,
+    Observer,
+    Progress,
+    Selection,
+    check_interval,
+    matches,
+    matching,
+)
 from orchestrator.runs.folder import INCOMPLETE, inner, place_of, publish, replaced
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.record import FILES, Stopwatch, write_metrics, write_record

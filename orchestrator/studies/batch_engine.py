@@ -20,9 +20,9 @@ from fmus.kinds import PYTHON
 from fmus.ports.port import Refusal
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
-from orchestrator.master.identity import digest_of
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import digest_of
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.studies.batch import accumulator
 from orchestrator.studies.batch.kernel import COLUMNS, RunSteps, is_bounded, part_of

@@ -7,12 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator.machine.archives import archive_of
+from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.locks import process_folder
-from orchestrator.master.identity import code_of
+from orchestrator.machine.user_files import archive_of
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, chosen
-from orchestrator.master.plan import planned
+from orchestrator.master.plan import code_of, planned
 from orchestrator.runs.preparation import Prepared
 from orchestrator.studies.engine import Outcome, Point
 from orchestrator.system.names import port_name

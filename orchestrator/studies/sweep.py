@@ -17,11 +17,11 @@ from tqdm import tqdm
 
 from fmus.kinds import PYTHON
 from orchestrator.figures.study_figures import draw_figures, figure_files
-from orchestrator.machine.compiler import machines_compiler
+from orchestrator.machine.children import machines_compiler
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
-from orchestrator.master.identity import PACKAGES, digest_of
 from orchestrator.master.loop import LOOPS
+from orchestrator.master.plan import PACKAGES, digest_of
 from orchestrator.runs.loading import loaded
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import CliOption, Force, Kind, LoopName

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from orchestrator.machine.archives import folder_of, unpacked
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
+from orchestrator.machine.user_files import folder_of, unpacked
 from orchestrator.system.description import described
 from orchestrator.system.values import Value, finite, typed
 

@@ -14,8 +14,7 @@ from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
 from auv_fmu.saturation import SATURATIONS
 from orchestrator.master.observers.files import CsvLines
-from orchestrator.master.observers.observer import Ending, Header
-from orchestrator.master.observers.selection import every
+from orchestrator.master.observers.observer import Ending, Header, every
 from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import (
     ACTUATORS,

@@ -19,7 +19,7 @@ from fmus.compilers import FLAGS
 from fmus.kinds import TARGETS
 from orchestrator.exchange import c_host
 from orchestrator.exchange.verify import verify
-from orchestrator.machine.compiler import machines_compiler
+from orchestrator.machine.children import machines_compiler
 from orchestrator.master.experiment import Experiment
 from orchestrator.runs import bundle
 from orchestrator.system.component import Component

@@ -41,9 +41,9 @@ from orchestrator import Result, simulate
 from orchestrator.commands.main import main as auv_fmu
 from orchestrator.exchange import verify
 from orchestrator.formats.ssp.writer import ssp_bytes
-from orchestrator.machine import archives as unpacking
+from orchestrator.machine import user_files as unpacking
+from orchestrator.machine.disk import _process_folder
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.locks import _process_folder
 from orchestrator.master.experiment import ORDERS, Exchange
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.observer import Observer

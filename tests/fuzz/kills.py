@@ -26,8 +26,8 @@ from unittest.mock import patch
 from tqdm import trange
 
 from orchestrator.commands.main import main as auv_fmu
+from orchestrator.machine.disk import process_folder
 from orchestrator.machine.ledger import LEDGER
-from orchestrator.machine.locks import process_folder
 from orchestrator.paper import report
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.folder import opened

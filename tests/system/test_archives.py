@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from orchestrator.formats.ssp.reader import read_ssp
-from orchestrator.machine import archives as unpacking
+from orchestrator.machine import user_files as unpacking
+from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.locks import process_folder
 from orchestrator.system.component import read_component
 from support.archives import component, described, system
 

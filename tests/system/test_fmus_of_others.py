@@ -15,7 +15,7 @@ import pytest
 from orchestrator.commands.main import main
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.master.hooks.playback import Playback
+from orchestrator.master.hooks.timing import Playback
 from orchestrator.runs.inputs import Inputs, read_inputs
 from orchestrator.runs.stored import read_result
 from orchestrator.system.component import read_component

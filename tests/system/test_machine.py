@@ -23,7 +23,7 @@ from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.commands.streams import INTERRUPTED
 from orchestrator.formats.tables import read_rows
-from orchestrator.machine.locks import claimed
+from orchestrator.machine.disk import claimed
 from orchestrator.runs import record
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.stored import read_result

@@ -19,9 +19,10 @@ from fmpy.util import read_csv
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.formats.tables import read_columns, read_rows
-from orchestrator.machine.archives import check_place, unpacked
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.user_files import unpacked
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.fmi.binary import check_place
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned, stages

@@ -15,7 +15,7 @@ from uuid import uuid4
 import pytest
 
 from orchestrator.machine.cache import keep, kept
-from orchestrator.machine.locks import process_folder
+from orchestrator.machine.disk import process_folder
 from orchestrator.master import stepper
 from orchestrator.studies.sweep import making
 from support.machine import called

@@ -18,8 +18,8 @@ import pytest
 from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.formats.tables import read_columns, read_rows
-from orchestrator.machine.archives import unpacked
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.user_files import unpacked
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.plan import planned
 from orchestrator.runs.preparation import Prepared

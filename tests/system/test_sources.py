@@ -10,10 +10,10 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.machine import archives as unpacking
-from orchestrator.machine import compiler
+from orchestrator.machine import children as compiler
+from orchestrator.machine import user_files as unpacking
 from orchestrator.machine.errors import InputError
-from orchestrator.master.fmi import sources
+from orchestrator.master.fmi import binary as sources
 from support.relay import relay
 
 SUPPORT = Path(__file__).parents[1] / "support"

@@ -11,9 +11,8 @@ from xml.etree.ElementTree import Element
 
 from orchestrator.formats.ssp import STRUCTURE
 from orchestrator.formats.ssp.document import read_document, violations
-from orchestrator.machine.archives import unpacked
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason
-from orchestrator.machine.user_files import check_file, is_folder
+from orchestrator.machine.user_files import check_file, is_folder, unpacked
 from orchestrator.system.units import Linear, UndefinedUnit, Unit, conversion
 from orchestrator.system.values import finite, integer
 

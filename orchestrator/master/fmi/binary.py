@@ -1,24 +1,31 @@
-"""The library of an FMU, loaded once a process."""
+"""The library of an FMU: brought along or compiled from C sources, and loaded once a process."""
 
 from __future__ import annotations
 
 import glob
+import os
+import re
 import struct
+import sysconfig
+import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from hashlib import sha256
 from pathlib import Path
 from shutil import copytree
 from tempfile import mkdtemp
 from threading import Lock
-from typing import Any
+from typing import Any, NamedTuple
 
 import fmpy
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave, fmi2Error, fmi2Status
+from fmpy.model_description import read_build_description
 
-from orchestrator.machine.archives import check_place, runs_python
+from orchestrator.machine import cache as user_cache
+from orchestrator.machine.children import compiler, made_library
+from orchestrator.machine.disk import claimed
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.master.fmi.sources import check_compiler, compile_into, sources_of
 from orchestrator.master.fmi.surroundings import put_back, within
 from orchestrator.system.component import Component
 
@@ -34,6 +41,23 @@ _ELF = {1: (28, "3I5H", 32, "2I8xI"), 2: (32, "2QI5H", 56, "I4xQ16xQ")}
 
 #: The kind of segments that are mapped into memory.
 _LOADED = 1
+
+
+#: As the standard of C has it: no product is contracted with a sum, nothing is reordered.
+_FLAGS = (
+    "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-w",
+    "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX",
+)  # fmt: skip
+
+#: The headers of FMI, for FMUs that come without them.
+_HEADERS = Path(fmpy.__file__).parent / "c-code"
+
+#: What compiled libraries are in the user's cache folder.
+_CATEGORY = "sources"
+
+#: Libraries by the folders into which their FMUs are unpacked, for runs in several threads.
+_libraries: dict[Path, Library] = {}
+_LOCK = Lock()
 
 
 class FMU2OfOthers(FMU2Slave):  # type: ignore[misc]
@@ -128,6 +152,32 @@ def named(component: Component) -> str:
     return f"{component.name}: {component.fmu.name}"
 
 
+def runs_python(folder: Path) -> bool:
+    """Whether an unpacked FMU is one of PythonFMU's."""
+    return (folder / "resources" / "slavemodule.txt").is_file()
+
+
+def check_place(folder: Path) -> None:
+    """Check that an unpacked FMU can be told where it is.
+
+    Raises:
+        InputError: it cannot; the text says what to do.
+
+    """
+    # PythonFMU 0.7 does not decode the URI of its folder, except spaces, and crashes its host. Our
+    # loader, which has PythonFMU's library beside it, does that for it.
+    loader = any((folder / "binaries").glob("*/*_pythonfmu.*"))
+    if (
+        runs_python(folder)
+        and not loader
+        and (odd := re.sub(r"[\w./~-]| ", "", str(folder), flags=re.ASCII))
+    ):
+        raise InputError(
+            f"temporary folder {str(folder)!r}: PythonFMU takes no {odd[0]!r} in it; set TMPDIR to "
+            "another, or build the FMU with --loader native"
+        )
+
+
 def binary_of(component: Component, folder: Path) -> Path:
     """Where the library of an unpacked FMU for this machine is, if it has one."""
     identifier = component.description.coSimulation.modelIdentifier
@@ -136,15 +186,31 @@ def binary_of(component: Component, folder: Path) -> Path:
 
 
 def make_binary(component: Component, folder: Path) -> None:
-    """Compile an unpacked FMU that has sources and no library for this machine.
+    """Compile an unpacked FMU that has sources and no library for this machine, if none is kept.
 
     Raises:
-        InputError: it cannot be compiled.
+        InputError: there is no compiler, or it refuses them.
 
     """
     binary = binary_of(component, folder)
-    if not binary.is_file() and (sources := sources_of(component, folder)):
-        compile_into(component, sources, binary)
+    if binary.is_file() or not (sources := sources_of(component, folder)):
+        return
+    key = _key(component)
+    try:
+        with claimed(user_cache.folder_of(_CATEGORY), wait=True):
+            kept = user_cache.kept(_CATEGORY, key)
+            content = next(iter(kept.values())) if kept else _compiled(component, sources)
+            if not kept:
+                with suppress(OSError):
+                    user_cache.keep(_CATEGORY, key, {binary.name: content})
+        binary.parent.mkdir(parents=True, exist_ok=True)
+        # Other processes may be about to load it.
+        new = binary.with_name(f"{binary.name}.{os.getpid()}")
+        new.write_bytes(content)
+        new.replace(binary)
+    except OSError as error:
+        why = reason(error).replace(f"{sources.files[0].parent}{os.sep}", "")
+        raise InputError(f"{component.fmu}: cannot be compiled: {why}") from error
 
 
 def check_binary(component: Component, folder: Path) -> None:
@@ -201,11 +267,6 @@ def _is_cut_short(path: Path) -> bool:
         return path.stat().st_size < max(ends)
 
 
-#: Libraries by the folders into which their FMUs are unpacked, for runs in several threads.
-_libraries: dict[Path, Library] = {}
-_LOCK = Lock()
-
-
 @contextmanager
 def library_of(component: Component, folder: Path) -> Iterator[Library]:
     """The library of an unpacked FMU, for one more instance of it.
@@ -241,3 +302,87 @@ def _copied(folder: Path) -> Path:
         return Path(copytree(folder, mkdtemp(dir=folder.parent), dirs_exist_ok=True))
     except OSError as error:
         raise InputError(f"{folder}: cannot be copied: {reason(error)}") from error
+
+
+class Sources(NamedTuple):
+    """What is compiled.
+
+    Attributes:
+        files: translation units.
+        options: of the compiler, for them.
+
+    """
+
+    files: list[Path]
+    options: list[str]
+
+
+def sources_of(component: Component, folder: Path) -> Sources | None:
+    """The sources of an FMU that is unpacked into a folder; None: it has none.
+
+    Raises:
+        InputError: their description cannot be read, or names files that are not there.
+
+    """
+    place = folder / "sources"
+    identifier = component.description.coSimulation.modelIdentifier
+    try:
+        described: list[Any] = read_build_description(folder, validate=False)
+    except Exception as error:
+        raise InputError(f"{component.fmu}: buildDescription.xml: {reason(error)}") from error
+    sets = [
+        one
+        for build in (*described, *component.description.buildConfigurations)
+        if build.modelIdentifier == identifier
+        for one in build.sourceFileSets
+    ]
+    if not sets:
+        files = sorted(place.glob("*.c"))
+        return Sources(files, [f"-I{place}"]) if files else None
+    files = list(dict.fromkeys(place / name for one in sets for name in one.sourceFiles))
+    for file in files:
+        if not (file.is_file() and file.resolve().is_relative_to(place.resolve())):
+            raise InputError(f"{component.fmu}: holds no sources/{file.relative_to(place)}")
+    options = [f"-I{place / name}" for one in sets for name in ("", *one.includeDirectories)]
+    for one in sets:
+        for definition in one.preprocessorDefinitions:
+            if not definition.optional:
+                value = "" if definition.value is None else f"={definition.value}"
+                options.append(f"-D{definition.name}{value}")
+    return Sources(files, list(dict.fromkeys(options)))
+
+
+def check_compiler(component: Component) -> None:
+    """Check that an FMU can be compiled here, if it was not before.
+
+    Raises:
+        InputError: there is no compiler.
+
+    """
+    if compiler() is None and not user_cache.kept(_CATEGORY, _key(component)):
+        raise InputError(
+            f"{component.fmu}: has no binary for this machine, {fmpy.platform}, and must be "
+            "compiled: install gcc or clang, or `pip install ziglang`"
+        )
+
+
+def _compiled(component: Component, sources: Sources) -> bytes:
+    check_compiler(component)
+    run = compiler()
+    assert run is not None
+    warnings.warn(
+        f"{component.fmu.name} has no binary for this machine, {fmpy.platform}: its C sources are "
+        "compiled now, and kept",
+        stacklevel=2,
+    )
+    cpp = ["-lstdc++"] * any(file.suffix != ".c" for file in sources.files)
+    files = map(str, sources.files)
+    return made_library(
+        run, *_FLAGS, *sources.options, "-idirafter", str(_HEADERS), *files, "-lm", *cpp
+    )
+
+
+def _key(component: Component) -> str:
+    """Of the FMU, the flags and the kind of machine."""
+    made_of = "\0".join((component.digest, *_FLAGS, sysconfig.get_platform()))
+    return sha256(made_of.encode()).hexdigest()[:16]

@@ -17,10 +17,9 @@ from fmpy.fmi2 import fmi2OK, fmi2Pending, fmi2Warning
 
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts
-from orchestrator.master.fmi.channel import LONGEST_NOTE, LONGEST_STATE, Channel, sizes
-from orchestrator.master.fmi.instance import ComponentFailed, Ended, Part
-from orchestrator.master.fmi.log import Log
-from orchestrator.master.stepper_types import CMember
+from orchestrator.master.fmi.instance import ComponentFailed, Ended, Log, Part
+from orchestrator.master.fmi.transfer import CMember
+from orchestrator.master.fmi.worker import LONGEST_NOTE, LONGEST_STATE, Channel, sizes
 from orchestrator.system.component import Component
 from orchestrator.system.values import StringTable, Value, is_integer, is_of
 

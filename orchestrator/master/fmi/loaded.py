@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from copy import copy
 from functools import partial
 from itertools import count
@@ -41,11 +41,15 @@ from fmpy.model_description import ModelVariable
 
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.fmi.binary import Library, library_of, named
-from orchestrator.master.fmi.instance import DO_STEP, ComponentFailed, Ended, Instance, Part
-from orchestrator.master.fmi.log import Listener
+from orchestrator.master.fmi.instance import (
+    DO_STEP,
+    ComponentFailed,
+    Ended,
+    Listener,
+    Part,
+)
 from orchestrator.master.fmi.surroundings import put_back
-from orchestrator.master.fmi.transfer import PortBlock, text_of
-from orchestrator.master.stepper_types import CMember, CMove
+from orchestrator.master.fmi.transfer import CMember, CMove, PortBlock, text_of
 from orchestrator.system.component import Component
 from orchestrator.system.values import StringTable, Value
 
@@ -363,18 +367,6 @@ def loaded(
             yield instance
         finally:
             instance.free()
-
-
-@contextmanager
-def all_loaded(
-    components: Mapping[str, Component], listener: Listener
-) -> Iterator[dict[str, Instance]]:
-    """Instances of components by their names, all in this process, freed at the end."""
-    with ExitStack() as stack:
-        yield {
-            name: stack.enter_context(loaded(component, listener))
-            for name, component in components.items()
-        }
 
 
 #: Instances by the component environments that their FMUs hand back with every message.

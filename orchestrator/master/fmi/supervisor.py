@@ -7,6 +7,7 @@ without end; and it outlives the process that has started it for as long as that
 from __future__ import annotations
 
 import ctypes
+import json
 import os
 import select
 import shutil
@@ -15,15 +16,20 @@ import socket
 import sys
 import warnings
 from codecs import getincrementaldecoder
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from subprocess import PIPE, Popen, TimeoutExpired
+from time import monotonic
 from typing import Any
 
 from orchestrator.machine.errors import plain
+from orchestrator.master.fmi.isolated import FAREWELL
 from orchestrator.master.fmi.worker import serve
+from orchestrator.system.component import Component
 
 #: Written to the supervisor to end all processes; so does the end of its input.
-END = b"."
+_END = b"."
 
 #: What an FMU may write to its standard output and error [bytes]; more is not shown.
 _MOST_OUTPUT = 1 << 16
@@ -36,11 +42,96 @@ _PATIENCE = 500
 
 _PR_SET_PDEATHSIG = 1
 
+#: What the supervisor begins with: the modules that this process would find, and no main module.
+_BEGIN = """
+import json, sys
+order = json.loads(sys.stdin.buffer.raw.readline())
+sys.path[:] = order["path"]
+from orchestrator.master.fmi.supervisor import keep
+keep(order)
+"""
+
+
+class Supervisor:
+    """The supervisor, as the process knows it that starts it."""
+
+    def __init__(
+        self, components: Mapping[str, Component], connections: Sequence[socket.socket]
+    ) -> None:
+        """Start it, with a socket for the process of each component.
+
+        Raises:
+            OSError: it cannot be started.
+
+        """
+        folders = [component.folder for component in components.values()]
+        descriptors = [connection.fileno() for connection in connections]
+        order = {
+            "path": [entry for entry in sys.path if isinstance(entry, str)],
+            "temporary": sorted({str(folder.parent) for folder in folders}),
+            "components": [
+                (component.name, str(component.fmu), component.digest, str(folder), descriptor)
+                for component, folder, descriptor in zip(
+                    components.values(), folders, descriptors, strict=True
+                )
+            ],
+        }
+        self._process = Popen(
+            [sys.executable, "-P", "-c", _BEGIN],
+            stdin=PIPE,
+            stdout=PIPE,
+            bufsize=0,
+            pass_fds=descriptors,
+            start_new_session=True,
+        )
+        self._statuses: dict[int, int] = {}
+        self._text = b""
+        self._write(json.dumps(order).encode() + b"\n")
+
+    def status(self, number: int, patience: float) -> int | None:
+        """Exit status of the process of a component, for which it waits some seconds.
+
+        Returns:
+            None: it has not ended.
+
+        """
+        due = monotonic() + patience
+        reports = self._process.stdout
+        assert reports is not None
+        ready = select.poll()
+        ready.register(reports)
+        while number not in self._statuses and (left := due - monotonic()) > 0.0:
+            if ready.poll(1000.0 * left):
+                text = os.read(reports.fileno(), 4096)
+                if not text:
+                    # Its children die with the supervisor.
+                    return -signal.SIGKILL
+                *lines, self._text = (self._text + text).split(b"\n")
+                for line in lines:
+                    ended, exit_status = map(int, line.split())
+                    self._statuses[ended] = exit_status
+        return self._statuses.get(number)
+
+    def end(self) -> None:
+        """End all processes that are left."""
+        self._write(_END)
+        try:
+            self._process.wait(FAREWELL)
+        except TimeoutExpired:
+            self._process.kill()
+        with self._process:
+            pass
+
+    def _write(self, text: bytes) -> None:
+        assert self._process.stdin is not None
+        with suppress(OSError):
+            self._process.stdin.write(text)
+
 
 def keep(order: dict[str, Any]) -> None:
     """Run each component in a process, until all have ended or their run has.
 
-    Reads :data:`END` from the standard input, and writes a line with the number of a component
+    Reads :data:`_END` from the standard input, and writes a line with the number of a component
     and its exit status to the standard output when its process has ended.
 
     Args:
@@ -141,7 +232,7 @@ class _Children:
         while self._numbers:
             for descriptor, event in self._poll.poll(_PATIENCE):
                 if descriptor == 0:
-                    there = os.read(0, 1) == END
+                    there = os.read(0, 1) == _END
                     self._kill()
                     return there
                 if descriptor == self._ends:

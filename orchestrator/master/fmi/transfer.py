@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from ctypes import CFUNCTYPE, addressof, c_size_t, c_void_p, cast
+from ctypes import CFUNCTYPE, POINTER, Structure, addressof, c_size_t, c_void_p, cast
 from functools import partial
 
 import numpy as np
@@ -18,7 +18,6 @@ from fmpy.fmi2 import (
     fmi2ValueReference,
 )
 
-from orchestrator.master.stepper_types import CMove
 from orchestrator.system.values import StringTable
 
 #: Kinds of values that can be connected and recorded, with FMI's functions for them and the types
@@ -33,6 +32,31 @@ FMI_TYPES = {
 
 #: FMI's functions that move Integers, as the compiled loop calls them.
 _CALLBACK = CFUNCTYPE(fmi2Status, fmi2Component, c_void_p, c_size_t, c_void_p)
+
+
+class CMove(Structure):
+    """Values of one type, neighbours in the row, and FMI's function for them: see stepper.c."""
+
+    _fields_ = (
+        ("call", c_void_p),
+        ("references", c_void_p),
+        ("n", c_size_t),
+        ("values", c_void_p),
+        ("integers", c_void_p),
+    )
+
+
+class CMember(Structure):
+    """A component: how it is stepped, and its inputs and outputs moved: see stepper.c."""
+
+    _fields_ = (
+        ("component", c_void_p),
+        ("do_step", c_void_p),
+        ("inputs", POINTER(CMove)),
+        ("outputs", POINTER(CMove)),
+        ("n_inputs", c_size_t),
+        ("n_outputs", c_size_t),
+    )
 
 
 class PortBlock:

@@ -16,6 +16,7 @@ import os
 from base64 import b64decode, b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from hashlib import sha256
 from math import isfinite
 from pathlib import Path
 from stat import S_ISREG
@@ -24,18 +25,129 @@ from uuid import uuid4
 
 import numpy as np
 
-from orchestrator.machine.atomic import sealed, unsealed, write_whole
+from orchestrator.machine.disk import sealed, to_disk, unsealed, write_whole
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.ledger import moved_aside
-from orchestrator.master.fmi.log import Log
+from orchestrator.master.fmi.instance import Log
 from orchestrator.master.hooks.hook import NEVER, Lasting, Run
-from orchestrator.master.hooks.row_log import RowLog, begins
-from orchestrator.master.identity import Identity
 from orchestrator.master.observers.observer import Ending, Header, NotKept
+from orchestrator.master.plan import Identity
 from orchestrator.system.structure import System
 
 #: The file that grows, and the one that is replaced.
 _ROWS, _STATE = "rows.bin", "state.json"
+
+#: A number in the file of rows, and how many rows are read at once.
+_NUMBER, _AT_ONCE = np.dtype("<f8"), 4096
+
+#: The first bytes of that file, before an identity, and how long both are together.
+_TITLE, _BEGIN = b"auv-fmu rows ", 64
+
+
+def begins(path: Path, identity: str) -> bool:
+    """Whether a file of rows bears an identity."""
+    if path.is_symlink() or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(_BEGIN) == _head(identity)
+
+
+def _head(identity: str) -> bytes:
+    return (_TITLE + identity.encode()).ljust(_BEGIN - 1) + b"\n"
+
+
+class RowLog:
+    """A file of rows, number after number, without anything between them.
+
+    Rows that are there after those that count are compared with what comes in their place.
+    """
+
+    def __init__(
+        self, path: Path, identity: str, width: int, kept: int = 0, digest: str = ""
+    ) -> None:
+        """Make the file, or go on after the first rows of one that is there.
+
+        Args:
+            path: of the file.
+            identity: that it begins with.
+            width: numbers in a row.
+            kept: how many of its rows count.
+            digest: of these.
+
+        Raises:
+            InputError: they are not there, or not as they were.
+
+        """
+        self._path, self._width, self._kept = path, width, kept
+        self._digest = sha256()
+        if not kept:
+            self._file = path.open("x+b")
+            self._file.write(_head(identity))
+            self._after = 0
+            return
+        row = width * _NUMBER.itemsize
+        if is_whole := begins(path, identity):
+            for rows in self.kept():
+                self._digest.update(rows.astype(_NUMBER, copy=False).tobytes())
+        if not is_whole or self._digest.hexdigest() != digest:
+            raise InputError(
+                f"{path}: missing, damaged, or not of the checkpoint beside it; move both, or let "
+                "--force move them aside"
+            )
+        self._file = path.open("r+b")
+        there = (path.stat().st_size - _BEGIN) // row
+        # A part of a row may follow.
+        self._file.truncate(_BEGIN + there * row)
+        self._file.seek(_BEGIN + kept * row)
+        self._after = there - kept
+
+    def append(self, rows: np.ndarray) -> tuple[int, int] | None:
+        """Write some rows.
+
+        Returns:
+            Row and column of the first number that is not what was there; None: all are.
+
+        """
+        content = rows.astype(_NUMBER, copy=False).tobytes()
+        different = self._different(content) if self._after else None
+        self._file.write(content)
+        self._digest.update(content)
+        if different is None:
+            return None
+        self._after = 0
+        self._file.truncate()
+        return divmod(different, self._width)
+
+    def _different(self, content: bytes) -> int | None:
+        """Which number, as it stands in the file, is the first that is not what is to be there."""
+        place = self._file.tell()
+        there = np.frombuffer(self._file.read(len(content)), np.uint64)
+        self._file.seek(place)
+        # Bit for bit: zero is not minus zero.
+        changed = np.flatnonzero(there != np.frombuffer(content, np.uint64)[: len(there)])
+        self._after -= len(there) // self._width
+        return int(changed[0]) if len(changed) else None
+
+    def kept(self) -> Iterator[np.ndarray]:
+        """The rows that were there before, some thousand at a time."""
+        with self._path.open("rb") as file:
+            file.seek(_BEGIN)
+            for first in range(0, self._kept, _AT_ONCE):
+                n = min(_AT_ONCE, self._kept - first)
+                numbers = np.fromfile(file, _NUMBER, n * self._width)
+                if len(numbers) < n * self._width:
+                    raise InputError(f"{self._path}: holds fewer than {self._kept:,} rows")
+                yield numbers.astype(float, copy=False).reshape(n, self._width)
+
+    def to_disk(self) -> str:
+        """Have all rows outlast the process, and a power cut; their digest is given back."""
+        self._file.flush()
+        to_disk(self._path)
+        return self._digest.hexdigest()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
 
 
 class _Stored(NamedTuple):
@@ -155,18 +267,16 @@ class Checkpoints:
     def begin(self, header: Header) -> None:
         """Open the file of rows."""
         self._columns = ("time", *header.columns)
-        found = self._found
+        rows, width, found = self.folder / _ROWS, len(self._columns), self._found
         if found is None or found.time is None:
-            self._known = 0
+            self._known, digest = 0, ""
             # First the proof that the file of rows is ours.
             self.folder.mkdir(parents=True, exist_ok=True)
-            self._store(_Stored(self._identity, self._every, dict(self._run)))
-            (self.folder / _ROWS).unlink(missing_ok=True)
+            self._store()
+            rows.unlink(missing_ok=True)
         else:
-            self._known = found.made + 1
-        digest = "" if found is None else found.rows
-        rows = self.folder / _ROWS
-        self._row_log = RowLog(rows, self._identity, len(self._columns), self._known, digest)
+            self._known, digest = found.made + 1, found.rows
+        self._row_log = RowLog(rows, self._identity, width, self._known, digest)
 
     def take(self, rows: np.ndarray) -> None:
         """Write some rows, except the ones that are told again."""
@@ -198,11 +308,12 @@ class Checkpoints:
 
     def remove(self) -> None:
         """Remove what a run that has come to its end does not need any more."""
-        if (found := _read(self.folder)) is not None and found.identity == self._identity:
+        found, rows = _read(self.folder), self.folder / _ROWS
+        if found is not None and found.identity == self._identity:
             # While there are rows, there is the proof that they are ours.
-            self._store(_Stored(self._identity, self._every, dict(self._run)))
-            if begins(self.folder / _ROWS, self._identity):
-                (self.folder / _ROWS).unlink()
+            self._store()
+            if begins(rows, self._identity):
+                rows.unlink()
             (self.folder / _STATE).unlink()
         self._partial.unlink(missing_ok=True)
         with suppress(OSError):
@@ -212,21 +323,17 @@ class Checkpoints:
     def _write(self, run: Run) -> None:
         run.blocks.hand_over()
         try:
-            content = _Stored(
-                self._identity,
-                self._every,
-                dict(self._run),
-                run.time,
-                run.made,
-                self._row_log.to_disk(),
-                run.row.values.tolist(),
-                {
+            self._store(
+                time=run.time,
+                made=run.made,
+                rows=self._row_log.to_disk(),
+                row=run.row.values.tolist(),
+                states={
                     name: b64encode(instance.state()).decode()
                     for name, instance in run.instances.items()
                 },
-                [one.state() for one in _lasting(run)],
+                lasting=[one.state() for one in _lasting(run)],
             )
-            self._store(content)
         except OSError as error:
             raise NotKept(f"stopped at t = {run.time:g} s: {reason(error)}") from error
         self.time = run.time
@@ -235,7 +342,8 @@ class Checkpoints:
     def _partial(self) -> Path:
         return self.folder / f".auv-fmu-{self._identity}.json"
 
-    def _store(self, content: _Stored) -> None:
+    def _store(self, **more: Any) -> None:
+        content = _Stored(self._identity, self._every, dict(self._run), **more)
         write_whole(self.folder / _STATE, sealed(content._asdict()), self._partial)
 
     def _resume(self, run: Run, found: _Stored) -> None:

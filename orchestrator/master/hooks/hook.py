@@ -8,11 +8,9 @@ from typing import Any, Protocol, runtime_checkable
 
 from orchestrator.machine.interrupts import Interrupts
 from orchestrator.master.experiment import MOST_STEPS, Experiment
-from orchestrator.master.fmi.instance import Instance
-from orchestrator.master.fmi.log import Log
-from orchestrator.master.gathering import Overrides
+from orchestrator.master.fmi.instance import Instance, Log
 from orchestrator.master.observers.observer import Blocks, Occurrence
-from orchestrator.master.row import Row
+from orchestrator.master.row import Overrides, Row
 from orchestrator.master.schedule import Stage
 from orchestrator.system.structure import System
 

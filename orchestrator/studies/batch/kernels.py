@@ -15,7 +15,7 @@ from typing import Any
 from auv_fmu.closed_loop import LAWS, Law, Moment
 from orchestrator.machine.cache import keep, kept
 from orchestrator.machine.children import imported_apart
-from orchestrator.master.identity import code_of
+from orchestrator.master.plan import code_of
 from orchestrator.studies.batch import kernel
 
 #: What it is in the user's cache folder.

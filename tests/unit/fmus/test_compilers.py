@@ -14,7 +14,7 @@ from fmus import compilers
 from fmus.compilers import compiler_for, library, universal
 from fmus.kinds import platforms
 from fmus.python import packaging
-from orchestrator.machine.compiler import COMPILERS, machines_compiler
+from orchestrator.machine.children import COMPILERS, machines_compiler
 
 OWN = "/usr/bin/own-cc"
 

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from orchestrator.machine.cache import folder_of, keep, kept
-from orchestrator.machine.locks import process_folder
+from orchestrator.machine.disk import process_folder
 
 CONTENT = {"a.so": b"library", "b": b""}
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.machine.atomic import sealed, unsealed
+from orchestrator.machine.disk import sealed, unsealed
 from orchestrator.machine.ledger import LEDGER, Ledger, Taken, is_changed, moved_aside
 from orchestrator.system.names import file_name
 from support.machine import contents

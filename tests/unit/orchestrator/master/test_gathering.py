@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.master.gathering import Gathering, Overrides
+from orchestrator.master.row import Gathering, Overrides
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection
 from orchestrator.system.units import Linear, Mapped

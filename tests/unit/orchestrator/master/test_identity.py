@@ -14,13 +14,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestrator.master import identity as module
+from orchestrator.master import plan as module
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.events import Event, Stop
-from orchestrator.master.hooks.playback import InputTable
-from orchestrator.master.identity import digest_of
+from orchestrator.master.hooks.timing import InputTable
 from orchestrator.master.loop import chosen
+from orchestrator.master.plan import digest_of
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import Request
 from orchestrator.system.names import PortName

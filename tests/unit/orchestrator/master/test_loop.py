@@ -11,8 +11,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master import loop
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.gathering import Gathering
 from orchestrator.master.loop import PYTHON_LOOP, chosen, interpreted
+from orchestrator.master.row import Gathering
 from orchestrator.master.schedule import Decimation, Stage, StageCall
 
 SHORT, LONG = Experiment(10.0, 1.0), Experiment(1e6, 1.0)

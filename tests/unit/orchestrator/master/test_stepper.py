@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.machine import cache as user_cache
-from orchestrator.machine import compiler
+from orchestrator.machine import children as compiler
 from orchestrator.machine.errors import InputError
 from orchestrator.master import loop, stepper
 from orchestrator.master.experiment import Experiment
@@ -129,7 +129,7 @@ def test_a_compiler_that_hangs_is_ended_with_what_it_has_started(tmp_path, monke
     compiler.write_text(f"#!/bin/sh\necho $$ > {tmp_path}/session\n{script}\necho\n")
     compiler.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
-    monkeypatch.setattr("orchestrator.machine.compiler._LIMIT", 0.5)
+    monkeypatch.setattr("orchestrator.machine.children._LIMIT", 0.5)
     with pytest.raises(InputError, match=r"cannot be compiled: .*/cc has not ended after 0\.5 s$"):
         stepper.made()
     session = int((tmp_path / "session").read_text())

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from orchestrator.machine.interrupts import held_interrupts
-from orchestrator.master.fmi.instance import ComponentFailed, Instance
+from orchestrator.master.fmi.instance import ComponentFailed, Instance, Log
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.fmi.loaded import all_loaded
-from orchestrator.master.fmi.log import Log
 from orchestrator.master.fmi.placement import isolated
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import member, step

@@ -19,11 +19,10 @@ from orchestrator.machine.errors import InputError
 from orchestrator.machine.interrupts import Interrupts
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi import placement
-from orchestrator.master.fmi.channel import LONGEST_NOTE, Channel, sizes
+from orchestrator.master.fmi.instance import Log, MessageQueue
 from orchestrator.master.fmi.isolated import IsolatedInstance, Isolation
 from orchestrator.master.fmi.loaded import loaded
-from orchestrator.master.fmi.log import Log, MessageQueue
-from orchestrator.master.fmi.worker import _Served
+from orchestrator.master.fmi.worker import LONGEST_NOTE, Channel, _Served, sizes
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.instance import ComponentFailed, Ended
-from orchestrator.master.gathering import Gathering, Overrides
 from orchestrator.master.hooks.events import (
     Alter,
     Condition,
@@ -26,6 +25,7 @@ from orchestrator.master.hooks.events import (
     Stop,
 )
 from orchestrator.master.hooks.hook import NEVER
+from orchestrator.master.row import Gathering, Overrides
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection
 

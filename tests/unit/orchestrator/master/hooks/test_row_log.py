@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from orchestrator.machine.errors import InputError
-from orchestrator.master.hooks.row_log import RowLog
+from orchestrator.master.hooks.checkpoint import RowLog
 
 ROWS = np.random.default_rng(1).normal(size=(10_000, 3))
 

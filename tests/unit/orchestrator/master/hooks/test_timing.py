@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.hooks import clock as real_time
-from orchestrator.master.hooks.clock import Lateness, RealTime
+from orchestrator.master.hooks import timing as real_time
 from orchestrator.master.hooks.hook import NEVER
+from orchestrator.master.hooks.timing import Lateness, RealTime
 
 
 class World:

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.observer import Ending, Header
-from orchestrator.master.observers.selection import Selection, matches, matching
+from orchestrator.master.observers.observer import Ending, Header, Selection, matches, matching
 from orchestrator.master.observers.table import Table
 
 COLUMNS = ("a.x", "a.y", "b.k[1]", "b.k[2]")

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.machine import locks
-from orchestrator.machine.atomic import sealed
-from orchestrator.machine.locks import claimed, process_folder
+from orchestrator.machine import disk as locks
+from orchestrator.machine.disk import claimed, process_folder, sealed
 from support.machine import contents, ended, eventually, forked
 
 
