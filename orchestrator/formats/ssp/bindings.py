@@ -9,14 +9,18 @@ from typing import TypeAlias
 from xml.etree.ElementTree import Element
 
 from orchestrator.formats.ssp.archive import Archive, listed
-from orchestrator.formats.ssp.definitions import (
+from orchestrator.formats.ssp.hierarchy import (
+    Bus,
+    Connector,
     Definitions,
+    Group,
     Items,
+    Leaf,
+    Node,
     converts_units,
     definitions_of,
     transformation_of,
 )
-from orchestrator.formats.ssp.hierarchy import Bus, Connector, Group, Leaf, Node
 from orchestrator.machine.errors import InputError
 from orchestrator.system.units import Transformation, Unit, chained
 

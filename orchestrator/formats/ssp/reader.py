@@ -11,9 +11,7 @@ from xml.etree.ElementTree import Element
 from orchestrator.formats.ssp import LEFT_OPEN
 from orchestrator.formats.ssp.archive import Archive, listed
 from orchestrator.formats.ssp.bindings import Bindings, Values
-from orchestrator.formats.ssp.building import Builder
-from orchestrator.formats.ssp.definitions import definitions_of
-from orchestrator.formats.ssp.hierarchy import Leaf, Node, Way
+from orchestrator.formats.ssp.hierarchy import Builder, Leaf, Node, Way, definitions_of
 from orchestrator.formats.ssp.routes import Route, Routes
 from orchestrator.machine.errors import Findings, InputError, shortened
 from orchestrator.system.component import Component

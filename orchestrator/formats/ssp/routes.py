@@ -7,8 +7,17 @@ from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 from orchestrator.formats.ssp.archive import Archive
-from orchestrator.formats.ssp.definitions import converts_units, transformation_of
-from orchestrator.formats.ssp.hierarchy import GIVES, TAKES, Bus, Connector, Group, Leaf, Node
+from orchestrator.formats.ssp.hierarchy import (
+    GIVES,
+    TAKES,
+    Bus,
+    Connector,
+    Group,
+    Leaf,
+    Node,
+    converts_units,
+    transformation_of,
+)
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.units import Linear, Transformation, Unit, chained
 

@@ -1,19 +1,25 @@
-"""A system as libcosim's own configuration, written and read."""
+"""Formats of single tools: libcosim's configuration, and a container FMU, which is only written."""
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Iterator, Mapping
+from importlib.util import find_spec
 from math import isclose
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from orchestrator.formats.ssp.archive import Archive
-from orchestrator.machine.errors import Findings, InputError, reason
+from orchestrator.machine.children import run_module
+from orchestrator.machine.errors import Findings, InputError, last_line, reason
+from orchestrator.machine.locks import process_folder
 from orchestrator.machine.user_files import check_file, is_folder
 from orchestrator.system.component import Component, read_component
-from orchestrator.system.names import PortName
+from orchestrator.system.names import PortName, file_name
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import Linear, conversion, unit_of_port
 from orchestrator.system.values import Value, literal, type_of, typed
@@ -273,3 +279,70 @@ def _parameters(
                 )
             parameters[port] = value
     return parameters
+
+
+_TOOLBOX = "fmu_manipulation_toolbox"
+
+#: The file that says what is in a container.
+_CONTENT = "system.json"
+
+
+def write_container(system: System, folder: Path) -> list[Path]:
+    """Write `NAME.fmu`, one FMU that contains the whole system and shows all its outputs.
+
+    Raises:
+        InputError: the FMU manipulation toolbox is not installed, or fails, or the system has what
+            a container has not.
+
+    """
+    if any(connection.transformation for connection in system.connections) or system.steps:
+        raise InputError("a container has no transformations and one step; write an SSP")
+    if find_spec(_TOOLBOX) is None:
+        raise InputError(
+            "a container needs the FMU manipulation toolbox: pip install 'auv-fmu[hosts]'"
+        )
+    container = f"{file_name(system.name)}.fmu"
+    names = system.fmus(container, _CONTENT)
+    fmus = {component.name: names[component.fmu] for component in system.components.values()}
+    if len(names) < len(fmus):
+        raise InputError("a container takes each FMU once; this system has one twice")
+    content: dict[str, Any] = {
+        "name": container,
+        "step_size": system.step,
+        "auto_link": False,
+        "auto_input": False,
+        "auto_output": False,
+        "auto_parameter": False,
+        "fmu": list(fmus.values()),
+        "link": [
+            [fmus[c.source.component], c.source.port, fmus[c.target.component], c.target.port]
+            for c in system.connections
+        ],
+        "output": [
+            [fmus[component.name], variable.name, f"{component.name}.{variable.name}"]
+            for component in system.components.values()
+            for variable in component.description.modelVariables
+            if variable.causality == "output"
+        ],
+        "start": [
+            [fmus[name], port, value]
+            for name in system.components
+            for port, value in system.parameters_of(name).items()
+        ],
+    }
+    with TemporaryDirectory(dir=process_folder()) as work:
+        for fmu, name in names.items():
+            shutil.copyfile(fmu, Path(work, name))
+        Path(work, _CONTENT).write_text(json.dumps(content), encoding="utf-8")
+        versions = {component.description.fmiVersion for component in system.components.values()}
+        fmi = max(versions).partition(".")[0]
+        options = ["-container", _CONTENT, "-fmu-directory", work, "-fmi", fmi]
+        process = run_module(f"{_TOOLBOX}.cli.fmucontainer", *options, folder=Path(work))
+        built = Path(work, container)
+        if process.returncode != 0 or not built.is_file():
+            raise InputError(
+                f"the container was not built: {last_line(process.stderr + process.stdout)}"
+            )
+        path = folder / built.name
+        shutil.copyfile(built, path)
+    return [path]
