@@ -1,27 +1,18 @@
-"""Systems in systems, down to the components, with the connectors of all of them."""
+"""The systems in a description, down to their components, with the connectors of all of them."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 from xml.etree.ElementTree import Element
 
-from orchestrator.formats.ssp.archive import Archive, listed, number
+from orchestrator.formats.ssp.archive import Archive, listed
 from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component, read_component
-from orchestrator.system.units import (
-    BASES,
-    Linear,
-    Mapped,
-    Transformation,
-    Unit,
-    Units,
-    unit_of_port,
-)
-from orchestrator.system.values import BOOLEANS, type_of
+from orchestrator.system.units import BASES, Unit, Units, unit_of_port
+from orchestrator.system.values import FMI2_NAMES, items_of, type_of
 
 #: An enumeration's values by the names of its items.
 Items: TypeAlias = Mapping[str, int]
@@ -72,64 +63,6 @@ def definitions_of(archive: Archive, root: Element) -> Definitions:
     return Definitions(units, enumerations)
 
 
-_LINEAR = "LinearTransformation"
-_TABLES = (
-    "BooleanMappingTransformation", "IntegerMappingTransformation",
-    "EnumerationMappingTransformation",
-)  # fmt: skip
-
-
-def transformation_of(content: Element, source: Items, target: Items) -> Transformation | None:
-    """The transformation in a connection or an entry of a mapping; None: there is none.
-
-    Args:
-        content: element of the connection or entry.
-        source, target: values of the enumerations at its ends, if there are any.
-
-    Raises:
-        InputError: it has a mistake.
-
-    """
-    linear = content.find(_LINEAR)
-    if linear is not None:
-        return Linear(
-            number("factor", linear.get("factor", "1")), number("offset", linear.get("offset", "0"))
-        )
-    for name in _TABLES:
-        table = content.find(name)
-        if table is not None:
-            entries = table.findall("MapEntry")
-            pairs = [
-                (_value(name, entry, "source", source), _value(name, entry, "target", target))
-                for entry in entries
-            ]
-            if len(dict(pairs)) < len(pairs):
-                raise InputError("a mapping has two entries for one source")
-            return Mapped(tuple(pairs))
-    return None
-
-
-def converts_units(content: Element) -> bool:
-    """Whether a connection or an entry of a mapping has units converted."""
-    return not BOOLEANS.get(content.get("suppressUnitConversion", "false"), False)
-
-
-def _value(table: str, entry: Element, end: str, items: Items) -> float:
-    """One value of a table, as the number that FMI has for it."""
-    text = entry.get(end, "")
-    if table.startswith("Boolean"):
-        if text not in BOOLEANS:
-            raise InputError(f"{end} {text!r} of a mapping is neither true nor false")
-        return float(BOOLEANS[text])
-    if table.startswith("Enumeration"):
-        if text not in items:
-            raise InputError(f"{end} {text!r} of a mapping is not in its enumeration")
-        return float(items[text])
-    if (value := number(end, text)) != int(value):
-        raise InputError(f"{end} {text!r} of a mapping is no integer")
-    return value
-
-
 #: The names of a system and of the systems around it, except the outermost.
 Way: TypeAlias = tuple[str, ...]
 
@@ -168,10 +101,10 @@ class Connector:
 
     """
 
-    causality: str | None
-    type: str | None
-    unit: Unit | None
-    items: Items
+    causality: str | None = None
+    type: str | None = None
+    unit: Unit | None = None
+    items: Items = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -196,18 +129,13 @@ class Leaf:
     def connector(self, name: str) -> Connector | None:
         """A connector as the FMU has it; None: it has none of that name."""
         if self.component is None:
-            return self.connectors.get(name, Connector(None, None, None, {}))
+            return self.connectors.get(name, Connector())
         variable = self.component.variables.get(name)
         if variable is None:
             return None
-        stated = self.connectors.get(name)
-        unit = unit_of_port(self.component, name, self.units)
-        if unit is None and stated is not None:
-            unit = stated.unit
-        declared = variable.declaredType
-        items = {} if declared is None else {i.name: int(i.value) for i in declared.items}
-        if not items and stated is not None:
-            items = dict(stated.items)
+        stated = self.connectors.get(name, Connector())
+        unit = unit_of_port(self.component, name, self.units) or stated.unit
+        items = {item: int(value) for item, value in items_of(variable).items()} or stated.items
         return Connector(variable.causality, type_of(variable), unit, items)
 
     def named(self, name: str) -> Iterator[tuple[Node, Connector]]:
@@ -234,7 +162,7 @@ class Bus:
     def connector(self, name: str) -> Connector | None:
         """A connector, through which signals go in both directions."""
         stated = self.connectors.get(name)
-        return None if stated is None else Connector(None, stated.type, stated.unit, stated.items)
+        return None if stated is None else replace(stated, causality=None)
 
     def named(self, _: str) -> Iterator[tuple[Node, Connector]]:
         """Nothing in it has a value of its own."""
@@ -270,22 +198,17 @@ class Group:
             if name.startswith(f"{member}."):
                 yield from element.named(name[len(member) + 1 :])
 
-    def leaves(self) -> Iterator[Leaf]:
-        """All components in it, in their order."""
+    def elements(self) -> Iterator[Leaf | Bus | Group]:
+        """All elements in it in their order, each system before those in it; first itself."""
+        yield self
         for element in self.members.values():
             if isinstance(element, Group):
-                yield from element.leaves()
-            elif isinstance(element, Leaf):
+                yield from element.elements()
+            else:
                 yield element
 
 
 _FMU = "application/x-fmu-sharedlibrary"
-
-#: Types of connectors, by what SSP 2.0 calls them as well.
-_TYPES = {
-    "Real": "Real", "Float64": "Real", "Integer": "Integer", "Int32": "Integer",
-    "Boolean": "Boolean", "String": "String", "Enumeration": "Enumeration",
-}  # fmt: skip
 
 #: What a connector may have besides its type.
 _NO_TYPES = ("Dimension", "Clock", "ConnectorGeometry", "Annotations")
@@ -309,13 +232,10 @@ class Builder:
             buses: ways to the signal dictionaries of the systems around it, by their names.
 
         """
+        own = content.findall("SignalDictionaries/SignalDictionary")
         buses = {
             **(buses or {}),
-            **{
-                name: (*way, name, "")
-                for dictionary in content.findall("SignalDictionaries/SignalDictionary")
-                if (name := dictionary.get("name", ""))
-            },
+            **{name: (*way, name, "") for d in own if (name := d.get("name"))},
         }
         members: dict[str, Leaf | Bus | Group] = {}
         for element in content.findall("Elements/*"):
@@ -329,12 +249,11 @@ class Builder:
             elif element.tag == "Component":
                 members[name] = self._leaf(element, (*way, name))
             elif element.tag == "SignalDictionaryReference":
-                dictionary = element.get("dictionary", "")
-                if dictionary in buses:
-                    connectors = self._connectors(element)
-                    members[name] = Bus(buses[dictionary], element, connectors)
+                bus = element.get("dictionary", "")
+                if bus in buses:
+                    members[name] = Bus(buses[bus], element, self._connectors(element))
                 else:
-                    self._archive.problem(f"{name}: there is no signal dictionary {dictionary!r}")
+                    self._archive.problem(f"{name}: there is no signal dictionary {bus!r}")
             else:
                 self._archive.problem(f"{name}: a <{element.tag}> in a system is not supported")
         return Group(way, content, self._connectors(content), members)
@@ -349,27 +268,24 @@ class Builder:
 
     def _component(self, content: Element, name: str) -> Component | None:
         source, kind = content.get("source"), content.get("type", _FMU)
+        implementation = content.get("implementation", "any")
         if kind != _FMU:
             self._archive.problem(
                 f"{name}: a component of type {kind!r} is not supported; an FMU is"
             )
         elif source is None:
             self._archive.problem(f"{name}: a component without a source, which cannot be run")
-        elif content.get("implementation", "any") not in ("any", "CoSimulation"):
+        elif implementation not in ("any", "CoSimulation"):
             self._archive.problem(
-                f"{name}: asks for {content.get('implementation')}, which is not supported; "
-                "CoSimulation is"
+                f"{name}: asks for {implementation}, which is not supported; CoSimulation is"
             )
         elif (fmu := self._archive.file(source, name)) is not None:
-            return self._read(name, fmu)
+            try:
+                return read_component(name, fmu, findings=self._archive.findings)
+            except InputError as error:
+                said = str(error).removeprefix(f"{self._archive.folder}/")
+                self._archive.problem(f"{name}: {said}")
         return None
-
-    def _read(self, name: str, fmu: Path) -> Component | None:
-        try:
-            return read_component(name, fmu, findings=self._archive.findings)
-        except InputError as error:
-            self._archive.problem(f"{name}: {str(error).removeprefix(f'{self._archive.folder}/')}")
-            return None
 
     def _compare(self, leaf: Leaf) -> None:
         """Say where connectors are not what their FMU has."""
@@ -401,11 +317,10 @@ class Builder:
         }
 
     def _connector(self, connector: Element) -> Connector:
-        stated = next((child for child in connector if child.tag not in _NO_TYPES), None)
         causality = connector.get("kind")
-        if stated is None:
-            return Connector(causality, None, None, {})
-        of = _TYPES.get(stated.tag, stated.tag)
-        return Connector(
-            causality, of, self._definitions.unit(stated), self._definitions.items(stated)
-        )
+        for stated in connector:
+            if stated.tag not in _NO_TYPES:
+                of = FMI2_NAMES.get(stated.tag, stated.tag)
+                unit, items = self._definitions.unit(stated), self._definitions.items(stated)
+                return Connector(causality, of, unit, items)
+        return Connector(causality)
