@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 from xml.etree import ElementTree
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, SubElement
 
 from orchestrator.formats.ssp.archive import Archive
 from orchestrator.machine.children import run_module
@@ -58,37 +58,32 @@ def write_osp(system: System, folder: Path) -> list[Path]:
                 f"{component.name}: libcosim takes no FMU of FMI {version}; write an SSP, or FMUs "
                 "with --fmi 2"
             )
-    root = ElementTree.Element("OspSystemStructure", xmlns=_OSP, version="0.1")
+    root = Element("OspSystemStructure", xmlns=_OSP, version="0.1")
     for tag, text in (
         ("StartTime", str(system.start_time or 0.0)),
         ("BaseStepSize", str(system.step)),
+        ("Algorithm", _ALGORITHM),
     ):
-        ElementTree.SubElement(root, tag).text = text
-    ElementTree.SubElement(root, "Algorithm").text = "fixedStep"
-    simulators = ElementTree.SubElement(root, "Simulators")
+        SubElement(root, tag).text = text
+    simulators = SubElement(root, "Simulators")
     fmus = system.fmus(STRUCTURE)
     for fmu, name in fmus.items():
         shutil.copyfile(fmu, folder / name)
-    for component in system.components.values():
-        simulator = ElementTree.SubElement(
-            simulators,
-            "Simulator",
-            name=component.name,
-            source=fmus[component.fmu],
-            stepSize=str(system.steps.get(component.name, system.step)),
-        )
-        parameters = system.parameters_of(component.name)
+    for name, component in system.components.items():
+        step = str(system.steps.get(name, system.step))
+        named = {"name": name, "source": fmus[component.fmu], "stepSize": step}
+        simulator = SubElement(simulators, "Simulator", named)
+        parameters = system.parameters_of(name)
         if parameters:
-            values = ElementTree.SubElement(simulator, "InitialValues")
-            for name, value in parameters.items():
-                element = ElementTree.SubElement(values, "InitialValue", variable=name)
-                fmi_type = component.variable(name).type
-                ElementTree.SubElement(element, fmi_type, value=literal(value))
-    connections = ElementTree.SubElement(root, "Connections")
+            values = SubElement(simulator, "InitialValues")
+            for port, value in parameters.items():
+                element = SubElement(values, "InitialValue", variable=port)
+                SubElement(element, component.variable(port).type, value=literal(value))
+    connections = SubElement(root, "Connections")
     for connection in system.connections:
-        element = ElementTree.SubElement(connections, "VariableConnection")
+        element = SubElement(connections, "VariableConnection")
         for end in (connection.source, connection.target):
-            ElementTree.SubElement(element, "Variable", simulator=end.component, name=end.port)
+            SubElement(element, "Variable", simulator=end.component, name=end.port)
     ElementTree.indent(root)
     path = folder / STRUCTURE
     path.write_bytes(ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True))
@@ -152,9 +147,8 @@ def _number(archive: Archive, root: Element, name: str) -> float | None:
     return None if text is None else archive.number(Element(name, {name: text}), name, None)
 
 
-def _simulators(root: Element) -> Iterator[tuple[str, Element]]:
-    for simulator in root.iterfind("Simulators/Simulator"):
-        yield simulator.get("name", ""), simulator
+def _simulators(root: Element) -> list[tuple[str, Element]]:
+    return [(element.get("name", ""), element) for element in root.iterfind("Simulators/Simulator")]
 
 
 def _components(archive: Archive, root: Element) -> dict[str, Component]:
@@ -265,12 +259,9 @@ def _parameters(
             except InputError as error:
                 archive.problem(error)
                 continue
-            why = ""
-            if port in fed:
-                why = f"is fed by {fed[port]}"
-            elif not components[name].is_settable(port.port):
+            if port in fed or not components[name].is_settable(port.port):
                 why = f"is of causality {variable.causality} and cannot be set"
-            if why:
+                why = f"is fed by {fed[port]}" if port in fed else why
                 archive.note(f"{port}: {why}; the value that is given to it has no effect")
                 continue
             if stated.tag != type_of(variable):
@@ -309,10 +300,7 @@ def write_container(system: System, folder: Path) -> list[Path]:
     content: dict[str, Any] = {
         "name": container,
         "step_size": system.step,
-        "auto_link": False,
-        "auto_input": False,
-        "auto_output": False,
-        "auto_parameter": False,
+        **dict.fromkeys(("auto_link", "auto_input", "auto_output", "auto_parameter"), False),
         "fmu": list(fmus.values()),
         "link": [
             [fmus[c.source.component], c.source.port, fmus[c.target.component], c.target.port]
@@ -321,8 +309,7 @@ def write_container(system: System, folder: Path) -> list[Path]:
         "output": [
             [fmus[component.name], variable.name, f"{component.name}.{variable.name}"]
             for component in system.components.values()
-            for variable in component.description.modelVariables
-            if variable.causality == "output"
+            for variable in component.having("output")
         ],
         "start": [
             [fmus[name], port, value]
@@ -340,9 +327,6 @@ def write_container(system: System, folder: Path) -> list[Path]:
         process = run_module(f"{_TOOLBOX}.cli.fmucontainer", *options, folder=Path(work))
         built = Path(work, container)
         if process.returncode != 0 or not built.is_file():
-            raise InputError(
-                f"the container was not built: {last_line(process.stderr + process.stdout)}"
-            )
-        path = folder / built.name
-        shutil.copyfile(built, path)
-    return [path]
+            said = last_line(process.stderr + process.stdout)
+            raise InputError(f"the container was not built: {said}")
+        return [Path(shutil.copyfile(built, folder / container))]

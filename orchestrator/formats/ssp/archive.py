@@ -1,4 +1,10 @@
-"""An SSP archive or its folder while it is read: its files, and what is found wrong with it."""
+"""An SSP archive or its folder while it is read: its files, and what is found wrong with it.
+
+Files are read leniently, and held against the schemas. fmpy.ssp is no such reader: it looks for
+transformations in the wrong namespace, passes over parameter mappings, units and annotations, does
+not decode the addresses of files, and reads a file only if it is valid to the letter. What is
+harmless is a note here.
+"""
 
 from __future__ import annotations
 
@@ -65,22 +71,22 @@ class _Reader:
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         """Take the beginning of an element."""
-        scope = self._scopes[-1]
-        declared = {
-            name.removeprefix("xmlns").removeprefix(":"): value
-            for name, value in attributes.items()
-            if name == "xmlns" or name.startswith("xmlns:")
-        }
-        self._scopes.append({**scope, **declared} if declared else scope)
+        scope, plain = dict(self._scopes[-1]), {}
+        for key, value in attributes.items():
+            if key.partition(":")[0] == "xmlns":
+                scope[key.partition(":")[2]] = value
+            else:
+                plain[key.rpartition(":")[2]] = value
+        self._scopes.append(scope)
         prefix, _, name = tag.rpartition(":")
         if self._open or name in _OPEN:
             self._open += 1
-        self._check(prefix)
-        plain = {
-            key.rpartition(":")[2]: value
-            for key, value in attributes.items()
-            if not key.startswith("xmlns")
-        }
+        namespace = scope.get(prefix)
+        if namespace is None and prefix:
+            self._note(f"the prefix {prefix!r} is not declared")
+        elif not self._open and namespace not in NAMESPACES:
+            where = f"the namespace {namespace!r}" if namespace else "no namespace"
+            self._note(f"elements are in {where}, which is none of SSP 1.0")
         self.builder.start(name, plain)
 
     def end(self, tag: str) -> None:
@@ -92,14 +98,6 @@ class _Reader:
     def doctype(self, *_: object) -> None:
         """Refuse what could name further files, or unfold into more than memory holds."""
         raise ValueError("it has a document type, which no file of an SSP has")
-
-    def _check(self, prefix: str) -> None:
-        namespace = self._scopes[-1].get(prefix)
-        if namespace is None and prefix:
-            self._note(f"the prefix {prefix!r} is not declared")
-        elif not self._open and namespace not in NAMESPACES:
-            where = f"the namespace {namespace!r}" if namespace else "no namespace"
-            self._note(f"elements are in {where}, which is none of SSP 1.0")
 
 
 #: Schemas by the root elements of the files that they are for.
@@ -120,9 +118,8 @@ def violations(root: str, text: bytes) -> list[str]:
     """
     if root not in _SCHEMAS:
         return [f"<{root}> is no element of SSP"]
-    schema = _schema(_SCHEMAS[root])
     try:
-        schema.assertValid(etree.fromstring(text))
+        _schema(_SCHEMAS[root]).assertValid(etree.fromstring(text))
     except etree.LxmlError as error:
         said = [(entry.line, entry.message) for entry in error.error_log]
         return [f"line {line}: {re.sub('{[^}]*}', '', message)}" for line, message in said]
@@ -131,8 +128,7 @@ def violations(root: str, text: bytes) -> list[str]:
 
 @cache
 def _schema(name: str) -> etree.XMLSchema:
-    [folder] = fmpy.ssp.__path__
-    return etree.XMLSchema(etree.parse(Path(folder, "schema", name)))
+    return etree.XMLSchema(etree.parse(Path(*fmpy.ssp.__path__, "schema", name)))
 
 
 _SUFFIX = Path(STRUCTURE).suffix
@@ -308,23 +304,10 @@ class Archive:
         """
         text = None if element is None else element.get(name)
         try:
-            return otherwise if text is None else number(name, text)
-        except InputError as error:
+            return otherwise if text is None else finite(text, name)
+        except ValueError as error:
             self.problem(error)
             return otherwise
-
-
-def number(name: str, text: str) -> float:
-    """The number that an attribute is.
-
-    Raises:
-        InputError: it is none, or not finite.
-
-    """
-    try:
-        return finite(text, name)
-    except ValueError as error:
-        raise InputError(str(error)) from None
 
 
 def listed(names: Sequence[str], between: str = ", ") -> str:

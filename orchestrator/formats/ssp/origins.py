@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 from xml.etree.ElementTree import Element
 
-from orchestrator.formats.ssp.archive import Archive, listed, number
+from orchestrator.formats.ssp.archive import Archive, listed
 from orchestrator.formats.ssp.hierarchy import (
     GIVES,
     TAKES,
@@ -22,7 +22,7 @@ from orchestrator.formats.ssp.hierarchy import (
 )
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.units import Linear, Mapped, Transformation, Unit, chained
-from orchestrator.system.values import BOOLEANS
+from orchestrator.system.values import BOOLEANS, finite
 
 _TABLES = (
     "BooleanMappingTransformation", "IntegerMappingTransformation",
@@ -44,14 +44,13 @@ def _transformation(content: Element, source: Items, target: Items) -> Transform
         source, target: values of the enumerations at its ends, if there are any.
 
     Raises:
-        InputError: it has a mistake.
+        ValueError: it has a mistake.
 
     """
     linear = content.find("LinearTransformation")
     if linear is not None:
-        return Linear(
-            number("factor", linear.get("factor", "1")), number("offset", linear.get("offset", "0"))
-        )
+        factor, offset = linear.get("factor", "1"), linear.get("offset", "0")
+        return Linear(finite(factor, "factor"), finite(offset, "offset"))
     for name in _TABLES:
         table = content.find(name)
         if table is not None:
@@ -61,7 +60,7 @@ def _transformation(content: Element, source: Items, target: Items) -> Transform
                 for entry in entries
             ]
             if len(dict(pairs)) < len(pairs):
-                raise InputError("a mapping has two entries for one source")
+                raise ValueError("a mapping has two entries for one source")
             return Mapped(tuple(pairs))
     return None
 
@@ -71,14 +70,14 @@ def _value(table: str, entry: Element, end: str, items: Items) -> float:
     text = entry.get(end, "")
     if table.startswith("Boolean"):
         if text not in BOOLEANS:
-            raise InputError(f"{end} {text!r} of a mapping is neither true nor false")
+            raise ValueError(f"{end} {text!r} of a mapping is neither true nor false")
         return float(BOOLEANS[text])
     if table.startswith("Enumeration"):
         if text not in items:
-            raise InputError(f"{end} {text!r} of a mapping is not in its enumeration")
+            raise ValueError(f"{end} {text!r} of a mapping is not in its enumeration")
         return float(items[text])
-    if (value := number(end, text)) != int(value):
-        raise InputError(f"{end} {text!r} of a mapping is no integer")
+    if (value := finite(text, end)) != int(value):
+        raise ValueError(f"{end} {text!r} of a mapping is no integer")
     return value
 
 
@@ -162,7 +161,7 @@ def _add(found: dict[Node, Segment], group: Group, connection: Element) -> None:
         )
     try:
         stated = _transformation(connection, source.connector.items, target.connector.items)
-    except InputError as error:
+    except ValueError as error:
         raise InputError(f"{named}: {error}") from None
     unit = target.connector.unit
     found[target.node] = Segment(source.node, unit, stated, _converts_units(connection))
@@ -232,7 +231,7 @@ class Given:
         """What makes of it the value of a node.
 
         Raises:
-            InputError: units do not fit, or the mapping has a mistake.
+            ValueError: units do not fit, or the mapping has a mistake.
 
         """
         stated = None

@@ -252,7 +252,7 @@ class _Ports:
             if arrival.error is not None:
                 raise arrival.error
             whole = chained(whole, arrival.whole)
-        except InputError as error:
+        except ValueError as error:
             raise InputError(f"{arrival.start}: {error}") from None
         component, connector = leaf.component, leaf.connector(port.port)
         if component is None or connector is None:
