@@ -54,7 +54,7 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     add_options(parser, Request, "step", "strict", "kind")
     add_fmi(parser)
     add_set(parser)
-    add_out(parser, None, "exports/SCENARIO/")
+    add_out(parser, "exports/SCENARIO/")
     add_options(parser, Files, "force")
     parser.set_defaults(action=_export)
 

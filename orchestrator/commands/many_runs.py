@@ -23,7 +23,7 @@ def add_sweep(parser: argparse.ArgumentParser) -> None:
         "study", metavar="STUDY.toml|NAME", help=f"a study file, or a ready study: {ready}"
     )
     add_options(parser, Means)
-    add_out(parser, None, "results/NAME/")
+    add_out(parser, "results/NAME/")
     parser.set_defaults(action=_sweep)
 
 
