@@ -30,7 +30,7 @@ from typing import Any
 import fmpy
 
 from fmus.kinds import NATIVE
-from orchestrator.formats.osp import write_osp
+from orchestrator.formats.other_formats import write_osp
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError

@@ -28,7 +28,7 @@ from time import perf_counter
 from typing import Any
 from zipfile import ZipFile
 
-from orchestrator.formats.osp import write_osp
+from orchestrator.formats.other_formats import write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table

@@ -8,13 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from fmus.kinds import NATIVE, PYTHON
-from orchestrator.commands.options import (
-    add_fmi,
-    add_options,
-    add_out,
-    add_set,
-    assignments,
-)
+from orchestrator.commands.options import add_fmi, add_options, add_out, add_set, assignments
 from orchestrator.commands.streams import OK, show
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
@@ -44,7 +38,7 @@ def add_build(parser: argparse.ArgumentParser) -> None:
         help="a slave of PythonFMU, whose FMU is built beside it; default: the bundle",
     )
     folders = f"{DEFAULT_FOLDERS[PYTHON]} or {DEFAULT_FOLDERS[NATIVE]}"
-    add_out(parser, None, f"{folders}, or the folder of SCRIPT.py")
+    add_out(parser, f"{folders}, or the folder of SCRIPT.py")
     add_options(parser, Files, "force")
     parser.add_argument(
         "--loader",

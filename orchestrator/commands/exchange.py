@@ -21,8 +21,7 @@ from orchestrator.commands.options import (
 from orchestrator.commands.streams import FAILED, OK, say, show
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.exchange.verify import verify
-from orchestrator.formats.container import write_container
-from orchestrator.formats.osp import write_osp
+from orchestrator.formats.other_formats import write_container, write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, order_of
@@ -55,7 +54,7 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     add_options(parser, Request, "step", "strict", "kind")
     add_fmi(parser)
     add_set(parser)
-    add_out(parser, None, "exports/SCENARIO/")
+    add_out(parser, "exports/SCENARIO/")
     add_options(parser, Files, "force")
     parser.set_defaults(action=_export)
 

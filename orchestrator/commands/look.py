@@ -8,14 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from orchestrator.commands.options import (
-    add_options,
-    add_set,
-    add_system,
-    read,
-    request,
-    status,
-)
+from orchestrator.commands.options import add_options, add_set, add_system, read, request, status
 from orchestrator.commands.streams import OK, say, show
 from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
 from orchestrator.figures.plot import plot, wanted

@@ -1,21 +1,46 @@
-"""The entry point of `auv-fmu`."""
+"""The entry point of `auv-fmu`, which imports what a command needs once that is named."""
 
 from __future__ import annotations
 
+import argparse
 import logging
 import os
+import re
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from importlib import import_module
+from itertools import pairwise
 from typing import Any
 
+from auv_fmu import __version__
 from orchestrator.commands import streams
-from orchestrator.commands.streams import say
+from orchestrator.commands.streams import BAD_INPUT, FAILED, INTERRUPTED, OK, Unheard, say
 from orchestrator.machine.children import imported_apart
-from orchestrator.machine.errors import reason
+from orchestrator.machine.errors import InputError, StartError, reason
 from orchestrator.machine.interrupts import orderly_end
+
+#: The commands: the module that has `add_COMMAND`, and what they are for.
+COMMANDS = {
+    "build": ("build", "build every FMU and the bundle auv.ssp, or a component of your own"),
+    "list": ("build", "list the scenarios"),
+    "gains": ("build", "check the conditions of Theorems 1 and 2"),
+    "run": ("run_command", "run a scenario, a scenario file or an SSP"),
+    "check": ("check", "say all that is wrong with an FMU, an SSP, a scenario or a study"),
+    "sweep": ("many_runs", "make the runs of a study, or those that are missing"),
+    "plot": ("look", "draw any signals of stored results"),
+    "view": ("look", "write a page to turn a stored result and play it"),
+    "animate": ("look", "write a film of a scenario"),
+    "new": ("build", "begin something of your own"),
+    "report": ("many_runs", "run all scenarios and compare with the paper"),
+    "table": (
+        "many_runs", "hold the printed table of section 4.2 against all that the paper leaves open"
+    ),
+    "export": ("exchange", "write a scenario for other tools"),
+    "hosts": ("exchange", "run a scenario in other co-simulation tools"),
+    "verify": ("exchange", "compare a table from another tool with ours"),
+}  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -31,27 +56,35 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Where it can keep no fonts it says so at length, and draws all the same.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     streams.fill()
-    status = 0
+    status = OK
     try:
         with orderly_end(arguments is None), warnings.catch_warnings():
             warnings.showwarning = partial(_warn, warnings.showwarning)
             # What is in the current folder may belong to someone else.
             imported_apart("matplotlib", "matplotlibrc")
-            # Half a second of imports, in which Ctrl-C must find an answer, too.
-            status = int(import_module("orchestrator.commands.parser").dispatch(arguments))
+            given = sys.argv[1:] if arguments is None else list(arguments)
+            options = parser(given).parse_args(given)
+            _check_no_empty(given)
+            options.command = ["auv-fmu", *given]
+            status = int(options.action(options))
+    except InputError as error:
+        say(str(error))
+        status = FAILED if isinstance(error, StartError) else BAD_INPUT
+    except Unheard:
+        status = FAILED
     except SystemExit as end:
         # The parser has shown its help, or complained.
         if not streams.finished():
-            raise SystemExit(end.code or 1) from None
+            raise SystemExit(end.code or FAILED) from None
         raise
     except KeyboardInterrupt:
         say("interrupted")
-        status = 130
+        status = INTERRUPTED
     except (OSError, MemoryError, ImportError) as error:
         # Whatever else this machine does not give.
         say(reason(error))
-        status = 2
-    return status if streams.finished() else status or 1
+        status = BAD_INPUT
+    return status if streams.finished() else status or FAILED
 
 
 def _warn(otherwise: Any, message: Warning | str, category: type[Warning], *place: Any) -> None:
@@ -62,5 +95,40 @@ def _warn(otherwise: Any, message: Warning | str, category: type[Warning], *plac
         otherwise(message, category, *place)
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def _check_no_empty(arguments: Sequence[str]) -> None:
+    """Check that all arguments say something: a variable of the shell may be unset.
+
+    Raises:
+        InputError: one is empty.
+
+    """
+    for before, argument in pairwise(("auv-fmu", *arguments)):
+        if not argument:
+            raise InputError(f"the argument after {before} is empty")
+        if re.fullmatch(r"--[\w-]+=", argument):
+            raise InputError(f"{argument} says nothing")
+
+
+def parser(given: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
+    """The parser of the command line.
+
+    Args:
+        given: arguments; of commands that are not among them only the help is there, as to import
+            what a command needs takes up to a second.
+
+    """
+    parser = argparse.ArgumentParser(
+        prog="auv-fmu",
+        description="Co-simulate an autonomous underwater vehicle with limited torque and "
+        "without velocity sensors, from FMI 2.0 components.",
+        epilog="Exit status: 0; 1 if a simulation failed, with the rows it had kept; 2 for bad "
+        "usage or input; 130 if ended by Ctrl-C.",
+    )
+    parser.add_argument("--version", action="version", version=__version__)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    named = set(given)
+    for name, (module, text) in COMMANDS.items():
+        command = commands.add_parser(name, help=text)
+        if name in named:
+            getattr(import_module(f"orchestrator.commands.{module}"), f"add_{name}")(command)
+    return parser

@@ -81,15 +81,11 @@ def add_set(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_out(parser: argparse.ArgumentParser, default: Path | None, otherwise: str = "") -> None:
-    """Where the files go."""
-    parser.add_argument(
-        "--out",
-        type=Path,
-        default=default,
-        metavar="DIR",
-        help=f"folder to write into; default: {default or otherwise}",
-    )
+def add_out(parser: argparse.ArgumentParser, default: Path | str) -> None:
+    """Where the files go: a path, or in words."""
+    path = default if isinstance(default, Path) else None
+    text = f"folder to write into; default: {default}"
+    parser.add_argument("--out", type=Path, default=path, metavar="DIR", help=text)
 
 
 def read(options: argparse.Namespace, fmi: str = FMI_VERSIONS[0]) -> tuple[Scenario, System]:

@@ -35,7 +35,7 @@ def add_run(parser: argparse.ArgumentParser) -> None:
     add_system(parser)
     add_options(parser, Request)
     add_set(parser)
-    add_out(parser, None, "results/SCENARIO/")
+    add_out(parser, "results/SCENARIO/")
     add_options(parser, Files)
     parser.set_defaults(action=_run)
 

@@ -16,17 +16,16 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import fmpy
 import numpy as np
 from fmpy.ssp.simulation import simulate_ssp
 
 from orchestrator.exchange import c_host
-from orchestrator.formats.container import write_container
-from orchestrator.formats.osp import write_osp
+from orchestrator.formats.other_formats import write_container, write_osp
 from orchestrator.formats.ssp.reader import read_ssp
-from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.formats.ssp.writer import PARAMETER_SET, write_ssp
 from orchestrator.machine.children import run_module
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line
@@ -105,9 +104,14 @@ def real_outputs(system: System) -> list[tuple[str, str, int]]:
     return [
         (component.name, variable.name, variable.valueReference)
         for component in system.components.values()
-        for variable in component.description.modelVariables
-        if variable.causality == "output" and variable.type == "Real"
+        for variable in component.having("output")
+        if variable.type == "Real"
     ]
+
+
+def _names(system: System, between: str = ".") -> list[str]:
+    """Names of all Real outputs, as tools write them."""
+    return [f"{component}{between}{port}" for component, port, _ in real_outputs(system)]
 
 
 def _stepped(step: Callable[[], object], read: Callable[[], list[float]], steps: int) -> Ran:
@@ -123,9 +127,13 @@ def _stepped(step: Callable[[], object], read: Callable[[], list[float]], steps:
     return Ran(np.array(rows), seconds, reading)
 
 
-def _libcosim(system: System, path: Path, steps: int, execution: Any) -> Ran:
+def _libcosim(system: System, steps: int, opener: str, **path: str) -> Ran:
+    from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level  # noqa: PLC0415
     from libcosimpy.CosimObserver import CosimObserver  # noqa: PLC0415
 
+    log_output_level(CosimLogLevel.ERROR)
+    execution = getattr(CosimExecution, opener)(**path)
     observer = CosimObserver.create_last_value()
     execution.add_observer(observer=observer)
     references: dict[str, list[int]] = {}
@@ -147,24 +155,14 @@ def _libcosim(system: System, path: Path, steps: int, execution: Any) -> Ran:
     return _stepped(one, read, steps)
 
 
-def _quiet_libcosim() -> Any:
-    from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
-    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level  # noqa: PLC0415
-
-    log_output_level(CosimLogLevel.ERROR)
-    return CosimExecution
-
-
 def _libcosim_ssp(system: System, folder: Path, steps: int, step: float) -> Ran:
     [path] = write_ssp(system, folder)
-    return _libcosim(system, folder, steps, _quiet_libcosim().from_ssp_file(ssp_path=str(path)))
+    return _libcosim(system, steps, "from_ssp_file", ssp_path=str(path))
 
 
 def _libcosim_osp(system: System, folder: Path, steps: int, step: float) -> Ran:
     write_osp(system, folder)
-    return _libcosim(
-        system, folder, steps, _quiet_libcosim().from_osp_config_file(osp_path=str(folder))
-    )
+    return _libcosim(system, steps, "from_osp_config_file", osp_path=str(folder))
 
 
 def _ecos(system: System, folder: Path, steps: int, step: float) -> Ran:
@@ -173,12 +171,9 @@ def _ecos(system: System, folder: Path, steps: int, step: float) -> Ran:
         ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
     ecospy = importlib.import_module("ecospy")
     [path] = write_ssp(system, folder)
-    names = [f"{component}::{port}" for component, port, _ in real_outputs(system)]
+    names = _names(system, "::")
     with ecospy.EcosSimulation(step_size=step, ssp_path=str(path)) as simulation:
-        if any(system.parameters_of(name) for name in system.components):
-            simulation.init(parameter_set="scenario")
-        else:
-            simulation.init()
+        simulation.init(**({"parameter_set": PARAMETER_SET} if system.parameters else {}))
         return _stepped(simulation.step, lambda: [*map(simulation.get_real, names)], steps)
 
 
@@ -189,9 +184,8 @@ def _fmpy_ssp(system: System, folder: Path, steps: int, step: float) -> Ran:
     # It accumulates its time, so the last step may be there or not: ask for half a step more.
     table = simulate_ssp(str(path), stop_time=(steps + 0.5) * step, step_size=step)
     seconds = perf_counter() - start
-    names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
     # Its row at a time has the outputs of the step that begins there.
-    return Ran(np.column_stack([table[name] for name in names])[:steps], seconds)
+    return Ran(np.column_stack([table[name] for name in _names(system)])[:steps], seconds)
 
 
 def _container(system: System, folder: Path, steps: int, step: float) -> Ran:
@@ -201,14 +195,12 @@ def _container(system: System, folder: Path, steps: int, step: float) -> Ran:
         str(path), stop_time=steps * step, step_size=step, output_interval=step
     )
     seconds = perf_counter() - start
-    names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
-    return Ran(np.column_stack([table[name] for name in names])[1:], seconds)
+    return Ran(np.column_stack([table[name] for name in _names(system)])[1:], seconds)
 
 
 def _c_program(system: System, folder: Path, steps: int, step: float) -> Ran:
     program = c_host.compiled(folder, system, Experiment(steps * step, step, "jacobi"))
-    names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
-    rows, seconds = c_host.run([program], folder, steps, names)
+    rows, seconds = c_host.run([program], folder, steps, _names(system))
     return Ran(rows[1:], seconds)
 
 
@@ -241,7 +233,7 @@ def compare(system: System, hosts: Sequence[str], steps: int, step: float) -> li
     expected = Table()
     start = system.start_time or 0.0
     completed(planned(system, Experiment(start + steps * step, step, "jacobi", start)), [expected])
-    names = [f"{component}.{port}" for component, port, _ in real_outputs(system)]
+    names = _names(system)
     table = expected.group(*names)[1:]
     return [_verdict(system, host, steps, step, names, table) for host in hosts]
 

@@ -13,8 +13,8 @@ from typing import TypeVar
 from fmus.kinds import FMI_VERSIONS, PYTHON
 from orchestrator.figures.drawing import check_figure
 from orchestrator.formats.examination import open_inputs
-from orchestrator.formats.osp import STRUCTURE as OSP
-from orchestrator.formats.osp import read_osp
+from orchestrator.formats.other_formats import STRUCTURE as OSP
+from orchestrator.formats.other_formats import read_osp
 from orchestrator.formats.ssp import STRUCTURE as SSD
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.machine.errors import Findings, InputError

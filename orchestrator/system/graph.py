@@ -31,7 +31,7 @@ def rings(system: System, among: Collection[str] | None = None) -> list[list[str
     place = {name: i for i, name in enumerate(sources)}
     return [
         _opened(part, sources, place)
-        for part in _strongly_connected(sources, sources)
+        for part in _strongly_connected(sources)
         if len(part) > 1 or part[0] in sources[part[0]]
     ]
 
@@ -136,11 +136,11 @@ def reaching(system: System, component: str, until: set[str]) -> Iterator[Connec
 
 
 def _sources(system: System, among: Collection[str] | None = None) -> dict[str, set[str]]:
-    counted = {name for name in system.components if among is None or name in among}
-    found: dict[str, set[str]] = {name: set() for name in system.components if name in counted}
+    counted = (name for name in system.components if among is None or name in among)
+    found: dict[str, set[str]] = {name: set() for name in counted}
     for connection in system.connections:
         source, target = connection.source.component, connection.target.component
-        if source in counted and target in counted and has_feedthrough(system, connection):
+        if source in found and target in found and has_feedthrough(system, connection):
             found[target].add(source)
     return found
 
@@ -149,7 +149,7 @@ def _without_rings(sources: _Sources) -> dict[str, set[str]]:
     """What each waits for once all rings are opened: in a ring, for the one before it."""
     place = {name: i for i, name in enumerate(sources)}
     found: dict[str, set[str]] = {}
-    for part in _strongly_connected(sources, sources):
+    for part in _strongly_connected(sources):
         before: set[str] = set()
         ring = set(part)
         for name in _opened(part, sources, place):
@@ -254,19 +254,18 @@ def _closing(first: str, feeding: Mapping[str, set[str]], fed: Mapping[str, set[
     return closing - {first}
 
 
-def _strongly_connected(names: Iterable[str], sources: _Sources) -> list[list[str]]:
+def _strongly_connected(sources: _Sources) -> list[list[str]]:
     """Components in parts of which each waits for all others of its part (Tarjan 1972).
 
     Returns:
         The parts; one comes after those that it waits for.
 
     """
-    names = dict.fromkeys(names)
     number: dict[str, int] = {}
     lowest: dict[str, int] = {}
     open_: dict[str, None] = {}
     parts: list[list[str]] = []
-    for root in names:
+    for root in sources:
         if root in number:
             continue
         path: list[tuple[str, Iterator[str]]] = []
@@ -279,8 +278,6 @@ def _strongly_connected(names: Iterable[str], sources: _Sources) -> list[list[st
             name, ahead = path[-1]
             following = None
             for source in ahead:
-                if source not in names:
-                    continue
                 if source not in number:
                     following = source
                     break

@@ -18,7 +18,7 @@ Value: TypeAlias = float | int | bool | str
 INTEGERS = -(2**31), 2**31 - 1
 
 #: What FMI 2.0 calls the types of FMI 3.0 that have a name there.
-_NAMES = {"Float64": "Real", "Int32": "Integer"}
+FMI2_NAMES = {"Float64": "Real", "Int32": "Integer"}
 
 #: An FMU may keep a value in another unit, and round it by such a share.
 _ROUNDING = 1e-9
@@ -134,7 +134,7 @@ def _range(variable: ModelVariable) -> tuple[float | None, float | None]:
 
 def type_of(variable: ModelVariable) -> str:
     """The type of a variable, as FMI 2.0 calls it."""
-    return _NAMES.get(variable.type, str(variable.type))
+    return FMI2_NAMES.get(variable.type, str(variable.type))
 
 
 def items_of(variable: ModelVariable) -> dict[str, str]:

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from auv_fmu import __version__
-from orchestrator.commands.main import main
-from orchestrator.commands.parser import parser
+from orchestrator.commands.main import main, parser
 from support.markdown import DOCS, blocks
 
 ROOT = DOCS.parent

@@ -29,7 +29,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from orchestrator.commands import paper
+from orchestrator.commands import many_runs
 from orchestrator.commands.main import main
 from orchestrator.figures.drawing import figure_files
 from orchestrator.machine.ledger import LEDGER
@@ -188,7 +188,7 @@ def quick(here: Path) -> Iterator[None]:
             (report, "workers", lambda: nullcontext(InThisProcess())),
             (report, "CLAIMS", ()),
             (report, "EFFECTS", ()),
-            (paper, "names", lambda: ["fig3a"]),
+            (many_runs, "names", lambda: ["fig3a"]),
         ):
             stack.enter_context(patch.object(what, name, instead))
         if STUDIES:

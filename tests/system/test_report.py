@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.commands import paper
+from orchestrator.commands import many_runs
 from orchestrator.commands.main import main
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
@@ -178,7 +178,7 @@ def test_files_on_the_command_line_come_after_the_scenarios(tmp_path, monkeypatc
         asked.append(arguments)
         return Path("a"), Path("b")
 
-    monkeypatch.setattr(paper, "write_report", write_report)
+    monkeypatch.setattr(many_runs, "write_report", write_report)
     assert main(["report", "mine.toml", "--out", str(tmp_path)]) == 0
     [(folder, scenarios, command)] = asked
     assert (folder, scenarios[-2:]) == (tmp_path, ["path-pd", "mine.toml"])

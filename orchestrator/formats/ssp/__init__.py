@@ -1,8 +1,8 @@
 """Systems as SSP archives: what the master runs and what other hosts open.
 
-`reader` and `writer` are the two doors. Reading goes from the elements of a file (`document`,
-`archive`) over the tree of systems (`building`, `hierarchy`) to the output that feeds each input
-(`routes`) and the value of each parameter (`bindings`).
+`reader` and `writer` are the two doors. Reading goes from the elements of a file (`archive`) over
+the tree of systems (`hierarchy`) to what each connection and parameter set says (`origins`), and
+from there to the output that feeds each input and the value of each parameter (`reader`).
 """
 
 #: The file of an archive that says what is in it.

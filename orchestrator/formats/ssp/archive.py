@@ -1,20 +1,134 @@
-"""An SSP archive or its folder while it is read: its files, and what is found wrong with it."""
+"""An SSP archive or its folder while it is read: its files, and what is found wrong with it.
+
+Files are read leniently, and held against the schemas. fmpy.ssp is no such reader: it looks for
+transformations in the wrong namespace, passes over parameter mappings, units and annotations, does
+not decode the addresses of files, and reads a file only if it is valid to the letter. What is
+harmless is a note here.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import TypeVar
 from urllib.parse import unquote, urlsplit
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
 
-from orchestrator.formats.ssp import STRUCTURE
-from orchestrator.formats.ssp.document import read_document, violations
+import fmpy.ssp
+from lxml import etree
+
+from orchestrator.formats.ssp import NAMESPACES, STRUCTURE
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason
 from orchestrator.machine.user_files import check_file, is_folder, unpacked
 from orchestrator.system.units import Linear, UndefinedUnit, Unit, conversion
 from orchestrator.system.values import finite, integer
+
+#: Elements in which others than the standard's are at home.
+_OPEN = ("Annotations", "MetaData", "Signature")
+
+
+def read_document(text: bytes, note: Callable[[str], None]) -> Element:
+    """The root element of an XML file; tags and attributes are local names, text is left out.
+
+    Args:
+        text: the file.
+        note: takes what is not as it should be, and can be understood.
+
+    Raises:
+        ValueError: it is not well-formed, or not without a document type.
+
+    """
+    reader = _Reader(note)
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = reader.start
+    parser.EndElementHandler = reader.end
+    parser.StartDoctypeDeclHandler = reader.doctype
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        raise ValueError(f"not well-formed XML: {error}") from error
+    return reader.builder.close()
+
+
+class _Reader:
+    """What is told by the parser, which knows nothing of namespaces.
+
+    Attributes:
+        builder: of the elements.
+
+    """
+
+    def __init__(self, note: Callable[[str], None]) -> None:
+        self.builder = TreeBuilder()
+        self._note = note
+        self._scopes: list[dict[str, str]] = [{}]
+        self._open = 0
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        """Take the beginning of an element."""
+        scope, plain = dict(self._scopes[-1]), {}
+        for key, value in attributes.items():
+            if key.partition(":")[0] == "xmlns":
+                scope[key.partition(":")[2]] = value
+            else:
+                plain[key.rpartition(":")[2]] = value
+        self._scopes.append(scope)
+        prefix, _, name = tag.rpartition(":")
+        if self._open or name in _OPEN:
+            self._open += 1
+        namespace = scope.get(prefix)
+        if namespace is None and prefix:
+            self._note(f"the prefix {prefix!r} is not declared")
+        elif not self._open and namespace not in NAMESPACES:
+            where = f"the namespace {namespace!r}" if namespace else "no namespace"
+            self._note(f"elements are in {where}, which is none of SSP 1.0")
+        self.builder.start(name, plain)
+
+    def end(self, tag: str) -> None:
+        """Take the end of an element."""
+        self._scopes.pop()
+        self._open = max(self._open - 1, 0)
+        self.builder.end(tag.rpartition(":")[2])
+
+    def doctype(self, *_: object) -> None:
+        """Refuse what could name further files, or unfold into more than memory holds."""
+        raise ValueError("it has a document type, which no file of an SSP has")
+
+
+#: Schemas by the root elements of the files that they are for.
+_SCHEMAS = {
+    "SystemStructureDescription": "SystemStructureDescription.xsd",
+    "ParameterSet": "SystemStructureParameterValues.xsd",
+    "ParameterMapping": "SystemStructureParameterMapping.xsd",
+}
+
+
+def violations(root: str, text: bytes) -> list[str]:
+    """What is not as the schema has it, with the number of its line.
+
+    Args:
+        root: name of the root element.
+        text: the file.
+
+    """
+    if root not in _SCHEMAS:
+        return [f"<{root}> is no element of SSP"]
+    try:
+        _schema(_SCHEMAS[root]).assertValid(etree.fromstring(text))
+    except etree.LxmlError as error:
+        said = [(entry.line, entry.message) for entry in error.error_log]
+        return [f"line {line}: {re.sub('{[^}]*}', '', message)}" for line, message in said]
+    return []
+
+
+@cache
+def _schema(name: str) -> etree.XMLSchema:
+    return etree.XMLSchema(etree.parse(Path(*fmpy.ssp.__path__, "schema", name)))
+
 
 _SUFFIX = Path(STRUCTURE).suffix
 
@@ -189,23 +303,10 @@ class Archive:
         """
         text = None if element is None else element.get(name)
         try:
-            return otherwise if text is None else number(name, text)
-        except InputError as error:
+            return otherwise if text is None else finite(text, name)
+        except ValueError as error:
             self.problem(error)
             return otherwise
-
-
-def number(name: str, text: str) -> float:
-    """The number that an attribute is.
-
-    Raises:
-        InputError: it is none, or not finite.
-
-    """
-    try:
-        return finite(text, name)
-    except ValueError as error:
-        raise InputError(str(error)) from None
 
 
 def listed(names: Sequence[str], between: str = ", ") -> str:

@@ -1,16 +1,67 @@
-"""Systems in systems, down to the components, with the connectors of all of them."""
+"""The systems in a description, down to their components, with the connectors of all of them."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 from xml.etree.ElementTree import Element
 
-from orchestrator.formats.ssp.definitions import Items
-from orchestrator.system.component import Component
-from orchestrator.system.units import Unit, Units, unit_of_port
-from orchestrator.system.values import type_of
+from orchestrator.formats.ssp.archive import Archive, listed
+from orchestrator.machine.errors import InputError
+from orchestrator.system.component import Component, read_component
+from orchestrator.system.units import BASES, Unit, Units, unit_of_port
+from orchestrator.system.values import FMI2_NAMES, items_of, type_of
+
+#: An enumeration's values by the names of its items.
+Items: TypeAlias = Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class Definitions:
+    """Units and enumerations by their names."""
+
+    units: Units = field(default_factory=dict)
+    enumerations: Mapping[str, Items] = field(default_factory=dict)
+
+    def with_inner(self, inner: Definitions) -> Definitions:
+        """These definitions and another file's, which win."""
+        return Definitions(
+            {**self.units, **inner.units}, {**self.enumerations, **inner.enumerations}
+        )
+
+    def unit(self, element: Element) -> Unit | None:
+        """The unit that a type or a value is stated in; None: it states none."""
+        name = element.get("unit")
+        return self.units.get(name, Unit(name)) if name else None
+
+    def items(self, element: Element) -> Items:
+        """The items of the enumeration that a type or a value names; empty where there is none."""
+        return self.enumerations.get(element.get("name", ""), {})
+
+
+def definitions_of(archive: Archive, root: Element) -> Definitions:
+    """What a file defines."""
+    units = {}
+    for unit in root.findall("Units/Unit"):
+        name, base = unit.get("name", ""), unit.find("BaseUnit")
+        if base is not None:
+            units[name] = Unit(
+                name,
+                tuple(archive.integer(base, of) for of in BASES),
+                archive.number(base, "factor", 1.0),
+                archive.number(base, "offset", 0.0),
+            )
+    enumerations = {
+        enumeration.get("name", ""): {
+            item.get("name", ""): archive.integer(item, "value")
+            for item in enumeration.findall("Item")
+        }
+        for enumeration in root.findall("Enumerations/Enumeration")
+    }
+    return Definitions(units, enumerations)
+
 
 #: The names of a system and of the systems around it, except the outermost.
 Way: TypeAlias = tuple[str, ...]
@@ -50,10 +101,10 @@ class Connector:
 
     """
 
-    causality: str | None
-    type: str | None
-    unit: Unit | None
-    items: Items
+    causality: str | None = None
+    type: str | None = None
+    unit: Unit | None = None
+    items: Items = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -78,18 +129,13 @@ class Leaf:
     def connector(self, name: str) -> Connector | None:
         """A connector as the FMU has it; None: it has none of that name."""
         if self.component is None:
-            return self.connectors.get(name, Connector(None, None, None, {}))
+            return self.connectors.get(name, Connector())
         variable = self.component.variables.get(name)
         if variable is None:
             return None
-        stated = self.connectors.get(name)
-        unit = unit_of_port(self.component, name, self.units)
-        if unit is None and stated is not None:
-            unit = stated.unit
-        declared = variable.declaredType
-        items = {} if declared is None else {i.name: int(i.value) for i in declared.items}
-        if not items and stated is not None:
-            items = dict(stated.items)
+        stated = self.connectors.get(name, Connector())
+        unit = unit_of_port(self.component, name, self.units) or stated.unit
+        items = {item: int(value) for item, value in items_of(variable).items()} or stated.items
         return Connector(variable.causality, type_of(variable), unit, items)
 
     def named(self, name: str) -> Iterator[tuple[Node, Connector]]:
@@ -116,7 +162,7 @@ class Bus:
     def connector(self, name: str) -> Connector | None:
         """A connector, through which signals go in both directions."""
         stated = self.connectors.get(name)
-        return None if stated is None else Connector(None, stated.type, stated.unit, stated.items)
+        return None if stated is None else replace(stated, causality=None)
 
     def named(self, _: str) -> Iterator[tuple[Node, Connector]]:
         """Nothing in it has a value of its own."""
@@ -152,10 +198,129 @@ class Group:
             if name.startswith(f"{member}."):
                 yield from element.named(name[len(member) + 1 :])
 
-    def leaves(self) -> Iterator[Leaf]:
-        """All components in it, in their order."""
+    def elements(self) -> Iterator[Leaf | Bus | Group]:
+        """All elements in it in their order, each system before those in it; first itself."""
+        yield self
         for element in self.members.values():
             if isinstance(element, Group):
-                yield from element.leaves()
-            elif isinstance(element, Leaf):
+                yield from element.elements()
+            else:
                 yield element
+
+
+_FMU = "application/x-fmu-sharedlibrary"
+
+#: What a connector may have besides its type.
+_NO_TYPES = ("Dimension", "Clock", "ConnectorGeometry", "Annotations")
+
+
+class Builder:
+    """Reads the systems of a description."""
+
+    def __init__(self, archive: Archive, definitions: Definitions) -> None:
+        """Take the archive, and what its description defines."""
+        self._archive, self._definitions = archive, definitions
+
+    def group(
+        self, content: Element, way: Way = (), buses: Mapping[str, Way] | None = None
+    ) -> Group:
+        """A system and all that is in it.
+
+        Args:
+            content: its element.
+            way: to it.
+            buses: ways to the signal dictionaries of the systems around it, by their names.
+
+        """
+        own = content.findall("SignalDictionaries/SignalDictionary")
+        buses = {
+            **(buses or {}),
+            **{name: (*way, name, "") for d in own if (name := d.get("name"))},
+        }
+        members: dict[str, Leaf | Bus | Group] = {}
+        for element in content.findall("Elements/*"):
+            name = element.get("name", "")
+            if not re.fullmatch(r"[^/\\]+", name):
+                self._archive.problem(f"component {name!r}: write it without slashes")
+            elif name in members:
+                self._archive.problem(f"two components are named {'.'.join((*way, name))}")
+            elif element.tag == "System":
+                members[name] = self.group(element, (*way, name), buses)
+            elif element.tag == "Component":
+                members[name] = self._leaf(element, (*way, name))
+            elif element.tag == "SignalDictionaryReference":
+                bus = element.get("dictionary", "")
+                if bus in buses:
+                    members[name] = Bus(buses[bus], element, self._connectors(element))
+                else:
+                    self._archive.problem(f"{name}: there is no signal dictionary {bus!r}")
+            else:
+                self._archive.problem(f"{name}: a <{element.tag}> in a system is not supported")
+        return Group(way, content, self._connectors(content), members)
+
+    def _leaf(self, content: Element, way: Way) -> Leaf:
+        component = self._component(content, ".".join(way))
+        connectors = self._connectors(content)
+        leaf = Leaf(way, content, component, connectors, self._definitions.units)
+        if component is not None:
+            self._compare(leaf)
+        return leaf
+
+    def _component(self, content: Element, name: str) -> Component | None:
+        source, kind = content.get("source"), content.get("type", _FMU)
+        implementation = content.get("implementation", "any")
+        if kind != _FMU:
+            self._archive.problem(
+                f"{name}: a component of type {kind!r} is not supported; an FMU is"
+            )
+        elif source is None:
+            self._archive.problem(f"{name}: a component without a source, which cannot be run")
+        elif implementation not in ("any", "CoSimulation"):
+            self._archive.problem(
+                f"{name}: asks for {implementation}, which is not supported; CoSimulation is"
+            )
+        elif (fmu := self._archive.file(source, name)) is not None:
+            try:
+                return read_component(name, fmu, findings=self._archive.findings)
+            except InputError as error:
+                said = str(error).removeprefix(f"{self._archive.folder}/")
+                self._archive.problem(f"{name}: {said}")
+        return None
+
+    def _compare(self, leaf: Leaf) -> None:
+        """Say where connectors are not what their FMU has."""
+        absent = []
+        for name, stated in leaf.connectors.items():
+            own = leaf.connector(name)
+            if own is None:
+                absent.append(name)
+                continue
+            for what, said, true in (
+                ("kind", stated.causality, own.causality),
+                ("type", stated.type, own.type),
+                ("unit", stated.unit and stated.unit.name, own.unit and own.unit.name),
+            ):
+                if said and said != true:
+                    self._archive.note(
+                        f"{Node(leaf.way, name)}: its {what} is {said}, and {true} in its FMU"
+                    )
+        if absent:
+            self._archive.note(
+                f"{'.'.join(leaf.way)}: its FMU has no variables for the connectors "
+                f"{listed(absent)}"
+            )
+
+    def _connectors(self, content: Element) -> dict[str, Connector]:
+        return {
+            connector.get("name", ""): self._connector(connector)
+            for connector in content.findall("Connectors/Connector")
+        }
+
+    def _connector(self, connector: Element) -> Connector:
+        causality = connector.get("kind")
+        for stated in connector:
+            if stated.tag not in _NO_TYPES:
+                of = FMI2_NAMES.get(stated.tag, stated.tag)
+                unit, items = self._definitions.unit(stated), self._definitions.items(stated)
+                return Connector(causality, of, unit, items)
+        return Connector(causality)

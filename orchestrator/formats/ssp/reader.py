@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
-from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 from orchestrator.formats.ssp import LEFT_OPEN
 from orchestrator.formats.ssp.archive import Archive, listed
-from orchestrator.formats.ssp.bindings import Bindings, Values
-from orchestrator.formats.ssp.building import Builder
-from orchestrator.formats.ssp.definitions import definitions_of
-from orchestrator.formats.ssp.hierarchy import Leaf, Node, Way
-from orchestrator.formats.ssp.routes import Route, Routes
+from orchestrator.formats.ssp.hierarchy import Builder, Leaf, Node, Way, definitions_of
+from orchestrator.formats.ssp.origins import Bindings, Segment, Values, segments_of
 from orchestrator.machine.errors import Findings, InputError, shortened
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
@@ -32,47 +29,7 @@ _STEPS = (
 )
 
 #: The same of a component.
-_STEP_OF_A_COMPONENT = ("StepSizeHint", "value")
-
-
-class Times(NamedTuple):
-    """The experiment of a description [s]; None: it does not say."""
-
-    start_time: float | None
-    stop_time: float | None
-    step: float | None
-
-
-def times_of(archive: Archive, root: Element) -> Times:
-    """The experiment that a description asks for."""
-    experiment = root.find("DefaultExperiment")
-    stated = (
-        archive.number(element, attribute, None)
-        for name, attribute in _STEPS
-        for place in (experiment, root.find("System"), root)
-        for element in annotated(place, name)
-    )
-    return Times(
-        archive.number(experiment, "startTime", None),
-        archive.number(experiment, "stopTime", None),
-        next((step for step in stated if step is not None), None),
-    )
-
-
-def step_of(archive: Archive, leaf: Leaf) -> float | None:
-    """The step that a component asks for [s]; None, as zero does: it has no wish."""
-    name, attribute = _STEP_OF_A_COMPONENT
-    for element in annotated(leaf.content, name):
-        return archive.number(element, attribute, None) or None
-    return None
-
-
-def annotated(element: Element | None, name: str) -> Iterator[Element]:
-    """Elements of a name in the annotations of an element itself."""
-    if element is not None:
-        for annotations in element.findall("Annotations"):
-            yield from annotations.iter(name)
-
+_STEPS_OF_COMPONENTS = (("StepSizeHint", "value"),)
 
 _ROOT = "SystemStructureDescription"
 
@@ -96,21 +53,19 @@ def read_ssp(path: Path, variant: str | None = None, findings: Findings | None =
     if root.tag != _ROOT or content is None:
         raise InputError(f"{path}: not a readable SSP: it describes no system")
     try:
-        system = _read(archive, root)
+        system = _read(archive, root, content)
     except RecursionError:
         raise InputError(f"{path}: not a readable SSP: nested too deeply") from None
     findings.refuse()
     return system
 
 
-def _read(archive: Archive, root: Element) -> System:
-    definitions = definitions_of(archive, root)
-    [content] = root.findall("System")[:1]
+def _read(archive: Archive, root: Element, content: Element) -> System:
+    definitions, experiment = definitions_of(archive, root), root.find("DefaultExperiment")
     top = Builder(archive, definitions).group(content)
-    leaves = {leaf.way: leaf for leaf in top.leaves()}
-    ports = _Ports(
-        archive, leaves, Routes(archive, top), Bindings(archive, definitions).values(top)
-    )
+    leaves = {leaf.way: leaf for leaf in top.elements() if isinstance(leaf, Leaf)}
+    segments = segments_of(archive, top)
+    ports = _Ports(archive, leaves, segments, Bindings(archive, definitions).values(top))
     components: dict[str, Component] = {}
     for leaf in leaves.values():
         name = ".".join(leaf.way)
@@ -118,20 +73,24 @@ def _read(archive: Archive, root: Element) -> System:
             archive.problem(f"two components are named {name}")
         if leaf.component is not None:
             components[name] = leaf.component
-    times = times_of(archive, root)
-    steps = {".".join(way): step_of(archive, leaf) for way, leaf in leaves.items()}
+    # A component whose step is zero has no wish.
+    steps = {
+        ".".join(way): step
+        for way, leaf in leaves.items()
+        if (step := _step(archive, _STEPS_OF_COMPONENTS, leaf.content))
+    }
     system = System(
         name=content.get("name") or archive.path.resolve().stem,
         components=components,
         connections=tuple(ports.connections),
         parameters=ports.parameters,
-        start_time=times.start_time,
-        stop_time=times.stop_time,
-        step=times.step,
-        steps={name: step for name, step in steps.items() if step is not None},
+        start_time=archive.number(experiment, "startTime", None),
+        stop_time=archive.number(experiment, "stopTime", None),
+        step=_step(archive, _STEPS, experiment, content, root),
+        steps=steps,
         left_open={
             PortName(element.get("component", ""), element.get("name", ""))
-            for left_open in annotated(root.find("DefaultExperiment"), LEFT_OPEN)
+            for left_open in _annotated(experiment, LEFT_OPEN)
             for element in left_open
         },
     )
@@ -142,12 +101,31 @@ def _read(archive: Archive, root: Element) -> System:
     return system
 
 
+def _annotated(element: Element | None, name: str) -> Iterator[Element]:
+    """Elements of a name in the annotations of an element itself."""
+    if element is not None:
+        for annotations in element.findall("Annotations"):
+            yield from annotations.iter(name)
+
+
+def _step(
+    archive: Archive, words: Iterable[tuple[str, str]], *places: Element | None
+) -> float | None:
+    """The step that the annotations of some places ask for [s]; None: they do not say."""
+    for name, attribute in words:
+        for element in chain.from_iterable(_annotated(place, name) for place in places):
+            if (step := archive.number(element, attribute, None)) is not None:
+                return step
+    return None
+
+
 @dataclass(frozen=True)
 class _Arrival:
     """What is known of a value at a node.
 
     Attributes:
         start: where it sets out: at a component's port, or where it is given; None: there is none.
+        leaf: the component that it comes from; None: it is given.
         whole: what has happened to it since.
         unit: that it has.
         error: why it cannot come so far.
@@ -155,6 +133,7 @@ class _Arrival:
     """
 
     start: Node | None
+    leaf: Leaf | None = None
     whole: Transformation | None = None
     unit: Unit | None = None
     error: InputError | None = None
@@ -170,73 +149,90 @@ class _Ports:
     """
 
     def __init__(
-        self, archive: Archive, leaves: Mapping[Way, Leaf], routes: Routes, given: Values
+        self,
+        archive: Archive,
+        leaves: Mapping[Way, Leaf],
+        segments: Mapping[Node, Segment],
+        given: Values,
     ) -> None:
         """Follow each port upstream."""
         self.connections: list[Connection] = []
         self.parameters: dict[PortName, Value] = {}
-        self._archive, self._leaves, self._given = archive, leaves, given
+        self._archive, self._leaves = archive, leaves
+        self._segments, self._given = segments, given
         self._used: set[Node] = set()
         self._arrivals: dict[Node, _Arrival] = {}
-        for node in dict.fromkeys((*routes.targets(), *given)):
+        self._circling: set[Node] = set()
+        for node in dict.fromkeys((*segments, *given)):
             leaf = leaves.get(node.way)
             if leaf is not None and leaf.component is not None:
-                port = PortName(leaf.component.name, node.port)
                 try:
-                    self._enter(port, routes.route(node), leaf)
+                    self._enter(PortName(leaf.component.name, node.port), node, leaf)
                 except InputError as error:
                     archive.problem(error)
         lost = [str(node) for node in given if node not in self._used]
         if lost:
             archive.note(f"values that are given to {listed(lost)} reach no component")
 
-    def _enter(self, port: PortName, route: Route, leaf: Leaf) -> None:
+    def _enter(self, port: PortName, node: Node, leaf: Leaf) -> None:
         """Enter what arrives at a port: another's value, or the outermost that is given."""
-        origin = self._leaves.get(route.origin.way) if route.segment else None
-        arrival = self._arrival(route) if route.segment else self._given_to(route.node)
-        if origin is None:
+        arrival = self._arrival(node) if node in self._segments else self._given_to(node)
+        if arrival.leaf is None:
             self._set(port, leaf, arrival)
-        elif origin.component is not None:
-            source = PortName(origin.component.name, route.origin.port)
+        elif arrival.start is not None and arrival.leaf.component is not None:
+            source = PortName(arrival.leaf.component.name, arrival.start.port)
             if arrival.error is not None:
                 raise InputError(f"{source} -> {port}: {arrival.error}")
             self.connections.append(Connection(source, port, arrival.whole))
 
-    def _arrival(self, route: Route) -> _Arrival:
-        """What is known of a value at the end of a route; each segment is looked at once."""
-        ahead: list[Route] = []
-        at: Route | None = route
-        while at is not None and at.node not in self._arrivals:
-            ahead.append(at)
-            at = at.before
-        for one in reversed(ahead):
-            self._arrivals[one.node] = self._arrival_by(one)
-        return self._arrivals[route.node]
+    def _arrival(self, node: Node) -> _Arrival:
+        """What is known of a value at a node.
 
-    def _arrival_by(self, route: Route) -> _Arrival:
-        """The same, where it is known of the course before."""
-        origin = self._leaves.get(route.origin.way)
-        if route.before is None or route.segment is None:
-            if origin is None:
-                return self._given_to(route.node)
-            connector = None if origin.component is None else origin.connector(route.node.port)
-            return _Arrival(route.node, unit=connector.unit if connector else None)
-        before = self._arrivals[route.before.node]
+        It is followed upstream to what another port has been followed through: so all of them take
+        linear time.
+
+        Raises:
+            InputError: its connections lead in a circle.
+
+        """
+        upstream: dict[Node, Segment] = {}
+        at = node
+        while at not in self._arrivals and (segment := self._segments.get(at)) is not None:
+            if at in upstream or segment.source in self._circling:
+                self._circling.update(upstream, [at])
+                raise InputError(f"{node}: the connections that feed it lead in a circle")
+            upstream[at] = segment
+            at = segment.source
+        arrival = self._arrivals.get(at) or self._setting_out(at)
+        self._arrivals[at] = arrival
+        for target, segment in reversed(upstream.items()):
+            arrival = self._arrivals[target] = self._carried(arrival, target, segment)
+        return arrival
+
+    def _setting_out(self, node: Node) -> _Arrival:
+        """A node that no connection ends in."""
+        leaf = self._leaves.get(node.way)
+        if leaf is None:
+            return self._given_to(node)
+        connector = leaf.connector(node.port)
+        return _Arrival(node, leaf, unit=connector.unit if connector else None)
+
+    def _carried(self, before: _Arrival, node: Node, segment: Segment) -> _Arrival:
+        """What arrives at the end of a connection."""
         if before.start is None:
-            return self._given_to(route.node)
-        self._used.add(route.node)
-        if origin is not None and route.node in self._given:
+            return self._given_to(node)
+        self._used.add(node)
+        if before.leaf is not None and node in self._given:
             self._archive.note(
-                f"{route.node}: is fed by {route.origin}, and the value that is given to it has "
-                "no effect"
+                f"{node}: is fed by {before.start}, and the value that is given to it has no effect"
             )
-        if before.error is not None or (origin is not None and origin.component is None):
+        if before.error is not None or (before.leaf and before.leaf.component is None):
             return before
         try:
-            whole, unit = route.segment.carry(self._archive, before.whole, before.unit)
+            whole, unit = segment.carry(self._archive, before.whole, before.unit)
         except InputError as error:
-            return _Arrival(before.start, error=error)
-        return _Arrival(before.start, whole, unit)
+            return replace(before, error=error)
+        return replace(before, whole=whole, unit=unit)
 
     def _given_to(self, node: Node) -> _Arrival:
         """A node that no value has come to before: there begins the one that is given to it."""
@@ -256,7 +252,7 @@ class _Ports:
             if arrival.error is not None:
                 raise arrival.error
             whole = chained(whole, arrival.whole)
-        except InputError as error:
+        except ValueError as error:
             raise InputError(f"{arrival.start}: {error}") from None
         component, connector = leaf.component, leaf.connector(port.port)
         if component is None or connector is None:

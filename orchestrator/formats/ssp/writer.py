@@ -6,6 +6,7 @@ from collections.abc import Collection
 from io import BytesIO
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
 from zipfile import ZipFile, ZipInfo
 
 from orchestrator.formats.ssp import LEFT_OPEN, OMS, OSP, SSC, SSD, SSV, STRUCTURE
@@ -13,10 +14,13 @@ from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, file_name, plain
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import BASES, Linear, Mapped
-from orchestrator.system.values import Value, literal, type_of
+from orchestrator.system.values import items_of, literal, type_of
 
 #: Name of every parameter set: ecos applies the sets of the one name that it is given.
 PARAMETER_SET = "scenario"
+
+#: Libcosim and OMSimulator accept no other prefixes than these.
+_PREFIXES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "oms": OMS}
 
 #: Whose annotations libcosim and ecos look for.
 _LIBCOSIM = "com.opensimulationplatform"
@@ -65,35 +69,30 @@ def _parameter_sources(system: System) -> dict[str, str]:
 
 def parameter_set_xml(system: System, component: Component) -> bytes:
     """The values that a system sets in one component, as an SSV."""
-    _register_prefixes()
-    root = ElementTree.Element(
-        f"{{{SSV}}}ParameterSet", name=PARAMETER_SET, version=_version(component)
-    )
-    parameters = ElementTree.SubElement(root, f"{{{SSV}}}Parameters")
+    root = Element(_tag("ssv:ParameterSet"), name=PARAMETER_SET, version=_version(component))
+    parameters = _add(root, "ssv:Parameters")
     for name, value in system.parameters_of(component.name).items():
-        element = ElementTree.SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
-        fmi_type = component.variable(name).type
-        ElementTree.SubElement(
-            element, f"{{{SSV}}}{fmi_type}", value=_literal(component, name, value)
-        )
+        variable = component.variable(name)
+        # Values of an enumeration have names there.
+        items = (item for item, number in items_of(variable).items() if int(number) == value)
+        element = _add(parameters, "ssv:Parameter", name=name)
+        written = next(items, literal(value))
+        _add(element, f"ssv:{variable.type}", value=written)
     return _serialised(root)
 
 
-def _literal(component: Component, name: str, value: Value) -> str:
-    """A value as an SSV has it, where values of an enumeration have names."""
-    declared = component.variable(name).declaredType
-    items = () if declared is None else declared.items
-    return next((str(item.name) for item in items if int(item.value) == value), literal(value))
+def _tag(name: str) -> str:
+    prefix, colon, local = name.partition(":")
+    return f"{{{_PREFIXES[prefix]}}}{local}" if colon else name
 
 
-def _register_prefixes() -> None:
-    """Libcosim and OMSimulator accept no other prefixes than these."""
-    prefixes = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "oms": OMS}
-    for prefix, namespace in prefixes.items():
+def _add(parent: Element, tag: str, /, **attributes: str) -> Element:
+    return SubElement(parent, _tag(tag), attributes)
+
+
+def _serialised(root: Element) -> bytes:
+    for prefix, namespace in _PREFIXES.items():
         ElementTree.register_namespace(prefix, namespace)
-
-
-def _serialised(root: ElementTree.Element) -> bytes:
     ElementTree.indent(root)
     content: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
     return content
@@ -104,47 +103,26 @@ def structure_xml(system: System) -> bytes:
 
     libcosim and OMSimulator each need the step in an annotation of their own.
     """
-    _register_prefixes()
-    root = ElementTree.Element(
-        _ssd("SystemStructureDescription"),
-        name=system.name,
-        version=max(map(_version, system.components.values())),
-    )
-    structure = ElementTree.SubElement(root, _ssd("System"), name=system.name)
-    elements = ElementTree.SubElement(structure, _ssd("Elements"))
+    version = max(map(_version, system.components.values()))
+    root = Element(_tag("ssd:SystemStructureDescription"), name=system.name, version=version)
+    structure = _add(root, "ssd:System", name=system.name)
+    elements = _add(structure, "ssd:Elements")
     sources, parameter_sources = _sources(system), _parameter_sources(system)
     for position, component in enumerate(system.components.values()):
-        element = _add_component(
-            elements, component, position, sources[component.fmu], system.left_open
-        )
+        source = sources[component.fmu]
+        element = _add_component(elements, component, position, source, system.left_open)
         if component.name in parameter_sources:
-            bindings = ElementTree.SubElement(element, _ssd("ParameterBindings"))
-            ElementTree.SubElement(
-                bindings,
-                _ssd("ParameterBinding"),
-                source=parameter_sources[component.name],
-                type="application/x-ssp-parameter-set",
-            )
+            bindings = _add(element, "ssd:ParameterBindings")
+            source, kind = parameter_sources[component.name], "application/x-ssp-parameter-set"
+            _add(bindings, "ssd:ParameterBinding", source=source, type=kind)
         if component.name in system.steps:
-            hint = {"value": str(system.steps[component.name])}
-            ElementTree.SubElement(_annotation(element, _LIBCOSIM), f"{{{OSP}}}StepSizeHint", hint)
+            hint = str(system.steps[component.name])
+            _add(_annotation(element, _LIBCOSIM), "osp:StepSizeHint", value=hint)
     # The schema has no empty list of connections.
-    connections = ElementTree.Element(_ssd("Connections"))
     if system.connections:
-        structure.append(connections)
-    for connection in system.connections:
-        element = ElementTree.SubElement(
-            connections,
-            _ssd("Connection"),
-            startElement=connection.source.component,
-            startConnector=connection.source.port,
-            endElement=connection.target.component,
-            endConnector=connection.target.port,
-        )
-        if connection.transformation is not None:
-            # Where units differ, it has been made of them.
-            element.set("suppressUnitConversion", "true")
-            _add_transformation(element, connection, system)
+        connections = _add(structure, "ssd:Connections")
+        for connection in system.connections:
+            _add_connection(connections, connection, system)
     if system.step is not None:
         _add_master(structure, system.step)
     _add_enumerations(root, system)
@@ -153,48 +131,48 @@ def structure_xml(system: System) -> bytes:
     return _serialised(root)
 
 
-def _add_transformation(
-    element: ElementTree.Element, connection: Connection, system: System
-) -> None:
-    made = connection.transformation
+def _add_connection(connections: Element, connection: Connection, system: System) -> None:
+    source, target, made = connection.source, connection.target, connection.transformation
+    start = {"startElement": source.component, "startConnector": source.port}
+    end = {"endElement": target.component, "endConnector": target.port}
+    element = _add(connections, "ssd:Connection", **start, **end)
+    if made is not None:
+        # Where units differ, it has been made of them.
+        element.set("suppressUnitConversion", "true")
     if isinstance(made, Linear) and made != Linear():
         numbers = {"factor": str(made.factor), "offset": str(made.offset)}
-        ElementTree.SubElement(element, _ssc("LinearTransformation"), numbers)
+        _add(element, "ssc:LinearTransformation", **numbers)
     elif isinstance(made, Mapped):
-        source = connection.source
         fmi_type = type_of(system.component(source.component).variable(source.port))
         of = bool if fmi_type == "Boolean" else int
         # Numbers of an enumeration are integers as well.
         name = "BooleanMapping" if of is bool else "IntegerMapping"
-        table = ElementTree.SubElement(element, _ssc(f"{name}Transformation"))
-        for start, end in made.pairs:
-            pair = {"source": literal(of(start)), "target": literal(of(end))}
-            ElementTree.SubElement(table, _ssc("MapEntry"), pair)
+        table = _add(element, f"ssc:{name}Transformation")
+        for before, after in made.pairs:
+            pair = {"source": literal(of(before)), "target": literal(of(after))}
+            _add(table, "ssc:MapEntry", **pair)
 
 
-def _add_master(structure: ElementTree.Element, step: float) -> None:
+def _add_master(structure: Element, step: float) -> None:
     """The step, as OMSimulator looks for it: in Python the attributes, in C++ the child.
 
     Components without a solver of their own get the one of this name. The tolerances are its own
     defaults: those that are missing it takes for zero.
     """
-    annotation = _annotation(structure, "org.openmodelica")
-    information = ElementTree.SubElement(
-        ElementTree.SubElement(annotation, f"{{{OMS}}}Annotations"),
-        f"{{{OMS}}}SimulationInformation",
-        {"name": "oms_ma_default", "method": "oms_ma", "fixedStepSize": str(step)},
-    )
+    annotations = _add(_annotation(structure, "org.openmodelica"), "oms:Annotations")
+    method = {"name": "oms_ma_default", "method": "oms_ma", "fixedStepSize": str(step)}
+    information = _add(annotations, "oms:SimulationInformation", **method)
     tolerances = dict.fromkeys(("absoluteTolerance", "relativeTolerance"), "0.0001")
     master = {"description": "oms-ma", "stepSize": str(step), **tolerances}
-    ElementTree.SubElement(information, f"{{{OMS}}}FixedStepMaster", master)
+    _add(information, "oms:FixedStepMaster", **master)
 
 
-def _annotation(element: ElementTree.Element, of: str) -> ElementTree.Element:
+def _annotation(element: Element, of: str) -> Element:
     """An annotation of an element, of some tool's."""
-    annotations = element.find(_ssd("Annotations"))
+    annotations = element.find(_tag("ssd:Annotations"))
     if annotations is None:
-        annotations = ElementTree.SubElement(element, _ssd("Annotations"))
-    return ElementTree.SubElement(annotations, _ssc("Annotation"), type=of)
+        annotations = _add(element, "ssd:Annotations")
+    return _add(annotations, "ssc:Annotation", type=of)
 
 
 def _version(component: Component) -> str:
@@ -202,53 +180,36 @@ def _version(component: Component) -> str:
     return "1.0" if component.description.fmiVersion == "2.0" else "2.0"
 
 
-def _ssd(tag: str) -> str:
-    return f"{{{SSD}}}{tag}"
-
-
-def _ssc(tag: str) -> str:
-    return f"{{{SSC}}}{tag}"
-
-
 def _add_component(
-    elements: ElementTree.Element,
+    elements: Element,
     component: Component,
     position: int,
     source: str,
     left_open: Collection[PortName],
-) -> ElementTree.Element:
-    element = ElementTree.SubElement(
-        elements,
-        _ssd("Component"),
-        name=component.name,
-        source=source,
-        type="application/x-fmu-sharedlibrary",
-    )
-    connectors = ElementTree.SubElement(element, _ssd("Connectors"))
+) -> Element:
+    kind = "application/x-fmu-sharedlibrary"
+    element = _add(elements, "ssd:Component", name=component.name, source=source, type=kind)
+    connectors = _add(element, "ssd:Connectors")
     for variable in component.description.modelVariables:
         # OMSimulator knows no connectors of texts, and fmpy feeds an input that no connection ends
         # at from another's source. Parameter sets reach variables without a connector.
         is_text = variable.causality == "parameter" and variable.type == "String"
         left_out = is_text or PortName(component.name, variable.name) in left_open
         if variable.causality in ("input", "output", "parameter") and not left_out:
-            connector = ElementTree.SubElement(
-                connectors, _ssd("Connector"), name=variable.name, kind=variable.causality
-            )
+            named = {"name": variable.name, "kind": variable.causality}
+            connector = _add(connectors, "ssd:Connector", **named)
             stated = {"unit": variable.unit} if variable.unit else {}
             if type_of(variable) == "Enumeration" and variable.declaredType is not None:
                 stated = {"name": variable.declaredType.name}
-            ElementTree.SubElement(connector, _ssc(variable.type), stated)
+            _add(connector, f"ssc:{variable.type}", **stated)
     width, height = _BOX
     left = position * (width + _GAP)
-    ElementTree.SubElement(
-        element,
-        _ssd("ElementGeometry"),
-        {"x1": str(left), "y1": "0.0", "x2": str(left + width), "y2": str(height)},
-    )
+    corners = {"x1": str(left), "y1": "0.0", "x2": str(left + width), "y2": str(height)}
+    _add(element, "ssd:ElementGeometry", **corners)
     return element
 
 
-def _add_enumerations(root: ElementTree.Element, system: System) -> None:
+def _add_enumerations(root: Element, system: System) -> None:
     enumerations = {
         variable.declaredType.name: variable.declaredType.items
         for component in system.components.values()
@@ -257,14 +218,14 @@ def _add_enumerations(root: ElementTree.Element, system: System) -> None:
     }
     if not enumerations:
         return
-    parent = ElementTree.SubElement(root, _ssd("Enumerations"))
+    parent = _add(root, "ssd:Enumerations")
     for name in sorted(enumerations):
-        element = ElementTree.SubElement(parent, _ssc("Enumeration"), name=name)
+        element = _add(parent, "ssc:Enumeration", name=name)
         for item in enumerations[name]:
-            ElementTree.SubElement(element, _ssc("Item"), name=item.name, value=str(item.value))
+            _add(element, "ssc:Item", name=item.name, value=str(item.value))
 
 
-def _add_units(root: ElementTree.Element, system: System) -> None:
+def _add_units(root: Element, system: System) -> None:
     units = {
         unit.name: unit.baseUnit
         for component in system.components.values()
@@ -272,29 +233,25 @@ def _add_units(root: ElementTree.Element, system: System) -> None:
     }
     if not units:
         return
-    parent = ElementTree.SubElement(root, _ssd("Units"))
+    parent = _add(root, "ssd:Units")
     for name in sorted(units):
-        element = ElementTree.SubElement(parent, _ssc("Unit"), name=name)
-        base = ElementTree.SubElement(element, _ssc("BaseUnit"))
+        base = _add(_add(parent, "ssc:Unit", name=name), "ssc:BaseUnit")
         for attribute, otherwise in (*((of, 0) for of in BASES), ("factor", 1), ("offset", 0)):
             stated = getattr(units[name], attribute, otherwise)
             if stated != otherwise:
                 base.set(attribute, str(stated))
 
 
-def _add_experiment(root: ElementTree.Element, system: System) -> None:
+def _add_experiment(root: Element, system: System) -> None:
     start_time = str(system.start_time or 0.0)
-    experiment = ElementTree.SubElement(root, _ssd("DefaultExperiment"), startTime=start_time)
+    experiment = _add(root, "ssd:DefaultExperiment", startTime=start_time)
     if system.stop_time is not None:
         experiment.set("stopTime", str(system.stop_time))
     if system.step is not None:
-        annotation = _annotation(experiment, _LIBCOSIM)
-        algorithm = ElementTree.SubElement(annotation, f"{{{OSP}}}Algorithm")
-        ElementTree.SubElement(
-            algorithm, f"{{{OSP}}}FixedStepAlgorithm", baseStepSize=str(system.step)
-        )
+        algorithm = _add(_annotation(experiment, _LIBCOSIM), "osp:Algorithm")
+        _add(algorithm, "osp:FixedStepAlgorithm", baseStepSize=str(system.step))
     if system.left_open:
         # Not beside the components: OMSimulator ends at an annotation there that it does not know.
-        left_open = ElementTree.SubElement(_annotation(experiment, _OURS), LEFT_OPEN)
+        left_open = _add(_annotation(experiment, _OURS), LEFT_OPEN)
         for component, name in sorted((port.component, port.port) for port in system.left_open):
-            ElementTree.SubElement(left_open, "Input", component=component, name=name)
+            _add(left_open, "Input", component=component, name=name)

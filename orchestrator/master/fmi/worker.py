@@ -29,8 +29,7 @@ from orchestrator.master.fmi.surroundings import Surroundings
 from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import member, step
-from orchestrator.system.component import Component
-from orchestrator.system.description import read_description
+from orchestrator.system.component import Component, read_description
 from orchestrator.system.structure import System
 from orchestrator.system.values import StringTable
 

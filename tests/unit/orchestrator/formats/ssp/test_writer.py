@@ -10,9 +10,8 @@ from zipfile import ZipFile
 import pytest
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
-from orchestrator.formats.container import write_container
 from orchestrator.formats.examination import open_inputs
-from orchestrator.formats.osp import write_osp
+from orchestrator.formats.other_formats import write_container, write_osp
 from orchestrator.formats.ssp import OMS
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import write_ssp

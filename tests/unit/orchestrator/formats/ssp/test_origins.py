@@ -45,24 +45,25 @@ units = st.sampled_from(["", "m", "mm", "km", "K", "furlong"])
 class OneByOne(reading._Ports):
     """Each port followed upstream by itself, and its way transformed from its beginning."""
 
-    def __init__(self, archive, leaves, routes, given) -> None:
+    def __init__(self, archive, leaves, segments, given) -> None:
         self.connections, self.parameters = [], {}
         self._archive, self._leaves, self._given = archive, leaves, given
         used: set[Node] = set()
-        for node in dict.fromkeys((*routes.targets(), *given)):
+        for node in dict.fromkeys((*segments, *given)):
             leaf = leaves.get(node.way)
             if leaf is not None and leaf.component is not None:
+                port = PortName(leaf.component.name, node.port)
                 try:
-                    self._follow(PortName(leaf.component.name, node.port), node, leaf, routes, used)
+                    self._follow(port, node, leaf, segments, used)
                 except InputError as error:
                     archive.problem(error)
         lost = [str(node) for node in given if node not in used]
         if lost:
             archive.note(f"values that are given to {reading.listed(lost)} reach no component")
 
-    def _follow(self, port, node, leaf, routes, used) -> None:
+    def _follow(self, port, node, leaf, segments, used) -> None:
         nodes, ways = [node], []
-        while (segment := routes._segments.get(nodes[0])) is not None:
+        while (segment := segments.get(nodes[0])) is not None:
             if segment.source in nodes:
                 raise InputError(f"{node}: the connections that feed it lead in a circle")
             nodes.insert(0, segment.source)
@@ -98,7 +99,7 @@ class OneByOne(reading._Ports):
                     whole = chained(first, carried(known.unit or value.unit, i))
                 except InputError as error:
                     raise InputError(f"{start}: {error}") from None
-                self._set(port, leaf, reading._Arrival(start, whole))
+                self._set(port, leaf, reading._Arrival(start, whole=whole))
                 return
 
 

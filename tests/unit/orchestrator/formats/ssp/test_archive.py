@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import pytest
 
 from orchestrator.formats.ssp import SSC, SSD
-from orchestrator.formats.ssp.document import read_document
+from orchestrator.formats.ssp.archive import read_document
 
 
 def read(text: str) -> tuple[ElementTree.Element, list[str]]:

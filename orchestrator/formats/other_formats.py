@@ -1,19 +1,25 @@
-"""A system as libcosim's own configuration, written and read."""
+"""Formats of single tools: libcosim's configuration, and a container FMU, which is only written."""
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Iterator, Mapping
+from importlib.util import find_spec
 from math import isclose
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 from xml.etree import ElementTree
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, SubElement
 
 from orchestrator.formats.ssp.archive import Archive
-from orchestrator.machine.errors import Findings, InputError, reason
+from orchestrator.machine.children import run_module
+from orchestrator.machine.errors import Findings, InputError, last_line, reason
+from orchestrator.machine.locks import process_folder
 from orchestrator.machine.user_files import check_file, is_folder
 from orchestrator.system.component import Component, read_component
-from orchestrator.system.names import PortName
+from orchestrator.system.names import PortName, file_name
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import Linear, conversion, unit_of_port
 from orchestrator.system.values import Value, literal, type_of, typed
@@ -52,37 +58,32 @@ def write_osp(system: System, folder: Path) -> list[Path]:
                 f"{component.name}: libcosim takes no FMU of FMI {version}; write an SSP, or FMUs "
                 "with --fmi 2"
             )
-    root = ElementTree.Element("OspSystemStructure", xmlns=_OSP, version="0.1")
+    root = Element("OspSystemStructure", xmlns=_OSP, version="0.1")
     for tag, text in (
         ("StartTime", str(system.start_time or 0.0)),
         ("BaseStepSize", str(system.step)),
+        ("Algorithm", _ALGORITHM),
     ):
-        ElementTree.SubElement(root, tag).text = text
-    ElementTree.SubElement(root, "Algorithm").text = "fixedStep"
-    simulators = ElementTree.SubElement(root, "Simulators")
+        SubElement(root, tag).text = text
+    simulators = SubElement(root, "Simulators")
     fmus = system.fmus(STRUCTURE)
     for fmu, name in fmus.items():
         shutil.copyfile(fmu, folder / name)
-    for component in system.components.values():
-        simulator = ElementTree.SubElement(
-            simulators,
-            "Simulator",
-            name=component.name,
-            source=fmus[component.fmu],
-            stepSize=str(system.steps.get(component.name, system.step)),
-        )
-        parameters = system.parameters_of(component.name)
+    for name, component in system.components.items():
+        step = str(system.steps.get(name, system.step))
+        named = {"name": name, "source": fmus[component.fmu], "stepSize": step}
+        simulator = SubElement(simulators, "Simulator", named)
+        parameters = system.parameters_of(name)
         if parameters:
-            values = ElementTree.SubElement(simulator, "InitialValues")
-            for name, value in parameters.items():
-                element = ElementTree.SubElement(values, "InitialValue", variable=name)
-                fmi_type = component.variable(name).type
-                ElementTree.SubElement(element, fmi_type, value=literal(value))
-    connections = ElementTree.SubElement(root, "Connections")
+            values = SubElement(simulator, "InitialValues")
+            for port, value in parameters.items():
+                element = SubElement(values, "InitialValue", variable=port)
+                SubElement(element, component.variable(port).type, value=literal(value))
+    connections = SubElement(root, "Connections")
     for connection in system.connections:
-        element = ElementTree.SubElement(connections, "VariableConnection")
+        element = SubElement(connections, "VariableConnection")
         for end in (connection.source, connection.target):
-            ElementTree.SubElement(element, "Variable", simulator=end.component, name=end.port)
+            SubElement(element, "Variable", simulator=end.component, name=end.port)
     ElementTree.indent(root)
     path = folder / STRUCTURE
     path.write_bytes(ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True))
@@ -146,9 +147,8 @@ def _number(archive: Archive, root: Element, name: str) -> float | None:
     return None if text is None else archive.number(Element(name, {name: text}), name, None)
 
 
-def _simulators(root: Element) -> Iterator[tuple[str, Element]]:
-    for simulator in root.iterfind("Simulators/Simulator"):
-        yield simulator.get("name", ""), simulator
+def _simulators(root: Element) -> list[tuple[str, Element]]:
+    return [(element.get("name", ""), element) for element in root.iterfind("Simulators/Simulator")]
 
 
 def _components(archive: Archive, root: Element) -> dict[str, Component]:
@@ -259,12 +259,9 @@ def _parameters(
             except InputError as error:
                 archive.problem(error)
                 continue
-            why = ""
-            if port in fed:
-                why = f"is fed by {fed[port]}"
-            elif not components[name].is_settable(port.port):
+            if port in fed or not components[name].is_settable(port.port):
                 why = f"is of causality {variable.causality} and cannot be set"
-            if why:
+                why = f"is fed by {fed[port]}" if port in fed else why
                 archive.note(f"{port}: {why}; the value that is given to it has no effect")
                 continue
             if stated.tag != type_of(variable):
@@ -273,3 +270,63 @@ def _parameters(
                 )
             parameters[port] = value
     return parameters
+
+
+_TOOLBOX = "fmu_manipulation_toolbox"
+
+#: The file that says what is in a container.
+_CONTENT = "system.json"
+
+
+def write_container(system: System, folder: Path) -> list[Path]:
+    """Write `NAME.fmu`, one FMU that contains the whole system and shows all its outputs.
+
+    Raises:
+        InputError: the FMU manipulation toolbox is not installed, or fails, or the system has what
+            a container has not.
+
+    """
+    if any(connection.transformation for connection in system.connections) or system.steps:
+        raise InputError("a container has no transformations and one step; write an SSP")
+    if find_spec(_TOOLBOX) is None:
+        raise InputError(
+            "a container needs the FMU manipulation toolbox: pip install 'auv-fmu[hosts]'"
+        )
+    container = f"{file_name(system.name)}.fmu"
+    names = system.fmus(container, _CONTENT)
+    fmus = {component.name: names[component.fmu] for component in system.components.values()}
+    if len(names) < len(fmus):
+        raise InputError("a container takes each FMU once; this system has one twice")
+    content: dict[str, Any] = {
+        "name": container,
+        "step_size": system.step,
+        **dict.fromkeys(("auto_link", "auto_input", "auto_output", "auto_parameter"), False),
+        "fmu": list(fmus.values()),
+        "link": [
+            [fmus[c.source.component], c.source.port, fmus[c.target.component], c.target.port]
+            for c in system.connections
+        ],
+        "output": [
+            [fmus[component.name], variable.name, f"{component.name}.{variable.name}"]
+            for component in system.components.values()
+            for variable in component.having("output")
+        ],
+        "start": [
+            [fmus[name], port, value]
+            for name in system.components
+            for port, value in system.parameters_of(name).items()
+        ],
+    }
+    with TemporaryDirectory(dir=process_folder()) as work:
+        for fmu, name in names.items():
+            shutil.copyfile(fmu, Path(work, name))
+        Path(work, _CONTENT).write_text(json.dumps(content), encoding="utf-8")
+        versions = {component.description.fmiVersion for component in system.components.values()}
+        fmi = max(versions).partition(".")[0]
+        options = ["-container", _CONTENT, "-fmu-directory", work, "-fmi", fmi]
+        process = run_module(f"{_TOOLBOX}.cli.fmucontainer", *options, folder=Path(work))
+        built = Path(work, container)
+        if process.returncode != 0 or not built.is_file():
+            said = last_line(process.stderr + process.stdout)
+            raise InputError(f"the container was not built: {said}")
+        return [Path(shutil.copyfile(built, folder / container))]

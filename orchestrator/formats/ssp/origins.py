@@ -1,0 +1,357 @@
+"""Where values come from: the connection that ends at each node, and what parameter sets give."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+from xml.etree.ElementTree import Element
+
+from orchestrator.formats.ssp.archive import Archive, listed
+from orchestrator.formats.ssp.hierarchy import (
+    GIVES,
+    TAKES,
+    Bus,
+    Connector,
+    Definitions,
+    Group,
+    Items,
+    Leaf,
+    Node,
+    definitions_of,
+)
+from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.system.units import Linear, Mapped, Transformation, Unit, chained
+from orchestrator.system.values import BOOLEANS, finite
+
+_TABLES = (
+    "BooleanMappingTransformation", "IntegerMappingTransformation",
+    "EnumerationMappingTransformation",
+)  # fmt: skip
+
+#: Parts of arrays and the like, which FMI 2.0 does not have.
+_UNSUPPORTED = ("startIndices", "endIndices")
+
+#: The types of files that are known.
+_VALUES, _MAPPING = "application/x-ssp-parameter-set", "application/x-ssp-parameter-mapping"
+
+
+def _transformation(content: Element, source: Items, target: Items) -> Transformation | None:
+    """The transformation in a connection or an entry of a mapping; None: there is none.
+
+    Args:
+        content: element of the connection or entry.
+        source, target: values of the enumerations at its ends, if there are any.
+
+    Raises:
+        ValueError: it has a mistake.
+
+    """
+    linear = content.find("LinearTransformation")
+    if linear is not None:
+        factor, offset = linear.get("factor", "1"), linear.get("offset", "0")
+        return Linear(finite(factor, "factor"), finite(offset, "offset"))
+    for name in _TABLES:
+        table = content.find(name)
+        if table is not None:
+            entries = table.findall("MapEntry")
+            pairs = [
+                (_value(name, entry, "source", source), _value(name, entry, "target", target))
+                for entry in entries
+            ]
+            if len(dict(pairs)) < len(pairs):
+                raise ValueError("a mapping has two entries for one source")
+            return Mapped(tuple(pairs))
+    return None
+
+
+def _value(table: str, entry: Element, end: str, items: Items) -> float:
+    """One value of a table, as the number that FMI has for it."""
+    text = entry.get(end, "")
+    if table.startswith("Boolean"):
+        if text not in BOOLEANS:
+            raise ValueError(f"{end} {text!r} of a mapping is neither true nor false")
+        return float(BOOLEANS[text])
+    if table.startswith("Enumeration"):
+        if text not in items:
+            raise ValueError(f"{end} {text!r} of a mapping is not in its enumeration")
+        return float(items[text])
+    if (value := finite(text, end)) != int(value):
+        raise ValueError(f"{end} {text!r} of a mapping is no integer")
+    return value
+
+
+def _converts_units(content: Element) -> bool:
+    """Whether a connection or an entry of a mapping has units converted."""
+    return not BOOLEANS.get(content.get("suppressUnitConversion", "false"), False)
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One connection of a file, which ends in a node.
+
+    Attributes:
+        source: where its value comes from.
+        unit: of its target; None: it is the one that arrives.
+        stated: transformation of the value, after its unit has been converted.
+        converts: whether its unit is converted.
+
+    """
+
+    source: Node
+    unit: Unit | None
+    stated: Transformation | None
+    converts: bool
+
+    def carry(
+        self, archive: Archive, whole: Transformation | None, unit: Unit | None
+    ) -> tuple[Transformation | None, Unit | None]:
+        """What has happened to a value at the segment's end, and the unit that it has there.
+
+        Args:
+            archive: whose connection it is.
+            whole: what has happened to it before.
+            unit: in which it comes.
+
+        Raises:
+            InputError: units do not fit, or transformations cannot follow each other.
+
+        """
+        step = self.stated
+        if self.converts:
+            step = chained(archive.conversion(unit, self.unit), step)
+            # What a transformation makes of a value is in the target's unit, or unknown.
+            unit = self.unit or (unit if self.stated is None else None)
+        else:
+            # Said even where it changes nothing: the units at its ends may differ.
+            step, unit = step or Linear(), self.unit
+        return chained(whole, step), unit
+
+
+def segments_of(archive: Archive, top: Group) -> dict[Node, Segment]:
+    """The connections of a system and of those in it, by the nodes in which they end.
+
+    What is wrong with one becomes a problem of the archive.
+    """
+    found: dict[Node, Segment] = {}
+    for group in top.elements():
+        if isinstance(group, Group):
+            for connection in group.content.findall("Connections/Connection"):
+                try:
+                    _add(found, group, connection)
+                except InputError as error:
+                    archive.problem(error)
+    return found
+
+
+def _add(found: dict[Node, Segment], group: Group, connection: Element) -> None:
+    start, end = (_End.of(group, connection, which) for which in ("start", "end"))
+    named = f"{start.node} -> {end.node}"
+    if any(connection.get(name) for name in _UNSUPPORTED):
+        raise InputError(f"{named}: connections of elements of arrays are not supported")
+    if (start.takes and end.takes) or (start.gives and end.gives):
+        both = "take their value from elsewhere" if start.takes else "give one"
+        raise InputError(f"{named}: cannot be connected, as both {both}")
+    # The standard lets a connection be written from either end.
+    source, target = (end, start) if start.takes or end.gives else (start, end)
+    if (before := found.get(target.node)) is not None:
+        raise InputError(
+            f"{target.node} is fed by {before.source} and by {source.node}; an input takes one "
+            "connection"
+        )
+    try:
+        stated = _transformation(connection, source.connector.items, target.connector.items)
+    except ValueError as error:
+        raise InputError(f"{named}: {error}") from None
+    unit = target.connector.unit
+    found[target.node] = Segment(source.node, unit, stated, _converts_units(connection))
+
+
+@dataclass(frozen=True)
+class _End:
+    """An end of a connection, as the system sees it in which the connection is.
+
+    Attributes:
+        node: where it is.
+        connector: what is known of it.
+        gives, takes: which way its value goes; neither: both are possible.
+
+    """
+
+    node: Node
+    connector: Connector
+    gives: bool
+    takes: bool
+
+    @classmethod
+    def of(cls, group: Group, connection: Element, which: str) -> _End:
+        """The start or the end of a connection."""
+        # Some writers leave it empty where it is the system itself.
+        name, port = connection.get(f"{which}Element") or None, connection.get(f"{which}Connector")
+        if not port:
+            raise InputError(f"a <{connection.tag}> without {which}Connector")
+        element: Leaf | Bus | Group | None = group if name is None else group.members.get(name)
+        if element is None:
+            raise InputError(
+                f"a connection to {Node((*group.way, name or ''), port)}: "
+                f"there is no element {name!r}{did_you_mean(name or '', group.members)}"
+            )
+        connector = element.connector(port)
+        if connector is None:
+            if isinstance(element, Leaf) and element.component is not None:
+                element.component.variable(port)
+            raise InputError(
+                f"a connection to {Node(element.way, port)}, which is not there"
+                f"{did_you_mean(port, element.connectors)}"
+            )
+        outwards, inwards = connector.causality in GIVES, connector.causality in TAKES
+        # Seen from within, a system's inputs give and its outputs take.
+        gives, takes = (inwards, outwards) if element is group else (outwards, inwards)
+        return cls(Node(element.way, port), connector, gives, takes)
+
+
+@dataclass(frozen=True)
+class Given:
+    """A value of a parameter set, and what happens to it on its way to a node.
+
+    Attributes:
+        text: the value.
+        unit: of the value; None: the node's.
+        items: values of its enumeration; empty: the variable's count.
+        entry: of the mapping that it came through.
+
+    """
+
+    text: str
+    unit: Unit | None = None
+    items: Items = field(default_factory=dict)
+    entry: Element | None = None
+
+    def transformation(self, archive: Archive, target: Connector) -> Transformation | None:
+        """What makes of it the value of a node.
+
+        Raises:
+            ValueError: units do not fit, or the mapping has a mistake.
+
+        """
+        stated = None
+        if self.entry is not None:
+            stated = _transformation(self.entry, self.items, target.items)
+            if not _converts_units(self.entry):
+                return stated
+        return chained(archive.conversion(self.unit, target.unit), stated)
+
+
+#: What is given to nodes, and what is known of each of these.
+Values: TypeAlias = dict[Node, tuple[Given, Connector]]
+
+
+class Bindings:
+    """The values of all parameter sets of a description."""
+
+    def __init__(self, archive: Archive, definitions: Definitions) -> None:
+        """Take the archive, and what its description defines."""
+        self._archive, self._definitions = archive, definitions
+
+    def values(self, top: Group) -> Values:
+        """What is given to which node.
+
+        Of several values the one of the outer system counts, then the one of the later set.
+        """
+        given: Values = {}
+        for element in _inside_out(top):
+            for binding in element.content.findall("ParameterBindings/ParameterBinding"):
+                try:
+                    self._apply(binding, element, given)
+                except InputError as error:
+                    self._archive.problem(error)
+        return given
+
+    def _apply(self, binding: Element, element: Leaf | Bus | Group, given: Values) -> None:
+        where = ".".join(element.way) or "the system"
+        values = self._content(binding, element, where, "ParameterValues/ParameterSet", _VALUES)
+        if values is None:
+            return
+        prefix = binding.get("prefix", "")
+        parameters = {
+            prefix + name: value for name, value in self._parameters(values, where).items()
+        }
+        mapping = binding.find("ParameterMapping")
+        if mapping is not None:
+            entries = self._content(mapping, element, where, "ParameterMapping", _MAPPING)
+            parameters = {} if entries is None else self._mapped(parameters, entries, where)
+        unknown = []
+        for name, value in parameters.items():
+            reached = {node: (value, connector) for node, connector in element.named(name)}
+            given.update(reached)
+            if not reached:
+                unknown.append(name)
+        if unknown and not (isinstance(element, Leaf) and element.component is None):
+            self._archive.note(
+                f"{where} has nothing named {listed(unknown)}; values for it have no effect"
+            )
+
+    def _content(
+        self, element: Element, owner: Leaf | Bus | Group, where: str, inline: str, kind: str
+    ) -> Element | None:
+        """What an element holds, itself or in the file that it names."""
+        stated = element.get("type", kind)
+        if stated != kind:
+            self._archive.problem(f"{where}: parameters of type {stated!r} are not supported")
+            return None
+        source = element.get("source")
+        if source is None:
+            found = element.find(inline)
+            if found is None:
+                self._archive.note(f"{where}: a <{element.tag}> without content")
+            return found
+        base = None
+        if element.get("sourceBase", "SSD") != "SSD":
+            if not isinstance(owner, Leaf) or owner.component is None:
+                named = ".".join(owner.way)
+                raise InputError(f"a file of {named!r}, which is no component with an FMU")
+            base = owner.component.folder
+        file = self._archive.file(source, where, base)
+        return None if file is None else self._archive.read(file)
+
+    def _mapped(
+        self, parameters: dict[str, Given], mapping: Element, where: str
+    ) -> dict[str, Given]:
+        """Those parameters that a mapping names, under their new names."""
+        found = {}
+        for entry in mapping.findall("MappingEntry"):
+            source, target = (
+                self._archive.required(entry, end, where) for end in ("source", "target")
+            )
+            if source in parameters:
+                found[target] = replace(parameters[source], entry=entry)
+        return found
+
+    def _parameters(self, values: Element, where: str) -> dict[str, Given]:
+        """The values of a parameter set by their names."""
+        known = self._definitions.with_inner(definitions_of(self._archive, values))
+        found: dict[str, Given] = {}
+        for parameter in values.findall("Parameters/Parameter"):
+            name = self._archive.required(parameter, "name", where)
+            value = next(iter(parameter), None)
+            text = None if value is None else value.get("value")
+            if value is None or text is None:
+                self._archive.problem(f"{where}: {name}: a parameter without a value")
+                continue
+            if parameter.find("Dimension") is not None:
+                self._archive.problem(f"{where}: {name}: arrays are not supported")
+                continue
+            if name in found:
+                self._archive.note(f"{where}: {name} stands twice in a parameter set")
+            found[name] = Given(text, known.unit(value), known.items(value))
+        return found
+
+
+def _inside_out(group: Group) -> Iterator[Leaf | Bus | Group]:
+    """All elements of a system, each after those in it."""
+    for element in group.members.values():
+        if isinstance(element, Group):
+            yield from _inside_out(element)
+        else:
+            yield element
+    yield group
