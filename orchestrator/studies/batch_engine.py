@@ -18,16 +18,22 @@ from auv_fmu.output_feedback import Gains
 from fmus.auv_plant.behaviour import check
 from fmus.kinds import PYTHON
 from fmus.ports.port import Refusal
+from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.identity import digest_of
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.studies.batch import accumulator
-from orchestrator.studies.batch.kernel import COLUMNS, RunSteps, is_bounded, part_of
-from orchestrator.studies.batch.kernels import compiled, digest
-from orchestrator.studies.batch.support import setting_of, unsupported
+from orchestrator.studies.batch.kernel import (
+    COLUMNS,
+    END,
+    RunSteps,
+    is_bounded,
+    new_accumulators,
+    part_of,
+)
+from orchestrator.studies.batch.support import digest, setting_of, unsupported
 from orchestrator.studies.engine import Outcome, Point
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
@@ -85,8 +91,8 @@ class BatchEngine:
         """
         try:
             job = _job(self._systems[run.scenario], run)
-            ends = np.array([_end(job, stop_time) for stop_time in stop_times], accumulator.END)
-            accumulators = accumulator.new(len(ends))
+            ends = np.array([_end(job, stop_time) for stop_time in stop_times], END)
+            accumulators = new_accumulators(len(ends))
             made, failure = _made(job, ends, accumulators, _NO_ROWS)
         except InputError as error:
             return [Outcome(run.number, {}, str(error)) for _ in stop_times]
@@ -115,7 +121,7 @@ class BatchEngine:
         """
         job = _job(self._systems[run.scenario], run)
         rows = np.empty((job.experiment.rows, 1 + len(COLUMNS)))
-        made, failure = _made(job, np.empty(0, accumulator.END), accumulator.new(0), rows)
+        made, failure = _made(job, np.empty(0, END), new_accumulators(0), rows)
         kept = [
             0,
             *(i for i, name in enumerate(COLUMNS, 1) if job.has((name,))),
@@ -194,7 +200,7 @@ def _parameters(system: System) -> dict[PortName, object]:
 
 
 def _end(job: _Job, stop_time: float) -> tuple[int, float, float]:
-    """Where the accumulator of a stop time ends, as :data:`.accumulator.END` has it.
+    """Where the accumulator of a stop time ends, as :data:`.kernel.END` has it.
 
     Raises:
         InputError: the run has no row there.
@@ -287,6 +293,10 @@ def _run(
     progress: np.ndarray,
 ) -> Moment:
     """Call the kernel."""
+    # Not installed where no studies are made.
+    imported_apart("numba", ".numba_config.yaml")
+    from orchestrator.studies.batch.compilation import compiled  # noqa: PLC0415
+
     run = compiled(type(job.setting.controller))  # type: ignore[arg-type]
     uniform = _NOISE.uniform(job.setting.plant.noise.seed)
     return run(job.setting, plan, uniform, ends, accumulators, rows, progress)

@@ -272,7 +272,7 @@ def test_another_process_finds_the_kernel_compiled():
     """It loads in a fraction of a second what has taken several to compile."""
     text = (
         "from auv_fmu.output_feedback import Gains\n"
-        "from orchestrator.studies.batch.kernels import compiled\n"
+        "from orchestrator.studies.batch.compilation import compiled\n"
         "from orchestrator.studies.batch_engine import BatchEngine\n"
         "from orchestrator.studies.engine import Point\n"
         "import pickle, sys\n"
