@@ -33,8 +33,8 @@ from orchestrator.master.observers.observer import Observer
 from orchestrator.master.observers.selection import Selection
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
-from orchestrator.vehicle.certificates import CertificatesFile
 from orchestrator.vehicle.indices import Metrics
+from orchestrator.vehicle.proof import CertificatesFile
 
 #: Parts of a run that are compared, and simulated seconds between the rows that are kept.
 _PARTS, _INTERVAL = 10, 1.0

@@ -7,7 +7,8 @@ import os
 
 from orchestrator.commands.options import add_options, add_out, taken
 from orchestrator.commands.streams import INTERRUPTED, OK, say, show
-from orchestrator.studies.study import read_study, ready_studies
+from orchestrator.studies.study import ready_studies
+from orchestrator.studies.study_file import read_study
 from orchestrator.studies.sweep import Means, folder_of, swept
 
 

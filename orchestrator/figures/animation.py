@@ -16,11 +16,10 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from auv_fmu.attitude import rotation_from_euler
-from orchestrator.figures.body import PAINT, Z_UP, body
-from orchestrator.figures.layout import Cell
-from orchestrator.figures.panels import draw_commands, draw_lines, over_time, title
-from orchestrator.figures.signal import moving_mean
+from orchestrator.figures.panels import Cell, draw_commands, draw_lines, over_time, title
 from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, heading, styled
+from orchestrator.figures.view import PAINT, Z_UP, body
+from orchestrator.figures.visible import moving_mean
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.signals import (
     AXES,

@@ -17,8 +17,17 @@ from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.engine import Point
-from orchestrator.studies.study import STEP, Range, Sample, Study, members
-from orchestrator.studies.study_file import LATIN_HYPERCUBE, LOG, MOST_RUNS, SOBOL
+from orchestrator.studies.study import (
+    LATIN_HYPERCUBE,
+    LOG,
+    MOST_RUNS,
+    SOBOL,
+    STEP,
+    Range,
+    Sample,
+    Study,
+    members,
+)
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value, is_finite, type_of, typed
