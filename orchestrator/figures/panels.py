@@ -61,12 +61,11 @@ class Cell:
     def stack(self, n: int) -> list[Any]:
         """Some axes above each other, with one axis of time."""
         grid = self._place.subgridspec(n, 1)
-        top = self._figure.add_subplot(grid[0])
-        below = [self._figure.add_subplot(grid[i], sharex=top) for i in range(1, n)]
-        stack = [top, *below]
-        for axes in stack[:-1]:
-            axes.tick_params(labelbottom=False)
+        stack = [self._figure.add_subplot(grid[0])]
+        stack += [self._figure.add_subplot(grid[i], sharex=stack[0]) for i in range(1, n)]
         for axes in stack:
+            if axes is not stack[-1]:
+                axes.tick_params(labelbottom=False)
             axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         return stack
 
@@ -108,8 +107,8 @@ def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | Non
     if not runs:
         return None, ["step"]
     panels = [panel for row in rows for panel in row]
-    drawn = [[panel for panel in row if _shows(panel, runs)] for row in rows]
-    drawn = [row for row in drawn if row]
+    shown = [panel for panel in panels if any(not run.lacks(panel.needs) for run in runs)]
+    drawn = [kept for row in rows if (kept := [panel for panel in row if panel in shown])]
     if not drawn:
         return None, runs[0].lacks(panels[0].needs)
     heights = [max(panel.height for panel in row) for row in drawn]
@@ -124,10 +123,6 @@ def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | Non
             for j, panel in enumerate(row):
                 panel.draw(Cell(figure, grid[i, j * width : (j + 1) * width]), runs)
     return figure, [note for panel in panels for note in _left_out(panel, runs)]
-
-
-def _shows(panel: Panel, runs: Sequence[Drawn]) -> bool:
-    return any(not run.lacks(panel.needs) for run in runs)
 
 
 def _left_out(panel: Panel, runs: Sequence[Drawn]) -> list[str]:
@@ -238,6 +233,15 @@ def draw_lines(
         axes.plot(time, column, **line)
 
 
+def draw_all_errors(axes: Axes, runs: Sequence[Drawn]) -> None:
+    """The three tracking errors of some runs in one panel."""
+    for i, (run, _) in enumerate(having(runs, Loop.for_tracking)):
+        errors, twin = tracking_error(run.result, run.loop), run.label if i else None
+        draw_lines(axes, run.result.time, errors, [f"$e_{k}$" for k in AXES], twin)
+    axes.set_ylabel("error [m]")
+    title(axes, "tracking errors")
+
+
 def title(axes: Axes, text: str) -> None:
     """A title above the axes, and below it what the lines are: nothing lies upon the data."""
     n = len(axes.get_legend_handles_labels()[0])
@@ -291,13 +295,9 @@ def _make_room_below(axes: Axes) -> None:
         axes.set_ylim(bottom=bottom - _ROOM * (top - bottom))
 
 
-def draw_errors(
-    panels: Sequence[Axes],
-    runs: Sequence[Drawn],
-    name: str = "tracking errors",
-    logarithmic: bool = False,
-) -> None:
+def _errors(cell: Cell, runs: Sequence[Drawn], logarithmic: bool = False) -> None:
     """Tracking errors of some runs, an axis a panel."""
+    panels = cell.stack(3)
     for i, (run, colour) in enumerate(having(runs, Loop.for_tracking)):
         errors = tracking_error(run.result, run.loop)
         for axes, error in zip(panels, (np.abs(errors) if logarithmic else errors).T, strict=True):
@@ -309,7 +309,7 @@ def draw_errors(
             axes.yaxis.set_major_locator(LogLocator(numticks=5))
             if axes.get_ylim()[1] > _SMALLEST_ERROR:
                 axes.set_ylim(bottom=max(_SMALLEST_ERROR, axes.get_ylim()[0]))
-    title(panels[0], name)
+    title(panels[0], "tracking errors" + ", logarithmic" * logarithmic)
     over_time(panels, runs)
 
 
@@ -379,21 +379,11 @@ def _peak(values: np.ndarray) -> float:
     return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
-def _errors(cell: Cell, runs: Sequence[Drawn]) -> None:
-    draw_errors(cell.stack(3), runs)
-
-
-def _logarithmic_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
-    draw_errors(cell.stack(3), runs, "tracking errors, logarithmic", logarithmic=True)
-
-
-def _commands(cell: Cell, runs: Sequence[Drawn]) -> None:
-    draw_commands(cell.stack(3), runs)
-
-
 PATH = Panel("path", Loop.for_control_point, _path, 3.4)
 ERRORS = Panel("tracking errors", Loop.for_tracking, _errors, 4.0)
 LOGARITHMIC_ERRORS = Panel(
-    "logarithmic tracking errors", Loop.for_tracking, _logarithmic_errors, 4.0
+    "logarithmic tracking errors", Loop.for_tracking, partial(_errors, logarithmic=True), 4.0
 )
-COMMANDS = Panel("commands", Loop.for_commands, _commands, 4.0)
+COMMANDS = Panel(
+    "commands", Loop.for_commands, lambda cell, runs: draw_commands(cell.stack(3), runs), 4.0
+)

@@ -23,6 +23,7 @@ from orchestrator.figures.panels import (
     Panel,
     Rows,
     compose,
+    draw_all_errors,
     draw_lines,
     over_time,
     title,
@@ -45,20 +46,13 @@ from orchestrator.vehicle.signals import (
     Loop,
     Needs,
     suffixes,
-    tracking_error,
     true_control_point,
 )
 
 
 def _all_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
-    """The three tracking errors in one panel."""
     axes = cell.axes()
-    for i, (run, _) in enumerate(having(runs, Loop.for_tracking)):
-        twin = run.label if i else None
-        errors = tracking_error(run.result, run.loop)
-        draw_lines(axes, run.result.time, errors, [f"$e_{k}$" for k in AXES], twin)
-    axes.set_ylabel("error [m]")
-    title(axes, "tracking errors")
+    draw_all_errors(axes, runs)
     over_time([axes], runs)
 
 
@@ -110,44 +104,26 @@ def _velocity_error(estimate: str, truth: str, table: Table) -> tuple[np.ndarray
     return time, estimated - table.start_values(truth)[:, 0]
 
 
-def _velocity(name: str, directions: slice) -> Panel:
-    def needs(loop: Loop) -> Needs:
-        return loop.nu[directions], ()
-
-    def draw(cell: Cell, runs: Sequence[Drawn]) -> None:
-        axes = cell.axes(ylabel=f"velocity [{_unit(directions)}]")
-        run, _ = next(having(runs, needs))
-        columns = run.loop.nu[directions]
-        labels = [f"${column[-1]}$" for column in columns]
-        draw_lines(axes, run.result.time, run.result.group(*columns), labels)
-        title(axes, name)
-        over_time([axes], [run])
-
-    return Panel(name, needs, draw)
-
-
-def _acceleration(name: str, directions: slice) -> Panel:
-    """D nu/dt as the plant's Euler scheme has it: the difference over the step."""
+def _motion(name: str, directions: slice, is_rate: bool = False) -> Panel:
+    """Velocities, or D nu/dt as the plant's Euler scheme has it: the difference over the step."""
+    unit = printed_unit(list(NU.values())[directions][0])
 
     def needs(loop: Loop) -> Needs:
         return loop.nu[directions], ()
 
     def draw(cell: Cell, runs: Sequence[Drawn]) -> None:
-        axes = cell.axes(ylabel=f"acceleration [{_unit(directions)}²]")
+        axes = cell.axes(ylabel=f"acceleration [{unit}²]" if is_rate else f"velocity [{unit}]")
         run, _ = next(having(runs, needs))
         columns = run.loop.nu[directions]
-        time, nu = run.result.time, run.result.group(*columns)
-        rates = np.diff(nu, axis=0) / np.diff(time)[:, np.newaxis]
-        labels = [rf"$\dot{{{column[-1]}}}$" for column in columns]
-        draw_lines(axes, time[:-1], rates, labels)
+        time, values = run.result.time, run.result.group(*columns)
+        if is_rate:
+            time, values = time[:-1], np.diff(values, axis=0) / np.diff(time)[:, np.newaxis]
+        symbol = r"$\dot{{{}}}$" if is_rate else "${}$"
+        draw_lines(axes, time, values, [symbol.format(column[-1]) for column in columns])
         title(axes, name)
         over_time([axes], [run])
 
     return Panel(name, needs, draw)
-
-
-def _unit(directions: slice) -> str:
-    return printed_unit(list(NU.values())[directions][0])
 
 
 def _from_above(cell: Cell, runs: Sequence[Drawn]) -> None:
@@ -190,20 +166,17 @@ FIGURES: Mapping[str, Mapping[str, Rows]] = {
     "open-loop-surge": {
         "": (
             (PATH,),
-            (_velocity("surge velocity", _SURGE), _acceleration("surge acceleration", _SURGE)),
+            (_motion("surge velocity", _SURGE), _motion("surge acceleration", _SURGE, True)),
         )
     },
     # Fig. 3(b).
     "open-loop-turn": {
         "": (
             (PATH, FROM_ABOVE),
+            (_motion("linear velocities", _LINEAR), _motion("linear accelerations", _LINEAR, True)),
             (
-                _velocity("linear velocities", _LINEAR),
-                _acceleration("linear accelerations", _LINEAR),
-            ),
-            (
-                _velocity("angular velocities", _ANGULAR),
-                _acceleration("angular accelerations", _ANGULAR),
+                _motion("angular velocities", _ANGULAR),
+                _motion("angular accelerations", _ANGULAR, True),
             ),
         )
     },

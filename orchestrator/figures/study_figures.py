@@ -99,8 +99,10 @@ def paneled(title: str, rows: int, columns: int, height: float, **how: Any) -> t
     return figure, figure.subplots(rows, columns, squeeze=False, **how)
 
 
-def spread(axis: Any) -> None:
-    """Make an axis logarithmic, with a few powers of ten along it."""
+def spread(axis: Any, is_wide: bool) -> None:
+    """Make an axis logarithmic if its values are wide, with a few powers of ten along it."""
+    if not is_wide:
+        return
     [name] = axis.axis_name
     getattr(axis.axes, f"set_{name}scale")("log")
     axis.axes.autoscale_view()
@@ -133,10 +135,8 @@ def bands(plan: FigureEntry, title: str, runs: Values) -> Figure:
         if value in plan.limits:
             axes.axhline(plan.limits[value], color="black", linewidth=0.8)
         axes.margins(x=0)
-        if bins.is_logarithmic:
-            spread(axes.xaxis)
-        if is_logarithmic(runs[value]):
-            spread(axes.yaxis)
+        spread(axes.xaxis, bins.is_logarithmic)
+        spread(axes.yaxis, is_logarithmic(runs[value]))
         axes.set_xlabel(runs.label(x))
         if x == plan.x[0]:
             axes.set_title(runs.label(value))
@@ -205,10 +205,8 @@ def maps(plan: FigureEntry, title: str, runs: Values) -> Figure:
     for axes in panels[-1]:
         axes.set_xlabel(runs.label(x))
     # All panels share their axes.
-    if across.is_logarithmic:
-        spread(axes.xaxis)
-    if down.is_logarithmic:
-        spread(axes.yaxis)
+    spread(axes.xaxis, across.is_logarithmic)
+    spread(axes.yaxis, down.is_logarithmic)
     return figure
 
 
@@ -246,10 +244,8 @@ def front(plan: FigureEntry, title: str, runs: Values) -> Figure:
         axes.plot(*points.T, ".", color=colour, markersize=2, alpha=0.25, rasterized=True)
         line = {"color": colour, "linestyle": style, "label": name, "drawstyle": "steps-post"}
         axes.plot(*best(points).T, **line)
-    if is_logarithmic(runs[x]):
-        spread(axes.xaxis)
-    if is_logarithmic(runs[plan.y]):
-        spread(axes.yaxis)
+    spread(axes.xaxis, is_logarithmic(runs[x]))
+    spread(axes.yaxis, is_logarithmic(runs[plan.y]))
     axes.set(xlabel=runs.label(x), ylabel=runs.label(plan.y))
     legend(figure, axes)
     return figure

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
@@ -57,21 +57,18 @@ _MOST_VALUES = 1_000_000
 _LARGEST_SEED = 2**63 - 1
 
 
-def _of_numbers(table: Mapping[str, Any]) -> Mapping[str, Any]:
-    if not all(is_finite(value) for _, value in flattened(table)):
-        raise ValueError
-    return table
+def _each(fits: Callable[[Any], bool]) -> AfterValidator:
+    def check(table: Mapping[str, Any]) -> Mapping[str, Any]:
+        if not all(fits(value) for _, value in flattened(table)):
+            raise ValueError
+        return table
 
-
-def _of_texts(table: Mapping[str, Any]) -> Mapping[str, Any]:
-    if not all(isinstance(value, str) for _, value in flattened(table)):
-        raise ValueError
-    return table
+    return AfterValidator(check)
 
 
 #: Tables whose keys may be dotted.
-_Numbers = Annotated[dict[str, Any], AfterValidator(_of_numbers), "table of numbers"]
-_Texts = Annotated[dict[str, Any], AfterValidator(_of_texts), "table of texts"]
+_Numbers = Annotated[dict[str, Any], _each(is_finite), "table of numbers"]
+_Texts = Annotated[dict[str, Any], _each(lambda text: isinstance(text, str)), "table of texts"]
 
 
 class RangeTable(TomlTable):
@@ -240,8 +237,9 @@ def study_of(name: str, content: Mapping[str, Any], path: Path | None = None) ->
     if "sample" in content:
         with findings.collecting():
             entries["sample"] = _sample(f"{where}: sample", content["sample"])
-    if "stop_time" in content:
-        entries["stop_time"] = _stop_time(content["stop_time"])
+    if (end := content.get("stop_time")) is not None:
+        per = dict(flattened(end["per"])) if isinstance(end, Mapping) else {}
+        entries["stop_time"] = StopTime(end["base"] if isinstance(end, Mapping) else end, per)
     findings.refuse()
     study = Study(name, **entries)
     _check_names(where, study)
@@ -295,12 +293,6 @@ def _sample(where: str, content: Mapping[str, Any]) -> Sample:
 
 def _is_norm(key: str, limits: Range) -> bool:
     return len(members(key)) in (2, 3) and key.endswith("|") and min(limits[:2]) >= 0.0
-
-
-def _stop_time(value: Any) -> StopTime:
-    if isinstance(value, Mapping):
-        return StopTime(value["base"], dict(flattened(value["per"])))
-    return StopTime(value, {})
 
 
 def _check_names(where: str, study: Study) -> None:
