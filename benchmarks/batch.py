@@ -33,7 +33,8 @@ from orchestrator.runs.loading import load, loaded
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import read_study, ready_studies
+from orchestrator.studies.study import ready_studies
+from orchestrator.studies.study_file import read_study
 from orchestrator.vehicle.signals import STANDARD
 
 #: Runs that are timed: noise is drawn in the first.

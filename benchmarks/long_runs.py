@@ -32,8 +32,8 @@ from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.observer import Observer, Selection
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
-from orchestrator.vehicle.certificates import CertificatesFile
 from orchestrator.vehicle.indices import Metrics
+from orchestrator.vehicle.proof import CertificatesFile
 
 #: Parts of a run that are compared, and simulated seconds between the rows that are kept.
 _PARTS, _INTERVAL = 10, 1.0

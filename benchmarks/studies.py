@@ -28,11 +28,10 @@ from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
 from orchestrator.studies import blocks as blocks_module
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import Engine, Outcome, Point
-from orchestrator.studies.fmu_engine import FmuEngine
+from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import store
-from orchestrator.studies.study import study_of
+from orchestrator.studies.study_file import study_of
 from orchestrator.studies.sweep import making
 from orchestrator.vehicle.indices import index_columns
 

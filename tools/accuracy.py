@@ -21,7 +21,7 @@ from orchestrator import load, simulate
 from orchestrator.master.observers.table import Table
 from orchestrator.paper.measures import total_variation_until
 from orchestrator.paper.page import table
-from orchestrator.studies.batch.numbers import flat
+from orchestrator.studies.batch.kernel import flat
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.vehicle.signals import STANDARD, true_control_point

@@ -20,7 +20,8 @@ from auv_fmu.euler import STEP
 from orchestrator.runs.loading import load
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
-from orchestrator.studies.study import Study, read_study
+from orchestrator.studies.study import Study
+from orchestrator.studies.study_file import read_study
 from orchestrator.vehicle.signals import ACTUATORS
 
 #: What no command may pass [N, N·m].

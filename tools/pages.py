@@ -36,11 +36,10 @@ from orchestrator.paper.page import table
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.scenario_file import EventTable, InputsTable, PathTable, ScenarioFile
 from orchestrator.runs.wiring import read_wiring
-from orchestrator.studies.figure_entries import LABELS
-from orchestrator.studies.study import Study, read_study, ready_studies
-from orchestrator.studies.study_file import FigureTable, StudyFile
-from orchestrator.vehicle.gains import stated
+from orchestrator.studies.study import Study, ready_studies
+from orchestrator.studies.study_file import LABELS, FigureTable, StudyFile, read_study
 from orchestrator.vehicle.indices import INDICES, Index
+from orchestrator.vehicle.proof import stated
 
 DOCS = Path(__file__).parents[1] / "docs"
 

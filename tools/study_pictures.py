@@ -15,10 +15,9 @@ from PIL import Image
 from orchestrator.figures.study_figures import draw_figures
 from orchestrator.figures.style import SETTINGS
 from orchestrator.runs.loading import loaded
-from orchestrator.studies.figure_entries import read_figures
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import StudyResult
-from orchestrator.studies.study import read_study
+from orchestrator.studies.study_file import read_figures, read_study
 from pages import DOCS, PICTURES
 
 #: Pictures are 1,000 pixels wide.

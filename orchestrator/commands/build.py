@@ -17,7 +17,7 @@ from orchestrator.runs.own_controller import BASES, build_own, new_controller
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.vehicle import gains
+from orchestrator.vehicle.proof import gain_check
 
 
 def add_build(parser: argparse.ArgumentParser) -> None:
@@ -97,7 +97,7 @@ def _list(_: argparse.Namespace) -> int:
 
 def _gains(options: argparse.Namespace) -> int:
     system = closed_loop(bundle.current_fmus()).with_parameters(assignments(options))
-    show(*gains.check(system).splitlines())
+    show(*gain_check(system).splitlines())
     return OK
 
 

@@ -12,7 +12,8 @@ from orchestrator.paper.printed_table import write_table
 from orchestrator.paper.report import write_report
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import names
-from orchestrator.studies.study import read_study, ready_studies
+from orchestrator.studies.study import ready_studies
+from orchestrator.studies.study_file import read_study
 from orchestrator.studies.sweep import Means, folder_of, swept
 
 

@@ -16,17 +16,14 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from auv_fmu.attitude import rotation_from_euler
-from orchestrator.figures.body import PAINT, Z_UP, body
-from orchestrator.figures.layout import Cell
-from orchestrator.figures.panels import draw_commands, draw_lines, over_time, title
-from orchestrator.figures.signal import moving_mean
+from orchestrator.figures.panels import Cell, draw_all_errors, draw_commands, over_time
 from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, heading, styled
+from orchestrator.figures.view import PAINT, Z_UP, body
+from orchestrator.figures.visible import moving_mean
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.signals import (
-    AXES,
     Loop,
     parameter,
-    tracking_error,
     true_control_point,
 )
 
@@ -89,23 +86,15 @@ def animate(text: str, run: Drawn, path: Path, fps: int = FRAMES_PER_SECOND) -> 
     """
     check_film(path, fps)
     frames = _frames(text, run, int(_DURATION * fps))
-    if path.suffix == ".mp4":
-        _write_mp4(frames, path, fps)
-    else:
-        _write_gif(frames, path, fps)
+    (_write_mp4 if path.suffix == ".mp4" else _write_gif)(frames, path, fps)
 
 
 def _write_gif(frames: Iterator[Image.Image], path: Path, fps: int) -> None:
-    first = next(frames)
-    palette = first.quantize(128, method=Image.Quantize.MAXCOVERAGE)
-
-    def rest() -> Iterator[Image.Image]:
-        # One palette for all: colours do not flicker, and it is found once.
-        for frame in frames:
-            yield frame.quantize(palette=palette, dither=Image.Dither.NONE)
-
+    palette = next(frames).quantize(128, method=Image.Quantize.MAXCOVERAGE)
+    # One palette for all: colours do not flicker, and it is found once.
+    rest = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     palette.save(
-        path, save_all=True, append_images=rest(), duration=1000 // fps, loop=0, optimize=False
+        path, save_all=True, append_images=rest, duration=1000 // fps, loop=0, optimize=False
     )
 
 
@@ -159,11 +148,7 @@ def _draw_series(cell: Cell, run: Drawn) -> list[Any]:
     has_errors, has_commands = not run.lacks(Loop.for_tracking), not run.lacks(Loop.for_commands)
     panels = cell.stack(has_errors + 3 * has_commands)
     if has_errors:
-        labels = [f"$e_{k}$" for k in AXES]
-        errors = tracking_error(run.result, run.loop)
-        draw_lines(panels[0], run.result.time, errors, labels)
-        panels[0].set_ylabel("error [m]")
-        title(panels[0], "tracking errors")
+        draw_all_errors(panels[0], [run])
     if has_commands:
         draw_commands(panels[has_errors:], [run])
     over_time(panels, [run])

@@ -1,38 +1,141 @@
-"""Panels that several figures have: the path, tracking errors, commands with their limits."""
+"""Panels in rows, and those of several figures: path, tracking errors, commands with their limits.
+
+What no run has the signals for is left out, with a note.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from math import lcm
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
 from matplotlib.ticker import LogLocator, MaxNLocator
 from matplotlib.transforms import Transform
 
 from fmus.ports.quantities import TAU
-from orchestrator.figures.layout import Cell, Panel
-from orchestrator.figures.signal import draw_signal, mean_window
 from orchestrator.figures.style import (
     COLOURS,
     REFERENCE,
     STYLES,
+    WIDTH,
     Drawn,
     earth_axes,
     having,
+    heading,
     plain,
     printed_unit,
+    styled,
 )
+from orchestrator.figures.visible import draw_signal, mean_window
 from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import (
     ACTUATORS,
     AXES,
     Loop,
+    Needs,
     limits,
     tracking_error,
     true_control_point,
 )
+
+#: Room for a heading [in].
+_HEADING = 0.3
+
+
+class Cell:
+    """The part of a figure that a panel may fill with axes."""
+
+    def __init__(self, figure: Figure, place: SubplotSpec) -> None:
+        """Take a place in a figure."""
+        self._figure, self._place = figure, place
+
+    def axes(self, **how: Any) -> Any:
+        """Axes that fill the cell."""
+        return self._figure.add_subplot(self._place, **how)
+
+    def stack(self, n: int) -> list[Any]:
+        """Some axes above each other, with one axis of time."""
+        grid = self._place.subgridspec(n, 1)
+        stack = [self._figure.add_subplot(grid[0])]
+        stack += [self._figure.add_subplot(grid[i], sharex=stack[0]) for i in range(1, n)]
+        for axes in stack:
+            if axes is not stack[-1]:
+                axes.tick_params(labelbottom=False)
+            axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+        return stack
+
+
+class Panel(NamedTuple):
+    """A part of a figure.
+
+    Attributes:
+        name: what the note calls it.
+        needs: columns and parameters that a run must have, by the loop that is drawn.
+        draw: fills a cell with the runs that have them.
+        height: of the cell [in].
+
+    """
+
+    name: str
+    needs: Callable[[Loop], Needs]
+    draw: Callable[[Cell, Sequence[Drawn]], None]
+    height: float = 2.6
+
+
+#: The rows of a figure.
+Rows = Sequence[Sequence[Panel]]
+
+
+def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | None, list[str]]:
+    """A figure of all that can be drawn.
+
+    Args:
+        title: heading; empty for none.
+        rows: of the figure.
+        runs: the first is the one the figure is about.
+
+    Returns:
+        The figure, and what was left out of it, and why; or None, and what is missing.
+
+    """
+    runs = [run for run in runs if len(run.result) > 1]
+    if not runs:
+        return None, ["step"]
+    panels = [panel for row in rows for panel in row]
+    shown = [panel for panel in panels if any(not run.lacks(panel.needs) for run in runs)]
+    drawn = [kept for row in rows if (kept := [panel for panel in row if panel in shown])]
+    if not drawn:
+        return None, runs[0].lacks(panels[0].needs)
+    heights = [max(panel.height for panel in row) for row in drawn]
+    with styled():
+        figure = Figure(figsize=(WIDTH, sum(heights) + _HEADING * bool(title)))
+        if title:
+            figure.suptitle(heading(title), wrap=True)
+        columns = lcm(*map(len, drawn))
+        grid = figure.add_gridspec(len(drawn), columns, height_ratios=heights)
+        for i, row in enumerate(drawn):
+            width = columns // len(row)
+            for j, panel in enumerate(row):
+                panel.draw(Cell(figure, grid[i, j * width : (j + 1) * width]), runs)
+    return figure, [note for panel in panels for note in _left_out(panel, runs)]
+
+
+def _left_out(panel: Panel, runs: Sequence[Drawn]) -> list[str]:
+    """What a panel does not show, and why."""
+    missing = {run.label: run.lacks(panel.needs) for run in runs}
+    if all(missing.values()):
+        return [f"{panel.name} left out: no {missing[runs[0].label][0]}"]
+    return [
+        f"{panel.name} of {label} left out: no {names[0]}"
+        for label, names in missing.items()
+        if names
+    ]
+
 
 #: An axis of a path is at least this share of the longest: a straight line lies in a box.
 _FLATTEST = 0.3
@@ -130,6 +233,15 @@ def draw_lines(
         axes.plot(time, column, **line)
 
 
+def draw_all_errors(axes: Axes, runs: Sequence[Drawn]) -> None:
+    """The three tracking errors of some runs in one panel."""
+    for i, (run, _) in enumerate(having(runs, Loop.for_tracking)):
+        errors, twin = tracking_error(run.result, run.loop), run.label if i else None
+        draw_lines(axes, run.result.time, errors, [f"$e_{k}$" for k in AXES], twin)
+    axes.set_ylabel("error [m]")
+    title(axes, "tracking errors")
+
+
 def title(axes: Axes, text: str) -> None:
     """A title above the axes, and below it what the lines are: nothing lies upon the data."""
     n = len(axes.get_legend_handles_labels()[0])
@@ -183,13 +295,9 @@ def _make_room_below(axes: Axes) -> None:
         axes.set_ylim(bottom=bottom - _ROOM * (top - bottom))
 
 
-def draw_errors(
-    panels: Sequence[Axes],
-    runs: Sequence[Drawn],
-    name: str = "tracking errors",
-    logarithmic: bool = False,
-) -> None:
+def _errors(cell: Cell, runs: Sequence[Drawn], logarithmic: bool = False) -> None:
     """Tracking errors of some runs, an axis a panel."""
+    panels = cell.stack(3)
     for i, (run, colour) in enumerate(having(runs, Loop.for_tracking)):
         errors = tracking_error(run.result, run.loop)
         for axes, error in zip(panels, (np.abs(errors) if logarithmic else errors).T, strict=True):
@@ -201,7 +309,7 @@ def draw_errors(
             axes.yaxis.set_major_locator(LogLocator(numticks=5))
             if axes.get_ylim()[1] > _SMALLEST_ERROR:
                 axes.set_ylim(bottom=max(_SMALLEST_ERROR, axes.get_ylim()[0]))
-    title(panels[0], name)
+    title(panels[0], "tracking errors" + ", logarithmic" * logarithmic)
     over_time(panels, runs)
 
 
@@ -271,21 +379,11 @@ def _peak(values: np.ndarray) -> float:
     return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
-def _errors(cell: Cell, runs: Sequence[Drawn]) -> None:
-    draw_errors(cell.stack(3), runs)
-
-
-def _logarithmic_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
-    draw_errors(cell.stack(3), runs, "tracking errors, logarithmic", logarithmic=True)
-
-
-def _commands(cell: Cell, runs: Sequence[Drawn]) -> None:
-    draw_commands(cell.stack(3), runs)
-
-
 PATH = Panel("path", Loop.for_control_point, _path, 3.4)
 ERRORS = Panel("tracking errors", Loop.for_tracking, _errors, 4.0)
 LOGARITHMIC_ERRORS = Panel(
-    "logarithmic tracking errors", Loop.for_tracking, _logarithmic_errors, 4.0
+    "logarithmic tracking errors", Loop.for_tracking, partial(_errors, logarithmic=True), 4.0
 )
-COMMANDS = Panel("commands", Loop.for_commands, _commands, 4.0)
+COMMANDS = Panel(
+    "commands", Loop.for_commands, lambda cell, runs: draw_commands(cell.stack(3), runs), 4.0
+)

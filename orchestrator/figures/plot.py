@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from orchestrator.figures.panels import over_time
-from orchestrator.figures.signal import draw_signal
 from orchestrator.figures.style import COLOURS, STYLES, WIDTH, Drawn, plain, printed_unit, styled
+from orchestrator.figures.visible import draw_signal
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.observer import matches, matching
 from orchestrator.master.observers.table import Table

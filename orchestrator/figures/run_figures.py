@@ -1,43 +1,58 @@
-"""Figures of a run by the names that scenarios have for them: rows of panels.
+"""Figures of a run by the names that scenarios have for them, drawn into files.
 
 A new one is an entry of :data:`FIGURES`, of the panels here and in :mod:`.panels`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from tqdm import tqdm
 
 from fmus.ports.quantities import NU, THETA
-from orchestrator.figures.layout import Cell, Panel, Rows, compose
 from orchestrator.figures.panels import (
     COMMANDS,
     ERRORS,
     LOGARITHMIC_ERRORS,
     PATH,
+    Cell,
+    Panel,
+    Rows,
+    compose,
+    draw_all_errors,
     draw_lines,
     over_time,
     title,
 )
-from orchestrator.figures.signal import draw_signal
-from orchestrator.figures.style import COLOURS, Drawn, earth_axes, having, printed_unit
-from orchestrator.machine.errors import InputError
+from orchestrator.figures.style import (
+    COLOURS,
+    FORMATS,
+    Drawn,
+    earth_axes,
+    having,
+    printed_unit,
+    save,
+)
+from orchestrator.figures.visible import draw_signal
+from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.master.observers.table import Table
-from orchestrator.vehicle.signals import AXES, Loop, Needs, tracking_error, true_control_point
+from orchestrator.vehicle.signals import (
+    AXES,
+    STANDARD,
+    Loop,
+    Needs,
+    suffixes,
+    true_control_point,
+)
 
 
 def _all_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
-    """The three tracking errors in one panel."""
     axes = cell.axes()
-    for i, (run, _) in enumerate(having(runs, Loop.for_tracking)):
-        twin = run.label if i else None
-        errors = tracking_error(run.result, run.loop)
-        draw_lines(axes, run.result.time, errors, [f"$e_{k}$" for k in AXES], twin)
-    axes.set_ylabel("error [m]")
-    title(axes, "tracking errors")
+    draw_all_errors(axes, runs)
     over_time([axes], runs)
 
 
@@ -89,44 +104,26 @@ def _velocity_error(estimate: str, truth: str, table: Table) -> tuple[np.ndarray
     return time, estimated - table.start_values(truth)[:, 0]
 
 
-def _velocity(name: str, directions: slice) -> Panel:
-    def needs(loop: Loop) -> Needs:
-        return loop.nu[directions], ()
-
-    def draw(cell: Cell, runs: Sequence[Drawn]) -> None:
-        axes = cell.axes(ylabel=f"velocity [{_unit(directions)}]")
-        run, _ = next(having(runs, needs))
-        columns = run.loop.nu[directions]
-        labels = [f"${column[-1]}$" for column in columns]
-        draw_lines(axes, run.result.time, run.result.group(*columns), labels)
-        title(axes, name)
-        over_time([axes], [run])
-
-    return Panel(name, needs, draw)
-
-
-def _acceleration(name: str, directions: slice) -> Panel:
-    """D nu/dt as the plant's Euler scheme has it: the difference over the step."""
+def _motion(name: str, directions: slice, is_rate: bool = False) -> Panel:
+    """Velocities, or D nu/dt as the plant's Euler scheme has it: the difference over the step."""
+    unit = printed_unit(list(NU.values())[directions][0])
 
     def needs(loop: Loop) -> Needs:
         return loop.nu[directions], ()
 
     def draw(cell: Cell, runs: Sequence[Drawn]) -> None:
-        axes = cell.axes(ylabel=f"acceleration [{_unit(directions)}²]")
+        axes = cell.axes(ylabel=f"acceleration [{unit}²]" if is_rate else f"velocity [{unit}]")
         run, _ = next(having(runs, needs))
         columns = run.loop.nu[directions]
-        time, nu = run.result.time, run.result.group(*columns)
-        rates = np.diff(nu, axis=0) / np.diff(time)[:, np.newaxis]
-        labels = [rf"$\dot{{{column[-1]}}}$" for column in columns]
-        draw_lines(axes, time[:-1], rates, labels)
+        time, values = run.result.time, run.result.group(*columns)
+        if is_rate:
+            time, values = time[:-1], np.diff(values, axis=0) / np.diff(time)[:, np.newaxis]
+        symbol = r"$\dot{{{}}}$" if is_rate else "${}$"
+        draw_lines(axes, time, values, [symbol.format(column[-1]) for column in columns])
         title(axes, name)
         over_time([axes], [run])
 
     return Panel(name, needs, draw)
-
-
-def _unit(directions: slice) -> str:
-    return printed_unit(list(NU.values())[directions][0])
 
 
 def _from_above(cell: Cell, runs: Sequence[Drawn]) -> None:
@@ -169,20 +166,17 @@ FIGURES: Mapping[str, Mapping[str, Rows]] = {
     "open-loop-surge": {
         "": (
             (PATH,),
-            (_velocity("surge velocity", _SURGE), _acceleration("surge acceleration", _SURGE)),
+            (_motion("surge velocity", _SURGE), _motion("surge acceleration", _SURGE, True)),
         )
     },
     # Fig. 3(b).
     "open-loop-turn": {
         "": (
             (PATH, FROM_ABOVE),
+            (_motion("linear velocities", _LINEAR), _motion("linear accelerations", _LINEAR, True)),
             (
-                _velocity("linear velocities", _LINEAR),
-                _acceleration("linear accelerations", _LINEAR),
-            ),
-            (
-                _velocity("angular velocities", _ANGULAR),
-                _acceleration("angular accelerations", _ANGULAR),
+                _motion("angular velocities", _ANGULAR),
+                _motion("angular accelerations", _ANGULAR, True),
             ),
         )
     },
@@ -204,3 +198,102 @@ def overlay(heading: str, runs: Sequence[Drawn]) -> Figure:
     if figure is None:
         raise InputError(f"no figure: the runs have no {missing[0]}")
     return figure
+
+
+#: Seconds before a bar appears on a terminal.
+_PATIENCE = 2.0
+
+
+def check_figure(kind: str) -> None:
+    """Check before a run that its figure is known.
+
+    Raises:
+        InputError: it is not.
+
+    """
+    if kind not in FIGURES:
+        hint = did_you_mean(kind, FIGURES) or f"; there are {', '.join(FIGURES)}"
+        raise InputError(f"no figure {kind!r}{hint}")
+
+
+def figure_files(kind: str, stem: str, loops: Sequence[Loop] = (STANDARD,)) -> list[str]:
+    """The files that :func:`draw` may write.
+
+    Args:
+        kind: key of :data:`FIGURES`.
+        stem: of their names.
+        loops: of the vehicles.
+
+    """
+    return [
+        f"{stem}{vehicle}{suffix}.{ending}"
+        for vehicle in suffixes(loops).values()
+        for suffix in FIGURES[kind]
+        for ending in FORMATS
+    ]
+
+
+def draw(
+    kind: str,
+    title: str,
+    runs: Sequence[Drawn],
+    folder: Path,
+    stem: str,
+    stop: Callable[[], bool] = lambda: False,
+) -> list[str]:
+    """Draw the figures of a scenario, as PNG and SVG, as far as the runs have what they show.
+
+    Of several vehicles each has its own, together with the vehicle of that name in the other runs.
+
+    Args:
+        kind: key of :data:`FIGURES`.
+        title: heading; empty where there is one beside the figure.
+        runs: the run of the scenario, and those it is compared with.
+        folder: to write into.
+        stem: of the file names.
+        stop: asked before each figure whether to leave it out.
+
+    Returns:
+        What was left out, and why.
+
+    """
+    notes: list[str] = []
+    for i, (loop, vehicle) in enumerate(suffixes(runs[0].loops).items()):
+        of_vehicle = [run._replace(loops=[_same(run, loop, i)]) for run in runs]
+        name = ", ".join(filter(None, (title, loop.vehicle if vehicle and title else "")))
+        notes += _drawn(kind, name, of_vehicle, folder, f"{stem}{vehicle}", stop)
+    return notes
+
+
+def _same(run: Drawn, loop: Loop, i: int) -> Loop:
+    """The loop of a run that is drawn beside another's: the one of the same vehicle."""
+    named = [own for own in run.loops if own.vehicle == loop.vehicle]
+    return next(iter([*named, *run.loops[i : i + 1], *run.loops]))
+
+
+def _drawn(
+    kind: str,
+    title: str,
+    runs: Sequence[Drawn],
+    folder: Path,
+    stem: str,
+    stop: Callable[[], bool],
+) -> list[str]:
+    """Draw the figures of one vehicle, and say what was left out."""
+    notes: list[str] = []
+    bar = tqdm(FIGURES[kind].items(), desc="drawing", delay=_PATIENCE, disable=None, leave=False)
+    for suffix, rows in bar:
+        if stop():
+            break
+        figure, left_out = compose(title, rows, runs)
+        if figure is not None:
+            try:
+                save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in FORMATS))
+                notes += left_out
+            except InputError as error:
+                notes.append(f"{stem}{suffix} left out: {error}")
+        elif not suffix:
+            return [f"no figure: the run has no {left_out[0]}"]
+        else:
+            notes.append(f"{stem}{suffix} left out: no {left_out[0]}")
+    return notes

@@ -15,18 +15,18 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
 
-from orchestrator.figures.study_axes import (
+from orchestrator.figures.study_values import (
+    VERDICTS,
     Bins,
+    Columns,
+    Values,
     bins_of,
     grouped,
     is_logarithmic,
-    legend,
-    paneled,
-    spread,
 )
-from orchestrator.figures.study_values import VERDICTS, Columns, Values
-from orchestrator.figures.style import COLOURS, FORMATS, STYLES, save, styled
+from orchestrator.figures.style import COLOURS, FORMATS, STYLES, WIDTH, heading, save, styled
 from orchestrator.system.names import file_name
 
 #: Heights of a row of panels, of a panel by itself, and of a row of a matrix and what surrounds
@@ -52,6 +52,13 @@ _DARK, _NOTHING = 0.6, 0.05
 _MOST_PARTS = 12
 
 
+#: Room for a heading, and for a legend or the names of axes [in].
+_HEADING, _NAMES = 0.3, 0.45
+
+#: Numbers along a logarithmic axis; with less powers of ten than that, 3 has one as well.
+_TICKS, _FEW = 6, 2.5
+
+
 @dataclass(frozen=True)
 class FigureEntry:
     """A figure that is to be drawn, as a study file has it.
@@ -72,6 +79,48 @@ class FigureEntry:
     labels: Mapping[str, str] = field(default_factory=dict)
 
 
+def paneled(title: str, rows: int, columns: int, height: float, **how: Any) -> tuple[Figure, Any]:
+    """A figure with panels.
+
+    Args:
+        title: heading; empty for none.
+        rows: of panels.
+        columns: of panels.
+        height: of a row [in].
+        how: for matplotlib's subplots.
+
+    Returns:
+        The figure, and its axes in rows and columns.
+
+    """
+    figure = Figure(figsize=(WIDTH, rows * height + _NAMES + _HEADING * bool(title)))
+    if title:
+        figure.suptitle(heading(title), wrap=True)
+    return figure, figure.subplots(rows, columns, squeeze=False, **how)
+
+
+def spread(axis: Any, is_wide: bool) -> None:
+    """Make an axis logarithmic if its values are wide, with a few powers of ten along it."""
+    if not is_wide:
+        return
+    [name] = axis.axis_name
+    getattr(axis.axes, f"set_{name}scale")("log")
+    axis.axes.autoscale_view()
+    low, high = axis.get_view_interval()
+    is_short = high < low * 10.0**_FEW
+    axis.set_major_locator(LogLocator(subs=(1.0, 3.0) if is_short else (1.0,), numticks=_TICKS))
+    axis.set_minor_locator(NullLocator())
+    if is_short:
+        axis.set_major_formatter("{x:g}")
+
+
+def legend(figure: Figure, axes: Axes) -> None:
+    """Say below all panels what the lines of one mean, if it has several."""
+    handles, labels = axes.get_legend_handles_labels()
+    if len(handles) > 1:
+        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+
+
 def bands(plan: FigureEntry, title: str, runs: Values) -> Figure:
     """A row of panels for each value that is shown, a column for each x; runs apart by colours."""
     abreast = len(plan.x) if len(plan.x) > 1 else min(_ABREAST, len(plan.show))
@@ -86,10 +135,8 @@ def bands(plan: FigureEntry, title: str, runs: Values) -> Figure:
         if value in plan.limits:
             axes.axhline(plan.limits[value], color="black", linewidth=0.8)
         axes.margins(x=0)
-        if bins.is_logarithmic:
-            spread(axes.xaxis)
-        if is_logarithmic(runs[value]):
-            spread(axes.yaxis)
+        spread(axes.xaxis, bins.is_logarithmic)
+        spread(axes.yaxis, is_logarithmic(runs[value]))
         axes.set_xlabel(runs.label(x))
         if x == plan.x[0]:
             axes.set_title(runs.label(value))
@@ -158,10 +205,8 @@ def maps(plan: FigureEntry, title: str, runs: Values) -> Figure:
     for axes in panels[-1]:
         axes.set_xlabel(runs.label(x))
     # All panels share their axes.
-    if across.is_logarithmic:
-        spread(axes.xaxis)
-    if down.is_logarithmic:
-        spread(axes.yaxis)
+    spread(axes.xaxis, across.is_logarithmic)
+    spread(axes.yaxis, down.is_logarithmic)
     return figure
 
 
@@ -199,10 +244,8 @@ def front(plan: FigureEntry, title: str, runs: Values) -> Figure:
         axes.plot(*points.T, ".", color=colour, markersize=2, alpha=0.25, rasterized=True)
         line = {"color": colour, "linestyle": style, "label": name, "drawstyle": "steps-post"}
         axes.plot(*best(points).T, **line)
-    if is_logarithmic(runs[x]):
-        spread(axes.xaxis)
-    if is_logarithmic(runs[plan.y]):
-        spread(axes.yaxis)
+    spread(axes.xaxis, is_logarithmic(runs[x]))
+    spread(axes.yaxis, is_logarithmic(runs[plan.y]))
     axes.set(xlabel=runs.label(x), ylabel=runs.label(plan.y))
     legend(figure, axes)
     return figure

@@ -15,8 +15,8 @@ from xml.etree.ElementTree import Element, SubElement
 
 from orchestrator.formats.ssp.archive import Archive
 from orchestrator.machine.children import run_module
+from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
-from orchestrator.machine.locks import process_folder
 from orchestrator.machine.user_files import check_file, is_folder
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import PortName, file_name

@@ -21,7 +21,7 @@ from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.measures import EFFORT_PD, EFFORT_PROPOSED
 from orchestrator.paper.page import actuator_values, numbers, picture, plain
 from orchestrator.runs.request import Request
-from orchestrator.vehicle.certificates import COLUMNS, certificates
+from orchestrator.vehicle.proof import CERTIFICATE_COLUMNS, certificates
 from orchestrator.vehicle.signals import ACTUATORS, AXES, limits
 
 #: Levels of measurement noise to show the effect of [m].
@@ -286,7 +286,7 @@ def saturation(tanh: KeptRun, algebraic: KeptRun) -> Shown:
 @effect("certificates", "Certificates along a run", QUIET)
 def certificates_along_a_run(quiet: KeptRun) -> Shown:
     """What the proof speaks of, along Fig. 4."""
-    column = dict(zip(COLUMNS, certificates(quiet.table).T, strict=True))
+    column = dict(zip(CERTIFICATE_COLUMNS, certificates(quiet.table).T, strict=True))
     figure = Figure(figsize=(WIDTH, 5.5))
     panels = figure.subplots(3, 1, sharex=True)
     panels[0].semilogy(column["time"], column["V_without_theta"], color=COLOURS[0])

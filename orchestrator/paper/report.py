@@ -31,7 +31,7 @@ from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.folder import inner, replaced
 from orchestrator.runs.record import PACKAGES, Stopwatch, write_files
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.vehicle import gains
+from orchestrator.vehicle.proof import gain_check
 
 #: Folders within the report's: figures, and runs that the next report can use again.
 _FIGURES, _RUNS, _STUDIES = "figures", "runs", "studies"
@@ -169,7 +169,7 @@ def _text(
     yield "## Studies of many vehicles"
     yield from shown
     yield "## Gain conditions"
-    yield f"`auv-fmu gains`:\n\n```\n{gains.check(closed_loop(fmus))}\n```"
+    yield f"`auv-fmu gains`:\n\n```\n{gain_check(closed_loop(fmus))}\n```"
     yield "## What is wrong in the paper"
     yield prose.errata()
     yield "## Readings"

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from fmus.kinds import PYTHON
-from orchestrator.figures.drawing import draw
-from orchestrator.figures.run_figures import FIGURES
+from orchestrator.figures.run_figures import FIGURES, draw
 from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.paper.kept_runs import KeptRun, KeptRuns
@@ -23,7 +22,8 @@ from orchestrator.runs.folder import inner
 from orchestrator.runs.preparation import Prepared, prepared_of, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario, read_scenario
-from orchestrator.studies.study import Study, read_study, ready_studies
+from orchestrator.studies.study import Study, ready_studies
+from orchestrator.studies.study_file import read_study
 from orchestrator.studies.sweep import Means, swept
 from orchestrator.system.names import file_name, port_name
 from orchestrator.vehicle.indices import metrics as indices

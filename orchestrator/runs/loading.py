@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from fmus.kinds import FMI_VERSIONS, PYTHON
-from orchestrator.figures.drawing import check_figure
+from orchestrator.figures.run_figures import check_figure
 from orchestrator.formats.examination import open_inputs
 from orchestrator.formats.other_formats import STRUCTURE as OSP
 from orchestrator.formats.other_formats import read_osp

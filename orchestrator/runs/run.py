@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.figures.drawing import draw, figure_files
+from orchestrator.figures.run_figures import draw, figure_files
 from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.disk import process_folder
@@ -42,8 +42,8 @@ from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import file_name
 from orchestrator.system.structure import System
 from orchestrator.vehicle.cautions import cautions, cautions_after, cautions_beside, watched
-from orchestrator.vehicle.certificates import CertificatesFile
 from orchestrator.vehicle.indices import Metrics
+from orchestrator.vehicle.proof import CertificatesFile
 from orchestrator.vehicle.signals import Loop, loops_of, suffixes
 
 #: A file that keeps room for what is written last, so that a full disk does not cost the record.

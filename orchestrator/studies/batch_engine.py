@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib.metadata import version
+from itertools import compress
 from math import isnan
 from threading import local
 from typing import NamedTuple
@@ -18,16 +19,22 @@ from auv_fmu.output_feedback import Gains
 from fmus.auv_plant.behaviour import check
 from fmus.kinds import PYTHON
 from fmus.ports.port import Refusal
+from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import digest_of
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.studies.batch import accumulator
-from orchestrator.studies.batch.kernel import COLUMNS, RunSteps, is_bounded, part_of
-from orchestrator.studies.batch.kernels import compiled, digest
-from orchestrator.studies.batch.support import setting_of, unsupported
+from orchestrator.studies.batch.kernel import (
+    COLUMNS,
+    END,
+    RunSteps,
+    is_bounded,
+    new_accumulators,
+    part_of,
+)
+from orchestrator.studies.batch.support import digest, setting_of, unsupported
 from orchestrator.studies.engine import Outcome, Point
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
@@ -85,8 +92,8 @@ class BatchEngine:
         """
         try:
             job = _job(self._systems[run.scenario], run)
-            ends = np.array([_end(job, stop_time) for stop_time in stop_times], accumulator.END)
-            accumulators = accumulator.new(len(ends))
+            ends = np.array([_end(job, stop_time) for stop_time in stop_times], END)
+            accumulators = new_accumulators(len(ends))
             made, failure = _made(job, ends, accumulators, _NO_ROWS)
         except InputError as error:
             return [Outcome(run.number, {}, str(error)) for _ in stop_times]
@@ -115,14 +122,15 @@ class BatchEngine:
         """
         job = _job(self._systems[run.scenario], run)
         rows = np.empty((job.experiment.rows, 1 + len(COLUMNS)))
-        made, failure = _made(job, np.empty(0, accumulator.END), accumulator.new(0), rows)
-        kept = [
-            0,
-            *(i for i, name in enumerate(COLUMNS, 1) if job.has((name,))),
-        ]
-        columns = tuple(COLUMNS[i - 1] for i in kept[1:])
-        header = Header(columns, job.experiment, _parameters(job.system))
-        return Table.of(header, rows[: made + 1, kept], Ending(failure))
+        made, failure = _made(job, np.empty(0, END), new_accumulators(0), rows)
+        there = [job.has((name,)) for name in COLUMNS]
+        parameters = {
+            name: job.system.value(name)
+            for component in job.system.components.values()
+            for name in (PortName(component.name, v.name) for v in component.having("parameter"))
+        }
+        header = Header(tuple(compress(COLUMNS, there)), job.experiment, parameters)
+        return Table.of(header, rows[: made + 1, [True, *there]], Ending(failure))
 
 
 class _Job(NamedTuple):
@@ -148,7 +156,8 @@ def _job(system: System, run: Point) -> _Job:
     """
     changes = {port_name(name): value for name, value in run.parameters.items()}
     system = system.with_parameters(changes)
-    if not all(_is_parameter(system, name) for name in changes):
+    changed = [system.component(name.component).variable(name.port) for name in changes]
+    if any(variable.causality != "parameter" for variable in changed):
         system.check()
     experiment = Experiment(run.stop_time, run.step, run.order)
     if run.order not in ORDERS:
@@ -180,21 +189,8 @@ def _job(system: System, run: Point) -> _Job:
     return _Job(system, experiment, setting, plan)
 
 
-def _is_parameter(system: System, name: PortName) -> bool:
-    return bool(system.component(name.component).variable(name.port).causality == "parameter")
-
-
-def _parameters(system: System) -> dict[PortName, object]:
-    """All parameters of a system."""
-    return {
-        name: system.value(name)
-        for component in system.components.values()
-        for name in (PortName(component.name, v.name) for v in component.having("parameter"))
-    }
-
-
 def _end(job: _Job, stop_time: float) -> tuple[int, float, float]:
-    """Where the accumulator of a stop time ends, as :data:`.accumulator.END` has it.
+    """Where the accumulator of a stop time ends, as :data:`.kernel.END` has it.
 
     Raises:
         InputError: the run has no row there.
@@ -227,44 +223,31 @@ def _made(
         _run(job, job.plan, ends, accumulators, rows, progress)
     made = int(progress[0])
     if made < 0:
-        raise InputError(_start_failure(job.setting, job.plan))
+        raise InputError(f"initialisation refused: {_why(job)}")
     if made == job.plan.steps:
         return made, None
     # What the step that is refused begins with is what a shorter run ends with.
     shorter = job.plan._replace(steps=made)
     moment = _run(job, shorter, ends[:0], accumulators[:0], _NO_ROWS, progress)
-    return made, _step_failure(job.setting, job.plan, made, moment)
+    return made, f"stopped at t = {moment.t:.12g} s: {_why(job, made, moment)}"
 
 
-def _start_failure(setting: Setting, plan: RunSteps) -> str:
-    """Why a run has no start."""
-    law = LAWS[type(setting.controller)]
+def _why(job: _Job, k: int = 0, before: Moment | None = None) -> str:
+    """Why a run has no start, or cannot take step k from a moment.
 
-    def start() -> Moment:
-        # Noise is too small to make a difference.
-        moment = closed_loop.begin(setting, law, (0.0, 0.0, 0.0))
-        closed_loop.act(setting, law, moment, plan.h, plan.parts, plan.delayed)
-        return moment
-
-    return f"initialisation refused: {_why(start)}"
-
-
-def _step_failure(setting: Setting, plan: RunSteps, k: int, moment: Moment) -> str:
-    """Why step k of a run, from 0, cannot be taken from a moment."""
-    law = LAWS[type(setting.controller)]
-    h, parts, end = part_of(plan, k)
-
-    def step() -> Moment:
-        instant = closed_loop.act(setting, law, moment, h, parts, plan.delayed)
-        return closed_loop.step(setting, law, instant, h, parts, end, (0.0, 0.0, 0.0))
-
-    return f"stopped at t = {moment.t:.12g} s: {_why(step)}"
-
-
-def _why(take: Callable[[], Moment]) -> str:
-    """What an equation raises on the way to a moment, or else what is wrong with the moment."""
+    It is what an equation of plain Python raises, or else what is wrong with what it comes to.
+    """
+    setting, plan, law = job.setting, job.plan, LAWS[type(job.setting.controller)]
+    # Noise is too small to make a difference.
+    n = (0.0, 0.0, 0.0)
     try:
-        moment = take()
+        if before is None:
+            moment = closed_loop.begin(setting, law, n)
+            closed_loop.act(setting, law, moment, plan.h, plan.parts, plan.delayed)
+        else:
+            h, parts, end = part_of(plan, k)
+            instant = closed_loop.act(setting, law, before, h, parts, plan.delayed)
+            moment = closed_loop.step(setting, law, instant, h, parts, end, n)
     except (ArithmeticError, ValueError) as error:
         return f"{type(error).__name__}: {error}"
     states = {
@@ -287,6 +270,10 @@ def _run(
     progress: np.ndarray,
 ) -> Moment:
     """Call the kernel."""
+    # Not installed where no studies are made.
+    imported_apart("numba", ".numba_config.yaml")
+    from orchestrator.studies.batch.compilation import compiled  # noqa: PLC0415
+
     run = compiled(type(job.setting.controller))  # type: ignore[arg-type]
     uniform = _NOISE.uniform(job.setting.plant.noise.seed)
     return run(job.setting, plan, uniform, ends, accumulators, rows, progress)

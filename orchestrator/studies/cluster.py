@@ -58,7 +58,9 @@ def cluster(address: str, engine: Engine) -> Iterator[Crew]:
         try:
             yield _Cluster(client, name)
         finally:
-            _forget(client, name)
+            # If it can still be reached.
+            with suppress(Exception):
+                client.unregister_worker_plugin(name)
 
 
 @contextmanager
@@ -105,12 +107,6 @@ def _failure_to_connect(address: str) -> Exception | None:
     # Where this is called, a loop may be running.
     Thread(target=tried, daemon=True).start()
     return errors.get()
-
-
-def _forget(client: Client, name: str) -> None:
-    """Have a cluster forget what it was sent, if it can still be reached."""
-    with suppress(Exception):
-        client.unregister_worker_plugin(name)
 
 
 class _Share(WorkerPlugin):  # type: ignore[misc]

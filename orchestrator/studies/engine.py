@@ -1,15 +1,27 @@
 """A run of a study, what comes out of it, and what an engine is.
 
-There are two engines. One runs the FMUs; it runs any system. The other runs the equations of the
-closed loop, compiled, and is some hundred times as fast. Both give the same numbers.
+There are two engines. The one here runs FMUs, of any system. The other (:mod:`.batch_engine`) runs
+the equations of the closed loop, compiled, and is some hundred times as fast. Both give the same
+numbers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
+from orchestrator.machine.disk import process_folder
+from orchestrator.machine.errors import InputError
+from orchestrator.machine.user_files import archive_of
 from orchestrator.master.experiment import ORDERS, Order
+from orchestrator.master.loop import LOOPS, PYTHON_LOOP, chosen
+from orchestrator.master.plan import code_of, planned
+from orchestrator.runs.preparation import Prepared
+from orchestrator.system.names import port_name
+from orchestrator.vehicle.indices import Indices
+from orchestrator.vehicle.signals import loops_of
 
 
 class Point(NamedTuple):
@@ -72,3 +84,88 @@ class Engine(Protocol):
 
         """
         ...
+
+
+class FmuEngine:
+    """Makes runs with FMUs in the process that it is called in; it takes them along."""
+
+    def __init__(self, prepared: Mapping[str, Prepared], loop: str = LOOPS[0]) -> None:
+        """Take what is run.
+
+        Args:
+            prepared: by the names that runs have for their scenarios.
+            loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
+
+        """
+        # Compiled loops do not travel: each run takes one where it is made.
+        self._prepared = {name: replace(one, loop=PYTHON_LOOP) for name, one in prepared.items()}
+        self._loop = loop
+
+    @property
+    def digest(self) -> str:
+        """Of the code that says what comes out of rows."""
+        return code_of("orchestrator.vehicle", "orchestrator.studies")
+
+    def outcomes(self, runs: Sequence[Point]) -> Iterator[Outcome]:
+        """Make some runs, in their order.
+
+        Raises:
+            KeyboardInterrupt: a signal has come to stop it.
+
+        """
+        for run in runs:
+            try:
+                yield self._outcome(run)
+            except InputError as error:
+                yield Outcome(run.number, {}, str(error))
+
+    def _outcome(self, run: Point) -> Outcome:
+        prepared = self._prepared[run.scenario]
+        system = prepared.system.with_parameters(
+            {port_name(name): value for name, value in run.parameters.items()}
+        )
+        experiment = replace(
+            prepared.experiment, stop_time=run.stop_time, step=run.step, order=run.order
+        )
+        indices = Indices(loops_of(system))
+        plan, loop = planned(system, experiment), chosen(self._loop, experiment)
+        ending = replace(prepared, plan=plan, loop=loop).run([indices])
+        if ending.signals:
+            raise KeyboardInterrupt
+        if ending.failure is not None:
+            return Outcome(run.number, {}, ending.failure)
+        return Outcome(run.number, indices.values())
+
+    def __getstate__(self) -> dict[str, Any]:
+        """With the FMUs, each once, by their digests.
+
+        Raises:
+            InputError: one has changed since it was read.
+
+        """
+        archives = {
+            part.digest: archive_of(part.fmu, part.digest)
+            for prepared in self._prepared.values()
+            for part in prepared.system.components.values()
+        }
+        return {"prepared": self._prepared, "loop": self._loop, "archives": archives}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        """Put the FMUs where this process keeps what is temporary."""
+        places = {digest: _place(digest, content) for digest, content in state["archives"].items()}
+        self._prepared, self._loop = {}, state["loop"]
+        for name, prepared in state["prepared"].items():
+            components = {
+                part.name: replace(part, fmu=places[part.digest])
+                for part in prepared.system.components.values()
+            }
+            system = replace(prepared.system, components=components)
+            self._prepared[name] = replace(prepared, plan=replace(prepared.plan, system=system))
+
+
+def _place(digest: str, content: bytes) -> Path:
+    """Where an FMU lies that has come from elsewhere."""
+    path = process_folder() / f"{digest}.fmu"
+    if not path.exists():
+        path.write_bytes(content)
+    return path

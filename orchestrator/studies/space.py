@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
 from itertools import chain
@@ -17,8 +17,17 @@ from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.engine import Point
-from orchestrator.studies.study import STEP, Range, Sample, Study, members
-from orchestrator.studies.study_file import LATIN_HYPERCUBE, LOG, MOST_RUNS, SOBOL
+from orchestrator.studies.study import (
+    LATIN_HYPERCUBE,
+    LOG,
+    MOST_RUNS,
+    SOBOL,
+    STEP,
+    Range,
+    Sample,
+    Study,
+    members,
+)
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value, is_finite, type_of, typed
@@ -83,9 +92,10 @@ class Space:
         self._constants = {
             name: known.typed(name, value) for name, value in study.parameters.items()
         }
+        names = {name for name in (*study.parameters, *study.varied) if name != STEP}
         self._has = {
-            name: known.had_by(system, (*study.parameters, *study.varied))
-            for name, (_, system) in systems.items()
+            scenario: {name for name in names if system.has(port_name(name))}
+            for scenario, (_, system) in systems.items()
         }
         self.prepared = {
             name: self._prepared(name, study, *system) for name, system in systems.items()
@@ -182,11 +192,6 @@ class _Known:
         target = port_name(name)
         system = next((one for one in self._systems if one.has(target)), self._systems[-1])
         return system.component(target.component).variable(target.port)
-
-    @staticmethod
-    def had_by(system: System, names: Iterable[str]) -> set[str]:
-        """The names of parameters that a system has."""
-        return {name for name in names if name != STEP and system.has(port_name(name))}
 
 
 def between(limits: Range, share: float, whole: bool) -> float | int:

@@ -1,29 +1,54 @@
-"""What a study file may hold; docs/studies.md and its JSON schema are made from this."""
+"""What a study file may hold, and the study and the figures that it stands for.
+
+docs/studies.md and the JSON schema of these files are made from this.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
+import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
-from orchestrator.figures.study_figures import KINDS
+from orchestrator.figures.study_figures import KINDS, FigureEntry
+from orchestrator.figures.study_values import SCENARIO, is_known
 from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
+from orchestrator.machine.errors import Findings, InputError, did_you_mean
+from orchestrator.machine.user_files import explained, path_of, text_of
 from orchestrator.master.experiment import ORDERS
-from orchestrator.system.names import flattened
+from orchestrator.runs.loading import is_path
+from orchestrator.studies.study import (
+    ENGINES,
+    FOLDER,
+    LINEAR,
+    LOG,
+    METHODS,
+    MOST_RUNS,
+    SPACINGS,
+    STEP,
+    WHAT,
+    Range,
+    Sample,
+    StopTime,
+    Study,
+    members,
+)
+from orchestrator.system.names import flattened, port_name
 from orchestrator.system.values import is_finite
+from orchestrator.vehicle.indices import index_columns
 
-#: What makes the runs; the first is the default.
-ENGINES = FMU, BATCH = "fmu", "batch"
+#: What a figure may be called: its files are.
+_NAME = re.compile(r"[\w-]+")
 
-#: How values that are not listed are spread between two ends.
-SPACINGS = LINEAR, LOG = "linear", "log"
+#: The table that is no figure.
+LABELS = "labels"
 
-#: How samples are drawn; the first is the default.
-METHODS = SOBOL, LATIN_HYPERCUBE, RANDOM = "sobol", "latin-hypercube", "random"
-
-#: More runs than this are taken for a mistake.
-MOST_RUNS = 1_000_000_000
+#: What is shown of a study whose file does not say it: of each vehicle, and of all together.
+_USUAL, _ALL = ("late_error", "peak_command"), "lost"
 
 #: More values of one parameter than this are taken for a mistake.
 _MOST_VALUES = 1_000_000
@@ -32,21 +57,18 @@ _MOST_VALUES = 1_000_000
 _LARGEST_SEED = 2**63 - 1
 
 
-def _of_numbers(table: Mapping[str, Any]) -> Mapping[str, Any]:
-    if not all(is_finite(value) for _, value in flattened(table)):
-        raise ValueError
-    return table
+def _each(fits: Callable[[Any], bool]) -> AfterValidator:
+    def check(table: Mapping[str, Any]) -> Mapping[str, Any]:
+        if not all(fits(value) for _, value in flattened(table)):
+            raise ValueError
+        return table
 
-
-def _of_texts(table: Mapping[str, Any]) -> Mapping[str, Any]:
-    if not all(isinstance(value, str) for _, value in flattened(table)):
-        raise ValueError
-    return table
+    return AfterValidator(check)
 
 
 #: Tables whose keys may be dotted.
-_Numbers = Annotated[dict[str, Any], AfterValidator(_of_numbers), "table of numbers"]
-_Texts = Annotated[dict[str, Any], AfterValidator(_of_texts), "table of texts"]
+_Numbers = Annotated[dict[str, Any], _each(is_finite), "table of numbers"]
+_Texts = Annotated[dict[str, Any], _each(lambda text: isinstance(text, str)), "table of texts"]
 
 
 class RangeTable(TomlTable):
@@ -171,3 +193,211 @@ class StudyFile(TomlTable):
         "none",
     )
     figures: FiguresTable = entry("What is drawn: see below.", "what moves what")
+
+
+def read_study(name: str) -> Study:
+    """A study that comes with the program by its name, or any by the path of its file.
+
+    Raises:
+        InputError: there is no such study, or its file has a mistake.
+
+    """
+    path = path_of(name, FOLDER, "study", "a .toml file")
+    text = text_of(path, WHAT)
+    with explained(path, WHAT):
+        return study_of(path.stem, tomllib.loads(text), path)
+
+
+def study_of(name: str, content: Mapping[str, Any], path: Path | None = None) -> Study:
+    """A study from what its file holds.
+
+    Args:
+        name: of the study.
+        content: of the file.
+        path: of the file; None: there is none.
+
+    Raises:
+        Refused: there is a mistake in it.
+
+    """
+    where = str(path or name)
+    StudyFile.check(where, content)
+    findings = Findings()
+    entries = dict(content)
+    names = content["scenario"]
+    entries["scenario"] = tuple(
+        str(path.parent / scenario) if path and is_path(scenario) else scenario
+        for scenario in ([names] if isinstance(names, str) else names)
+    )
+    entries["parameters"] = dict(flattened(content.get("parameters", {})))
+    entries["vary"] = {}
+    for key, value in flattened(content.get("vary", {}), _is_range):
+        with findings.collecting():
+            entries["vary"][key] = _values(f"{where}: vary: {key}", value)
+    if "sample" in content:
+        with findings.collecting():
+            entries["sample"] = _sample(f"{where}: sample", content["sample"])
+    if (end := content.get("stop_time")) is not None:
+        per = dict(flattened(end["per"])) if isinstance(end, Mapping) else {}
+        entries["stop_time"] = StopTime(end["base"] if isinstance(end, Mapping) else end, per)
+    findings.refuse()
+    study = Study(name, **entries)
+    _check_names(where, study)
+    return study
+
+
+def _is_range(value: Any) -> bool:
+    return isinstance(value, Mapping) and bool({"from", "to"} & value.keys())
+
+
+def _values(where: str, value: Any) -> tuple[Any, ...]:
+    """The values of a list, or of a range under `vary`."""
+    if isinstance(value, list) and value:
+        return tuple(value)
+    if not _is_range(value):
+        raise InputError(f"{where}: write [values], or {{ from = 1.0, to = 10.0, n = 7 }}")
+    GridTable.check(where, value)
+    low, high, spacing = _range(where, value)
+    between = np.geomspace if spacing == LOG else np.linspace
+    return tuple(between(low, high, value["n"]).tolist())
+
+
+def _range(where: str, value: Any) -> Range:
+    if isinstance(value, list) and len(value) == 2 and all(map(is_finite, value)):
+        found = Range(*value)
+    elif _is_range(value):
+        found = Range(value["from"], value["to"], value.get("spacing", LINEAR))
+    else:
+        raise InputError(f"{where}: write [low, high], or {{ from = 1.0, to = 10.0 }}")
+    if found.spacing == LOG and not (found.low > 0.0 and found.high > 0.0):
+        raise InputError(f"{where}: spacing = {LOG!r} needs two positive ends")
+    return found
+
+
+def _sample(where: str, content: Mapping[str, Any]) -> Sample:
+    findings, ranges = Findings(), {}
+    for key, value in flattened(content["range"], _is_range):
+        with findings.collecting():
+            if _is_range(value):
+                RangeTable.check(f"{where}: {key}", value)
+            ranges[key] = _range(f"{where}: {key}", value)
+            if key.startswith("|") and not _is_norm(key, ranges[key]):
+                raise InputError(
+                    f"{where}: {key}: a norm is of two or three numbers, and not negative"
+                )
+    findings.refuse()
+    if not ranges:
+        raise InputError(f"{where}: draws nothing; name values under [sample.range]")
+    return Sample(content["n"], ranges, content.get("method", METHODS[0]), content.get("seed", 0))
+
+
+def _is_norm(key: str, limits: Range) -> bool:
+    return len(members(key)) in (2, 3) and key.endswith("|") and min(limits[:2]) >= 0.0
+
+
+def _check_names(where: str, study: Study) -> None:
+    """Check that names are names, that none is given twice, and that what is summed varies."""
+    findings = Findings()
+    stated = [*study.parameters, *([STEP] * (study.step is not None)), *study.varied]
+    for name in stated:
+        if name != STEP or name in study.parameters:
+            try:
+                port_name(name)
+            except InputError as error:
+                findings.problem(f"{where}: {error}")
+        if stated.count(name) > 1:
+            findings.problem(f"{where}: {name} is stated twice")
+    for name in study.stop_time.per if study.stop_time else ():
+        if name not in study.varied:
+            hint = did_you_mean(name, study.varied)
+            findings.problem(f"{where}: stop_time: {name} does not vary{hint}")
+    findings.refuse()
+
+
+def read_figures(
+    where: str,
+    figures: Mapping[str, Any],
+    varied: Mapping[str, type],
+    is_compared: bool,
+    indices: Sequence[str] | None = None,
+) -> tuple[FigureEntry, ...]:
+    """The figures of a study.
+
+    Args:
+        where: they stand, for messages.
+        figures: that the study file has; without any the usual one is drawn.
+        varied: the types of what varies, by name.
+        is_compared: whether there are several scenarios.
+        indices: the columns of what comes out of a run; None: of one vehicle.
+
+    Raises:
+        Refused: a figure names what runs do not have.
+
+    """
+    tables, indices = dict(figures), indices or index_columns()
+    labels = dict(flattened(tables.pop(LABELS, {})))
+    numbers = [name for name, kind in varied.items() if kind is not str]
+    if not tables and numbers:
+        tables["influence"] = {"kind": "influence", "x": numbers, "show": _usual(indices)}
+    by = (SCENARIO,) if is_compared else ()
+    findings, plans = Findings(), []
+    for name, table in tables.items():
+        with findings.collecting():
+            if not _NAME.fullmatch(name):
+                raise InputError(
+                    f"{where}: figures: {name!r} is no name of a file: letters, digits, -"
+                )
+            _check_figure(f"{where}: figures: {name}", table, (*numbers, *indices), (*varied, *by))
+        plans.append(
+            FigureEntry(
+                name,
+                table["kind"],
+                _listed(table.get("x", ())),
+                table.get("y", ""),
+                _listed(table.get("show", ())),
+                _listed(table.get("by", by)),
+                dict(flattened(table.get("where", {}))),
+                dict(flattened(table.get("limits", {}))),
+                labels,
+            )
+        )
+    findings.refuse()
+    return tuple(plans)
+
+
+def _usual(indices: Sequence[str]) -> list[str]:
+    """What is shown of a study whose file does not say it: of each vehicle, and of all."""
+    of = [name.removesuffix(_USUAL[0]) for name in indices if name.endswith(_USUAL[0])]
+    return [*(f"{vehicle}{name}" for name in _USUAL for vehicle in of), _ALL]
+
+
+def _check_figure(
+    where: str, table: Mapping[str, Any], numbers: Sequence[str], columns: Sequence[str]
+) -> None:
+    """Check that a figure names what runs have.
+
+    Args:
+        where: it stands, for messages.
+        table: that describes it.
+        numbers: the columns that can be drawn.
+        columns: those that tell runs apart.
+
+    """
+    for key in ("x", "y", "show", "limits"):
+        for value in _listed(table.get(key, ())):
+            if not is_known(value, numbers):
+                raise InputError(
+                    f"{where}: {key}: runs have no number {value!r}{did_you_mean(value, numbers)}"
+                )
+    for key in ("by", "where"):
+        for column in _listed(table.get(key, ())):
+            if column not in columns:
+                raise InputError(
+                    f"{where}: {key}: runs have no column {column!r}{did_you_mean(column, columns)}"
+                )
+
+
+def _listed(value: Any) -> list[str]:
+    if isinstance(value, Mapping):
+        return [name for name, _ in flattened(value)]
+    return [value] if isinstance(value, str) else list(value)

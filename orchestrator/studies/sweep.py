@@ -28,13 +28,11 @@ from orchestrator.runs.request import CliOption, Force, Kind, LoopName
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.blocks import Making, local
-from orchestrator.studies.engine import Engine, Outcome, Point
-from orchestrator.studies.figure_entries import read_figures
-from orchestrator.studies.fmu_engine import FmuEngine
+from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import Store, StudyResult, read_record, store
-from orchestrator.studies.study import Study, read_study, study_of
-from orchestrator.studies.study_file import BATCH, ENGINES, FMU
+from orchestrator.studies.study import BATCH, ENGINES, FMU, Study
+from orchestrator.studies.study_file import read_figures, read_study, study_of
 
 #: Packages whose versions the runs and their table depend on.
 _PACKAGES = (*PACKAGES, "numba", "pyarrow", "scipy")

@@ -84,34 +84,6 @@ class Index(NamedTuple):
         return ", ".join(filter(None, dict.fromkeys(self.units.values())))
 
 
-def _energy(rows: LoopRows) -> np.ndarray:
-    """Integral of the square of the applied signal, over each step."""
-    h: np.ndarray = rows.ends("time") - rows.starts("time")
-    energy: np.ndarray = rows.ends(*rows.loop.applied) ** 2 * h
-    return energy
-
-
-def _outside(rows: LoopRows) -> np.ndarray:
-    commanded, (lower, upper) = rows.ends(*rows.loop.commanded), rows.limits
-    outside: np.ndarray = ((commanded < lower) | (commanded > upper)).astype(float)
-    return outside
-
-
-def _change(rows: LoopRows) -> np.ndarray:
-    change: np.ndarray = np.abs(rows.ends(*rows.loop.applied) - rows.starts(*rows.loop.applied))
-    if rows.number <= 1:
-        # Before the first step nothing was applied.
-        change[:1] = 0.0
-    return change
-
-
-def _miss(rows: LoopRows) -> np.ndarray:
-    """Squares of dy_hat - dy: a row holds the estimate of the instant at which its step began."""
-    late = rows.starts("time")[:, 0] >= rows.half
-    miss: np.ndarray = (rows.ends(*rows.loop.dy_hat) - rows.starts(*rows.loop.dy))[late] ** 2
-    return miss
-
-
 def _root_mean(squares: np.ndarray, n: int, end: float) -> np.ndarray:
     # One after the other, as the equations add.
     x, y, z = squares
@@ -119,16 +91,12 @@ def _root_mean(squares: np.ndarray, n: int, end: float) -> np.ndarray:
     return mean
 
 
-def _late_distance(rows: LoopRows) -> np.ndarray:
-    return rows.distance[rows.late] if rows.late.any() else np.empty(0)
-
-
 def _actuation(loop: Loop) -> Needs:
     return (*loop.commanded, *loop.applied), loop.limits
 
 
 #: Two indices are made of it.
-_ENERGY = partial(Fold, _energy, total)
+_ENERGY = partial(Fold, LoopRows.energy, total)
 
 #: Units of its root.
 _EFFORT = {member: f"{unit}.s^1/2" for member, unit in TAU.items()}
@@ -176,7 +144,7 @@ INDICES: tuple[Index, ...] = (
         dict.fromkeys(TAU, ""),
         "share of the steps whose command is outside the limits",
         _actuation,
-        partial(Fold, _outside, total),
+        partial(Fold, LoopRows.outside, total),
         "outside",
         lambda found, n, end: found / n,
         is_metric=True,
@@ -187,7 +155,7 @@ INDICES: tuple[Index, ...] = (
         TAU,
         "sum of the absolute differences of the applied signal from step to step",
         _actuation,
-        partial(Fold, _change, total),
+        partial(Fold, LoopRows.change, total),
         "variation",
         is_metric=True,
     ),
@@ -216,7 +184,7 @@ INDICES: tuple[Index, ...] = (
         {"": "m"},
         "largest |e| in the second half of the run",
         Loop.for_tracking,
-        partial(Fold, _late_distance, largest),
+        partial(Fold, LoopRows.late_distance, largest),
         "late",
     ),
     Index(
@@ -225,7 +193,7 @@ INDICES: tuple[Index, ...] = (
         {"": "m/s"},
         "root mean square of |dy_hat - dy| in the second half, both of the same instant",
         Loop.for_velocity_estimates,
-        partial(Fold, _miss, total),
+        partial(Fold, LoopRows.miss, total),
         "miss",
         _root_mean,
     ),

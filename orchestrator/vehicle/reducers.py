@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
+from operator import itemgetter
 
 import numpy as np
 
@@ -64,11 +65,6 @@ class LoopRows:
             self._groups[columns] = self._table.group(*columns)
         return self._groups[columns]
 
-    @property
-    def limits(self) -> tuple[np.ndarray, np.ndarray]:
-        """The limits of (3), lower and upper."""
-        return limits(self._table, self.loop)
-
     def errors(self, wanted: np.ndarray | slice = slice(None)) -> np.ndarray:
         """y - y_d with the true control point, in all rows or in some [m]."""
         rows = self._rows[self._new :][wanted]
@@ -79,6 +75,42 @@ class LoopRows:
         """|y - y_d| in each row [m]."""
         # The control point takes as long as everything else together, and is not always wanted.
         return size(self.errors())
+
+    def late_distance(self) -> np.ndarray:
+        """|y - y_d| in the rows of the second half [m]."""
+        return self.distance[self.late] if self.late.any() else np.empty(0)
+
+    def energy(self) -> np.ndarray:
+        """Integral of the square of the applied signal, over each step."""
+        h: np.ndarray = self.ends("time") - self.starts("time")
+        energy: np.ndarray = self.ends(*self.loop.applied) ** 2 * h
+        return energy
+
+    def outside(self) -> np.ndarray:
+        """1 for each step whose command is outside the limits, else 0."""
+        commanded, (lower, upper) = self.ends(*self.loop.commanded), limits(self._table, self.loop)
+        outside: np.ndarray = ((commanded < lower) | (commanded > upper)).astype(float)
+        return outside
+
+    def change(self) -> np.ndarray:
+        """How far the applied signal moves from step to step."""
+        change: np.ndarray = np.abs(self.ends(*self.loop.applied) - self.starts(*self.loop.applied))
+        if self.number <= 1:
+            # Before the first step nothing was applied.
+            change[:1] = 0.0
+        return change
+
+    def miss(self) -> np.ndarray:
+        """Squares of dy_hat - dy: a row holds the estimate of the instant its step began at."""
+        late = self.starts("time")[:, 0] >= self.half
+        miss: np.ndarray = (self.ends(*self.loop.dy_hat) - self.starts(*self.loop.dy))[late] ** 2
+        return miss
+
+
+#: Many terms to one, column by column. A sum goes row by row: it does not depend on the blocks in
+#: which rows come.
+total, largest = partial(np.sum, axis=0), partial(np.max, axis=0)
+first, last = itemgetter(0), itemgetter(-1)
 
 
 class Fold:
@@ -91,7 +123,7 @@ class Fold:
 
         Args:
             term: of some rows, in their order.
-            fold: many terms to one: :func:`total`, :func:`largest`, :func:`first` or :func:`last`.
+            fold: many terms to one: `total`, `largest`, `first` or `last`.
 
         """
         self._term, self._fold = term, fold
@@ -109,30 +141,6 @@ class Fold:
     def found(self, end: float) -> np.ndarray:
         """What the terms of a run come to that ends at a time [s]."""
         return self._found
-
-
-def total(terms: np.ndarray) -> np.ndarray:
-    """The sum, row by row: it does not depend on the blocks in which rows come."""
-    found: np.ndarray = terms.sum(axis=0)
-    return found
-
-
-def largest(terms: np.ndarray) -> np.ndarray:
-    """The largest of each column."""
-    found: np.ndarray = terms.max(axis=0)
-    return found
-
-
-def first(terms: np.ndarray) -> np.ndarray:
-    """The first row."""
-    found: np.ndarray = terms[0]
-    return found
-
-
-def last(terms: np.ndarray) -> np.ndarray:
-    """The last row."""
-    found: np.ndarray = terms[-1]
-    return found
 
 
 class LargestOfTheEnd:
@@ -158,7 +166,8 @@ class LargestOfTheEnd:
     def found(self, end: float) -> np.ndarray:
         """The largest errors."""
         errors = [rows.errors(rows.time >= end - LAST_SECONDS) for rows in self._recent]
-        return largest(np.abs(np.vstack(errors)))
+        found: np.ndarray = largest(np.abs(np.vstack(errors)))
+        return found
 
 
 def size(vectors: np.ndarray) -> np.ndarray:

@@ -8,7 +8,8 @@ from importlib import import_module
 import pytest
 from PIL import Image
 
-from orchestrator.studies.study import read_study, ready_studies
+from orchestrator.studies.study import ready_studies
+from orchestrator.studies.study_file import read_study
 from orchestrator.vehicle.indices import index_columns
 from pages import PICTURES
 from support.markdown import DOCS

@@ -10,9 +10,9 @@ import pytest
 
 from orchestrator import sweep
 from orchestrator.runs.loading import loaded
-from orchestrator.studies.figure_entries import read_figures
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import ready_studies, study_of
+from orchestrator.studies.study import ready_studies
+from orchestrator.studies.study_file import read_figures, study_of
 from orchestrator.vehicle.indices import index_columns
 from support.markdown import DOCS, blocks
 

@@ -31,7 +31,7 @@ from hypothesis import strategies as st
 
 from orchestrator.commands import many_runs
 from orchestrator.commands.main import main
-from orchestrator.figures.drawing import figure_files
+from orchestrator.figures.run_figures import figure_files
 from orchestrator.machine.ledger import LEDGER
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.paper import report

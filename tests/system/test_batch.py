@@ -29,10 +29,10 @@ from orchestrator.runs.loading import load, loaded
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import Point
-from orchestrator.studies.fmu_engine import FmuEngine
+from orchestrator.studies.engine import FmuEngine, Point
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import read_study, ready_studies
+from orchestrator.studies.study import ready_studies
+from orchestrator.studies.study_file import read_study
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 from support.runs import prepared
@@ -272,7 +272,7 @@ def test_another_process_finds_the_kernel_compiled():
     """It loads in a fraction of a second what has taken several to compile."""
     text = (
         "from auv_fmu.output_feedback import Gains\n"
-        "from orchestrator.studies.batch.kernels import compiled\n"
+        "from orchestrator.studies.batch.compilation import compiled\n"
         "from orchestrator.studies.batch_engine import BatchEngine\n"
         "from orchestrator.studies.engine import Point\n"
         "import pickle, sys\n"

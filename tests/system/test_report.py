@@ -18,7 +18,7 @@ from orchestrator.paper.report import write_report
 from orchestrator.paper.sections import make_studies, study_sections
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.studies.study import ready_studies
-from orchestrator.vehicle.gains import check
+from orchestrator.vehicle.proof import gain_check
 from support.variants import found, planted
 
 STRANGER = """\
@@ -117,7 +117,7 @@ def test_what_is_wrong_in_the_paper_is_there_with_the_gain_check(text, dist):
     titles = re.findall("^#### .+$", errata(), re.MULTILINE)
     assert len(titles) > 20
     assert all(f"\n{title}\n" in text for title in titles)
-    assert check(closed_loop(dist)) in text
+    assert gain_check(closed_loop(dist)) in text
 
 
 def test_links_lead_somewhere(folder, page):

@@ -25,8 +25,7 @@ from orchestrator.master.plan import planned
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.stored import read_result
-from orchestrator.studies.engine import Point
-from orchestrator.studies.fmu_engine import FmuEngine
+from orchestrator.studies.engine import FmuEngine, Point
 from support.others import build, system_of
 
 pytestmark = pytest.mark.usefixtures("workplace")

@@ -22,8 +22,8 @@ from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import PortName
 from orchestrator.vehicle.cautions import velocities_reaching
-from orchestrator.vehicle.certificates import COLUMNS, certificates
 from orchestrator.vehicle.indices import metrics_of
+from orchestrator.vehicle.proof import CERTIFICATE_COLUMNS, certificates
 from orchestrator.vehicle.signals import tracking_error
 from support.runs import final_error, system_of
 from support.runs import run as simulated
@@ -230,7 +230,7 @@ def test_certificates_agree_with_the_matrix_form_of_34(run: Runner):
     """V from logarithms of cosh and M_2 = J^-T M_1 J^-1, at some instants of Fig. 4."""
     result = run("fig4", plant__noise__std=0.0)
     table = certificates(result)
-    column = dict(zip(COLUMNS, table.T, strict=True))
+    column = dict(zip(CERTIFICATE_COLUMNS, table.T, strict=True))
     M_1, ell = np.diag([25.0, 22.5, 15.0]), 0.35
     for k in range(1, 5000, 700):
         phi, theta, psi = (result[f"plant.eta.{a}"][k - 1] for a in ("phi", "theta", "psi"))
@@ -262,7 +262,9 @@ def test_certificates_agree_with_the_matrix_form_of_34(run: Runner):
 
 def test_composite_errors_end_in_a_small_ball(run: Runner):
     """The theorem's claim, in numbers of ours: |r_1| < 0.2 m/s and |r_2| < 0.02 m/s after 40 s."""
-    column = dict(zip(COLUMNS, certificates(run("fig4", plant__noise__std=0.0)).T, strict=True))
+    column = dict(
+        zip(CERTIFICATE_COLUMNS, certificates(run("fig4", plant__noise__std=0.0)).T, strict=True)
+    )
     settled = column["time"] > 40.0
     for name, bound in (("r_1", 0.2), ("r_2", 0.02)):
         norm = np.linalg.norm([column[f"{name}.{a}"] for a in "xyz"], axis=0)

@@ -16,10 +16,10 @@ from orchestrator.commands.main import main
 from orchestrator.runs.loading import loaded
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.fmu_engine import FmuEngine
+from orchestrator.studies.engine import FmuEngine
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import read_study, study_of
-from orchestrator.studies.study_file import BATCH, ENGINES
+from orchestrator.studies.study import BATCH, ENGINES
+from orchestrator.studies.study_file import read_study, study_of
 from orchestrator.studies.sweep import Means, faster
 from orchestrator.vehicle.indices import index_columns
 from support import others

@@ -13,9 +13,8 @@ from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.runs.wiring import read_wiring
 from orchestrator.system.names import PortName
-from orchestrator.vehicle.certificates import certificates
-from orchestrator.vehicle.gains import check
 from orchestrator.vehicle.indices import INDICES, VEHICLES, index_columns
+from orchestrator.vehicle.proof import certificates, gain_check
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
 
 OTHER = Loop("tow", "pilot", "guide", "sea")
@@ -140,7 +139,7 @@ def test_each_vehicle_has_a_page(results, capsys):
 
 
 def test_theorem_and_indices_are_said_of_each(results, capsys):
-    text = check(load(results / "two.toml", "native"))
+    text = gain_check(load(results / "two.toml", "native"))
     assert text.startswith("plant:\n") and "\ntow:\n" in text
     result = simulate(results / "two.toml", stop_time=1.0, kind="native")
     assert result.metrics()[VEHICLES].keys() == {"plant", "tow"}

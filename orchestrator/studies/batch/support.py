@@ -16,6 +16,7 @@ from fmus.pd_controller import ports as pd_controller
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, Port, Refusal
 from orchestrator.machine.errors import InputError
+from orchestrator.master.plan import code_of
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import PortName
@@ -35,6 +36,11 @@ _VELOCITY = {
     Connection(PortName("plant", f"dy.{axis}"), PortName("controller", f"dy.{axis}"))
     for axis in AXES
 }
+
+
+def digest() -> str:
+    """Of the text of all that is compiled."""
+    return code_of("auv_fmu", __package__)[:16]
 
 
 def unsupported(system: System, fmus: Path) -> str:

@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.figures.study_figures import bands, best, draw_figures, influence, maps
 from orchestrator.figures.study_values import Values
-from orchestrator.studies.figure_entries import read_figures
+from orchestrator.studies.study_file import read_figures
 from orchestrator.vehicle.indices import index_columns
 
 GRID = np.geomspace(1.0, 100.0, 5)

@@ -18,7 +18,7 @@ from auv_fmu.vehicle import Vehicle, accelerations
 from orchestrator.paper.measures import EFFORT_PD, EFFORT_PROPOSED, TURNING_RADIUS, sum_without_step
 from orchestrator.paper.prose import errata, readings
 from orchestrator.runs.wiring import closed_loop as loop_of
-from orchestrator.vehicle import gains
+from orchestrator.vehicle.proof import gain_check, stated, theorem_of
 from support.markdown import DOCS, sections
 from support.texts import tells
 
@@ -35,8 +35,8 @@ def text_of(title):
 
 
 def test_gains_prints_the_lines_of_the_page(dist):
-    lines = "\n".join(gains.stated(gains.evaluate(loop_of(dist))))
-    assert lines in gains.check(loop_of(dist))
+    lines = "\n".join(stated(theorem_of(loop_of(dist))))
+    assert lines in gain_check(loop_of(dist))
     assert f"```\n{lines}\n```" in PAGE.read_text(encoding="utf-8")
 
 

@@ -13,8 +13,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import loaded
 from orchestrator.studies.engine import Point
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import study_of
-from orchestrator.studies.study_file import MOST_RUNS
+from orchestrator.studies.study import MOST_RUNS
+from orchestrator.studies.study_file import study_of
 
 qmc = pytest.importorskip("scipy.stats.qmc", reason="needs scipy: the extra `studies`")
 

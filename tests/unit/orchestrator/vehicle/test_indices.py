@@ -17,10 +17,10 @@ from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.loading import loaded
-from orchestrator.studies.fmu_engine import FmuEngine
+from orchestrator.studies.engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import StudyResult, store
-from orchestrator.studies.study import study_of
+from orchestrator.studies.study_file import study_of
 from orchestrator.system.names import PortName, port_name
 from orchestrator.vehicle import indices as table_of_indices
 from orchestrator.vehicle.indices import Index, Indices, Metrics, index_columns, metrics_of

@@ -10,8 +10,8 @@ import pytest
 
 pytest.importorskip("numba", reason="needs numba: the extra `studies`")
 
-from orchestrator.studies.batch.equations import Equations
-from orchestrator.studies.batch.numbers import flat
+from orchestrator.studies.batch.compilation import equations
+from orchestrator.studies.batch.kernel import flat
 
 TEXT = '''
 """An equation that refuses."""
@@ -47,7 +47,7 @@ def equation(tmp_path, monkeypatch) -> ModuleType:
 
 
 def test_functions_give_what_their_text_gives_and_raise_without_a_text(equation):
-    compiled = Equations().anew(equation, equation.__file__)
+    compiled = equations(equation)
     # What is called from Python must have what Python calls it by.
     import numba  # noqa: PLC0415
 

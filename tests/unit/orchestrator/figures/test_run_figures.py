@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.figures.drawing import check_figure, draw
-from orchestrator.figures.layout import compose
-from orchestrator.figures.run_figures import FIGURES, overlay
+from orchestrator.figures.panels import compose
+from orchestrator.figures.run_figures import FIGURES, check_figure, draw, overlay
 from orchestrator.figures.style import Drawn
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.signals import STANDARD

@@ -5,14 +5,10 @@ from __future__ import annotations
 import pytest
 
 from orchestrator.machine.errors import InputError, Refused
-from orchestrator.studies.study import (
-    Range,
-    Sample,
-    StopTime,
-    read_study,
-    ready_studies,
-    study_of,
-)
+from orchestrator.runs.loading import loaded
+from orchestrator.studies.space import Space
+from orchestrator.studies.study import BATCH, Range, Sample, StopTime, ready_studies
+from orchestrator.studies.study_file import read_figures, read_study, study_of
 
 TEXT = """
 scenario = ["fig5", "other.ssp"]
@@ -198,3 +194,84 @@ def test_unknown_name_and_missing_file_are_one_line():
 @pytest.mark.parametrize("name", ready_studies())
 def test_ready_studies_can_be_read(name):
     assert read_study(name).title
+
+
+VARIED = {"plant.eta0.z": float, "controller.k_d": float, "controller.observer": str}
+
+
+def plans(is_compared=True, **figures):
+    return read_figures("mine.toml", figures, VARIED, is_compared)
+
+
+def test_names_may_stand_alone_or_in_lists():
+    figure = {"kind": "bands", "x": "plant.eta0.z", "show": ["late_error", "lost"]}
+    labels = {"plant": {"eta0": {"z": "depth [m]"}}}
+    [plan] = plans(far={**figure, "limits": {"late_error": 1.0}}, labels=labels)
+    assert (plan.name, plan.x, plan.show) == ("far", ["plant.eta0.z"], ["late_error", "lost"])
+    assert plan.limits == {"late_error": 1.0}
+    assert plan.labels == {"plant.eta0.z": "depth [m]"}
+
+
+def test_scenarios_are_told_apart_unless_the_file_says_otherwise():
+    front = {"kind": "front", "x": "peak_command", "y": "late_error"}
+    assert plans(f=front)[0].by == ["scenario"]
+    assert plans(f={**front, "by": []})[0].by == []
+    assert plans(is_compared=False, f=front)[0].by == []
+
+
+def test_a_file_that_says_nothing_has_a_figure_of_all_numbers_that_vary():
+    [plan] = plans()
+    assert plan.kind == "influence"
+    assert plan.x == ["plant.eta0.z", "controller.k_d"]
+    assert read_figures("mine.toml", {}, {}, False) == ()
+
+
+BANDS = {"kind": "bands", "x": "plant.eta0.z", "show": "late_error"}
+
+
+@pytest.mark.parametrize(
+    ("figure", "complaint"),
+    [
+        (
+            {**BANDS, "show": "late_errors"},
+            "show: runs have no number 'late_errors'; did you mean",
+        ),
+        ({**BANDS, "x": "plant.eta0.x"}, "x: runs have no number 'plant.eta0.x'"),
+        ({**BANDS, "x": "controller.observer"}, "x: runs have no number 'controller.observer'"),
+        ({**BANDS, "by": "controller.observe"}, "by: runs have no column 'controller.observe'"),
+        ({**BANDS, "where": {"step": 0.1}}, "where: runs have no column 'step'"),
+    ],
+)
+def test_mistakes_are_told_in_a_line(figure, complaint):
+    with pytest.raises(InputError, match=f"^mine.toml: figures: f: .*{complaint}") as error:
+        plans(f=figure)
+    assert "\n" not in str(error.value)
+
+
+def test_a_figure_is_named_as_a_file_can_be():
+    with pytest.raises(InputError, match="is no name of a file"):
+        plans(**{"../mine": BANDS})
+
+
+pytest.importorskip("scipy", reason="needs scipy: the extra `studies`")
+
+#: As the command line and the pages name them.
+NAMES = {"attraction", "robustness", "noise", "gains", "distance", "sampling"}
+
+
+def test_there_are_six():
+    assert set(ready_studies()) == NAMES
+
+
+@pytest.mark.parametrize("name", ready_studies())
+def test_study_holds_the_proposed_controller_against_pd_ten_thousand_times(name):
+    study = read_study(name)
+    space = Space(study, {scenario: loaded(scenario) for scenario in study.scenario})
+    assert study.engine == BATCH
+    assert len(space) >= 10_000
+    first, second = space[0], space[1]
+    assert (first.scenario, second.scenario) == ("fig5", "fig5-pd")
+    # Whatever both controllers have is the same in both runs.
+    assert dict(second.parameters).items() <= dict(first.parameters).items()
+    assert read_figures(name, study.figures, space.columns, space.has_scenarios)
+    assert study.remark.count("\n\n") == 1, "two paragraphs"

@@ -11,8 +11,7 @@ import threading
 import pytest
 
 from orchestrator import simulate
-from orchestrator.studies.engine import Point
-from orchestrator.studies.fmu_engine import FmuEngine
+from orchestrator.studies.engine import FmuEngine, Point
 from support.runs import prepared
 
 CHANGES = {"plant.eta0.y": 3.0, "controller.eps_t": 2.0, "plant.noise.seed": 7}

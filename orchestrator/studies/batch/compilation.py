@@ -1,0 +1,193 @@
+"""The kernel and the equations, compiled by numba once for each controller and kept.
+
+It is the same text, except what refusals say: numba makes no texts, so what compiled equations
+raise has none. The rest is Python's: each operation is rounded by itself, nothing is contracted or
+reordered, and sine and the like come from the same library.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import math
+import os
+import pickle
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from hashlib import sha256
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numba
+from numba import types
+from numba.core import serialize
+from numba.core.compiler import CompileResult
+from numba.extending import intrinsic, overload
+
+from auv_fmu.closed_loop import LAWS, Law, Moment
+from orchestrator.machine.cache import keep, kept
+from orchestrator.studies.batch import kernel
+from orchestrator.studies.batch.support import digest
+
+#: It would look for its configuration in the current folder before each compilation.
+numba.core.config._config_fname = os.devnull
+
+#: What the compiled kernels are in the user's cache folder.
+_CATEGORY = "batch"
+
+#: Where a number is not finite, Python raises in some places; here it is found afterwards.
+_OPTIONS: Any = {"nogil": True, "error_model": "numpy"}
+
+#: A call costs as much as what most of them compute. Only compiled ones call them: what Python
+#: and C would call them by takes half of the time to compile.
+_WITHIN: Any = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+#: The package of the equations.
+_PACKAGE = "auv_fmu"
+
+
+def _pure(name: str) -> Any:
+    """A function of LLVM, which is what the C library has by that name, and has no memory."""
+
+    @intrinsic
+    def function(_: Any, x: Any) -> Any:
+        def call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            double = context.get_value_type(types.float64)
+            return builder.call(builder.module.declare_intrinsic(name, [double]), arguments)
+
+        return types.float64(types.float64), call
+
+    return function
+
+
+def _places(kind: Any, place: str = "value") -> list[str]:
+    """Expressions for all numbers of a nested tuple of some type."""
+    if not isinstance(kind, types.BaseTuple):
+        return [place]
+    parts: Any = kind
+    return [one for i, part in enumerate(parts) for one in _places(part, f"{place}[{i}]")]
+
+
+def _tree(terms: list[str]) -> str:
+    """A sum as a tree, whose branches a processor computes side by side."""
+    half = len(terms) // 2
+    return f"({_tree(terms[:half])} + {_tree(terms[half:])})" if half else terms[0]
+
+
+#: What is another expression for each type of tuple, and its text.
+_WRITTEN_OUT: dict[Any, Callable[[list[str]], str]] = {
+    kernel.flat: lambda xs: f"({', '.join(xs)},)",
+    kernel.square: lambda xs: _tree([f"{x} * {x}" for x in xs]),
+    kernel.nought: lambda xs: _tree([f"0.0 * {x}" for x in xs]),
+}
+
+
+def _overload(function: Any, text: Callable[[list[str]], str]) -> None:
+    overload(function)(lambda value: eval(f"lambda value: {text(_places(value))}"))
+
+
+for _function, _text in _WRITTEN_OUT.items():
+    _overload(_function, _text)
+
+#: Sine and cosine of an angle are computed once, together, wherever they are needed.
+_PURE = {math.sin: _pure("llvm.sin"), math.cos: _pure("llvm.cos")}
+
+
+def equations(module: ModuleType) -> ModuleType:
+    """A module made anew, of which all functions are compiled when they are first called.
+
+    What it takes from other modules of equations is compiled too. Types and constants stay the
+    modules' own: a state is of the same type on both sides.
+    """
+    made = ModuleType(module.__name__)
+    tree = ast.parse(inspect.getsource(module))
+    functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
+    names = {one.name for one in functions if vars(module)[one.name] not in _WRITTEN_OUT}
+    scope = vars(made)
+    for name, value in vars(module).items():
+        if name not in names:
+            scope[name] = _counterpart(value)
+    exec(_code([one for one in functions if one.name in names], str(module.__file__)), scope)
+    for name in names:
+        scope[name] = numba.njit(scope[name], **_OPTIONS, **_WITHIN)
+    return made
+
+
+#: The equations of this process: one module of each name.
+_equations = cache(equations)
+
+
+def _counterpart(value: Any) -> Any:
+    if isinstance(value, BuiltinFunctionType):
+        return _PURE.get(value, value)
+    if isinstance(value, ModuleType) and _is_compiled(value.__name__):
+        return _equations(value)
+    if isinstance(value, FunctionType) and _is_compiled(value.__module__):
+        return vars(_equations(sys.modules[value.__module__]))[value.__name__]
+    return value
+
+
+def _is_compiled(module: str) -> bool:
+    return module.split(".", maxsplit=1)[0] == _PACKAGE
+
+
+def _code(functions: list[ast.FunctionDef], path: str) -> CodeType:
+    """The functions without types, and without what their refusals say."""
+    for function in functions:
+        function.returns = None
+        for argument in function.args.args:
+            argument.annotation = None
+        for node in ast.walk(function):
+            if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
+                node.exc = node.exc.func
+    return compile(ast.Module([*functions], []), path, "exec")
+
+
+@cache
+def compiled(gains: type[Any]) -> Callable[..., Moment]:
+    """The function :func:`.kernel.run` for the controller with a type of gains.
+
+    It is compiled when it is first called, which takes some ten seconds, unless some process of
+    this user has done so before.
+    """
+    made = equations(kernel)
+    vars(made)["law"] = Law(*map(_counterpart, LAWS[gains]))
+    run: Callable[..., Moment] = numba.njit(made.run.py_func, **_OPTIONS)
+    vars(run)["_cache"] = _Kept(gains.__name__)
+    return run
+
+
+class _Kept:
+    """What numba asks for code that was compiled earlier, in the place of its own cache.
+
+    Numba's own is where its configuration says, and takes whatever is there.
+    """
+
+    cache_path = None
+
+    def __init__(self, name: str) -> None:
+        """Take the name of a variant of the kernel."""
+        self._name = name
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """The code for the types of arguments, or None."""
+        target.refresh()
+        rebuild: Any = CompileResult._rebuild
+        for content in kept(_CATEGORY, self._key(signature, target.codegen())).values():
+            return rebuild(target, *pickle.loads(content))
+        return None
+
+    def save_overload(self, signature: Any, result: Any) -> None:
+        """Keep code."""
+        dumps: Any = serialize.dumps
+        key = self._key(signature, result.codegen)
+        # What cannot be kept is compiled again.
+        with suppress(OSError):
+            if not kept(_CATEGORY, key):
+                keep(_CATEGORY, key, {"kernel": dumps(result._reduce())})
+
+    def _key(self, signature: Any, codegen: Any) -> str:
+        text = repr((self._name, signature, numba.__version__, sys.version, codegen.magic_tuple()))
+        return f"{digest()}-{sha256(text.encode()).hexdigest()[:16]}"

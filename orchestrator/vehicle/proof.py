@@ -1,0 +1,263 @@
+"""What the proof says: Theorem 1 or 2 for some parameters, and along a run V and its margins.
+
+Certificates are computed from the true state of the vehicle, which the controller does not know.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from auv_fmu.attitude import rotation_from_euler
+from auv_fmu.control_point import ELL as CONTROL_POINT
+from auv_fmu.output_feedback import Gains
+from auv_fmu.proof.attraction import Theorem, theorem
+from auv_fmu.proof.gain_conditions import observer_rate
+from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
+from auv_fmu.saturation import MAXIMUM_SLOPE, SATURATIONS
+from auv_fmu.vehicle import Vehicle
+from orchestrator.machine.errors import InputError
+from orchestrator.master.observers.files import CsvLines
+from orchestrator.master.observers.observer import Ending, Header, every
+from orchestrator.master.observers.table import Table
+from orchestrator.system.names import port_name
+from orchestrator.system.structure import System
+from orchestrator.vehicle.cautions import gain_of_a_step
+from orchestrator.vehicle.signals import (
+    ACTUATORS,
+    AXES,
+    STANDARD,
+    Loop,
+    limits,
+    loops_of,
+    parameter,
+    true_control_point,
+    value_of,
+    vehicle,
+)
+
+#: What the paper says of these conditions, in Remark 4, and what they leave open.
+_NOTE = """\
+The conditions are sufficient, and Remark 4 calls them conservative: a run may well be stable
+where they are violated. The zetas of (26) and (29) are known from below only, by states of a level
+vehicle. C_2 has a pole at the vertical, so that no finite zetas hold at all attitudes: open means
+that a condition may hold for pitches that keep off it. The report has the proofs, under "What is
+wrong in the paper"; so has docs/paper.md."""
+
+_PAPER = """\
+These are the paper's own gains: as printed they miss (30), and (31) in any unit of speed."""
+
+
+def theorem_of(system: System, loop: Loop = STANDARD) -> Theorem:
+    """The theorem for the parameters of a loop.
+
+    Raises:
+        InputError: a parameter does not exist or cannot be set.
+
+    """
+    system.check()
+
+    def value(name: str) -> Any:
+        return system.value(port_name(name))
+
+    def of(name: str) -> Any:
+        return value(f"{loop.controller}.{name}")
+
+    saturation = of("saturation")
+    if saturation not in MAXIMUM_SLOPE:
+        raise InputError(
+            f"{loop.controller}.saturation = {saturation}: use one of {', '.join(MAXIMUM_SLOPE)}"
+        )
+    K1, K2 = (tuple(of(f"{K}[{i}]") for i in range(1, 4)) for K in ("K1", "K2"))
+    gains = Gains(K1=K1, K2=K2, lambda_=of("lambda"), k_d=of("k_d"), gamma=of("gamma"))
+    return theorem(vehicle(value, loop), value(loop.ell), gains, MAXIMUM_SLOPE[saturation])
+
+
+def gain_check(system: System) -> str:
+    """The theorem in words and numbers, for the parameters of each loop of a system.
+
+    Raises:
+        InputError: a parameter does not exist or cannot be set.
+
+    """
+    loops = loops_of(system)
+    lines: list[str] = []
+    for loop in loops:
+        found = theorem_of(system, loop)
+        if len(loops) > 1:
+            lines += [f"{loop.vehicle}:", ""]
+        lines += [*stated(found), "", _NOTE, "", *_sampling(system, loop)]
+        if found == theorem(Vehicle(), CONTROL_POINT, Gains(), MAXIMUM_SLOPE["tanh"]):
+            lines += ["", _PAPER]
+        lines.append("")
+    return "\n".join(lines[:-1])
+
+
+def stated(found: Theorem) -> Iterator[str]:
+    """Bounds, conditions, alphas and region of attraction, in lines."""
+    known, zetas, alphas = found.bounds, found.zetas, found.alphas
+    yield "over all attitudes:"
+    yield f"  lambda_m2 = {known.lambda_m2:.6g} kg, lambda_M2 = {known.lambda_M2:.6g} kg"
+    yield f"  lambda_d2 = {known.lambda_d2:.6g} kg/s, lambda_D2 = {known.lambda_D2:.6g} kg/s"
+    yield ""
+    yield "as printed, with speeds in m/s:"
+    yield f"  zeta_1 + zeta_2 >= {zetas.zeta_1_2:.4g} kg/s"
+    yield f"  zeta_3 + zeta_4 >= {zetas.zeta_3_4:.4g} kg/s"
+    for condition in found.conditions:
+        least = f" + {condition.zetas}, at least {condition.right + condition.least:.4g}"
+        yield f"  {condition.number}  {condition.statement}"
+        yield (
+            f"    {condition.left:.6g} > {condition.right:.6g}{least if condition.zetas else ''}: "
+            f"{condition.verdict}"
+        )
+    if found.zeta_of_any_gains >= known.lambda_d2:
+        least = f"{known.lambda_d2:.6g} > 0.5 (zeta_1 + zeta_2), at least "
+        yield f"  (31), (53)  with any gains: {least}{found.zeta_of_any_gains:.4g}: violated"
+    yield (
+        f"  (40)  alpha_1 = {alphas.alpha_1:.4g}, alpha_2 = {alphas.alpha_2:.4g}, "
+        f"alpha_3 <= {alphas.alpha_3:.4g}, alpha_4 <= {alphas.alpha_4:.4g}"
+    )
+    yield (
+        f"  (33)  R_A lies within |vartheta| < {found.radius:.3g}"
+        if found.radius
+        else "  (33)  R_A is empty"
+    )
+    yield (
+        "  (42)  with (26) asked for on a ball of x only: holds for "
+        f"|x| < {found.x_at_most:.3g} at most, with any gains for |x| < {found.x_of_any_gains:.3g}"
+    )
+    yield ""
+    yield "with any gains, and with speeds in any unit:"
+    yield (
+        f"  (31), (53)  asks for lambda < {2.0 * found.speed_of_any_gains:.3g} m/s and "
+        f"|dy_d| < {found.speed_of_any_gains:.3g} m/s"
+    )
+    yield f"  (40)  alpha_1 < {found.alpha_1_of_any_gains:.3g} W, where (31) holds"
+    yield f"  (42)  holds for |r_1| < {found.speed_of_any_gains:.3g} m/s at most"
+
+
+def _sampling(system: System, loop: Loop) -> list[str]:
+    """What the step asks of k_d."""
+    lambda_, h = (
+        float(system.value(port_name(f"{loop.controller}.{name}")) or 0.0)
+        for name in ("lambda", "h_max")
+    )
+    rate = observer_rate(lambda_, gain_of_a_step(system, h, loop.controller))
+    return [
+        f"Euler's scheme with internal steps of {h:g} s: the observer's fastest mode has the rate "
+        f"{rate:.4g} 1/s,",
+        f"h p = {h * rate:.3g}: it changes its sign in every step above 1, and grows above 2.",
+    ]
+
+
+CERTIFICATE_COLUMNS = (
+    "time",
+    "V_without_theta",
+    *(f"r_1.{k}" for k in AXES),
+    *(f"r_2.{k}" for k in AXES),
+    *(f"saturation_margin.{k}" for k in ACTUATORS),
+)
+
+
+def missing_for_certificates(table: Table, loop: Loop = STANDARD) -> list[str]:
+    """Ports and parameters of the proposed controller and the vehicle that a run does not have."""
+    columns = (
+        *loop.posture, *loop.dy, *loop.seen_y_d, *loop.seen_dy_d, *loop.y_hat, *loop.dy_hat,
+        *loop.z, *loop.tau,
+    )  # fmt: skip
+    return table.missing(columns, (*_gains(loop), *loop.limits, *loop.vehicle_parameters, loop.ell))
+
+
+def _gains(loop: Loop) -> tuple[str, ...]:
+    """K_2, lambda and the saturation function: parameters of the proposed controller."""
+    names = ("K2[1]", "K2[2]", "K2[3]", "lambda", "saturation")
+    return tuple(f"{loop.controller}.{name}" for name in names)
+
+
+def certificates(table: Table, loop: Loop = STANDARD) -> np.ndarray:
+    """Table with :data:`CERTIFICATE_COLUMNS`, a row for each instant that the controller acted at.
+
+    V is (34), or (55) for another saturation function, without its term in theta - theta_hat:
+    theta is unknown. r_1 is (17), r_2 is (19). The margin is the distance of a command from its
+    nearer limit, negative beyond it.
+    """
+    return _certificates(table.header, loop, table.rows[:-1], table.rows[1:])
+
+
+def _certificates(header: Header, loop: Loop, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Certificates of some steps, from the rows at their starts and at their ends."""
+    return np.array(list(_rows(loop, Table.of(header, starts), Table.of(header, ends))))
+
+
+def _rows(loop: Loop, start: Table, end: Table) -> Iterator[list[float]]:
+    plant = vehicle(lambda name: parameter(start, name), loop)
+    *K2_names, lambda_name, saturation = _gains(loop)
+    ell, lambda_ = parameter(start, loop.ell), parameter(start, lambda_name)
+    K2_x, K2_y, K2_z = (parameter(start, name) for name in K2_names)
+    s = SATURATIONS[str(value_of(start, saturation))]
+    lower, upper = limits(start, loop)
+
+    y, dy = true_control_point(start, loop), start.group(*loop.dy)
+    euler = start.group(*loop.attitude)
+    # The controller is sampled: the row at the end of a step has its values of the start.
+    y_d, dy_d, y_hat, dy_hat, z_measured, tau = (
+        end.group(*group)
+        for group in (loop.seen_y_d, loop.seen_dy_d, loop.y_hat, loop.dy_hat, loop.z, loop.tau)
+    )
+
+    e, z, e_z = y - y_d, y - y_hat, y_hat - y_d
+    margin = np.minimum(upper - tau, tau - lower)
+    for i, t in enumerate(start.time.tolist()):
+        r_1, r_2 = composite_errors(dy[i], dy_d[i], dy_hat[i], e_z[i], z_measured[i], lambda_, s)
+        errors = Errors(e[i].tolist(), z[i].tolist(), r_1, r_2)
+        rotation = rotation_from_euler(*euler[i].tolist())
+        V = lyapunov(plant, rotation, errors, (K2_x, K2_y, K2_z), s, ell)
+        yield [t, V, *r_1, *r_2, *margin[i]]
+
+
+class CertificatesFile:
+    """An observer that writes the table as CSV, if the run has what it takes."""
+
+    def __init__(self, path: Path, interval: float | None = None, loop: Loop = STANDARD) -> None:
+        """Write into a file, which is made when there is something to write.
+
+        Args:
+            path: of the file.
+            interval: an instant is written for each of these [s]; None: all.
+            loop: whose certificates they are.
+
+        """
+        self._path, self._loop = path, loop
+        self._interval = interval
+        self._lines: CsvLines | None = None
+
+    def begin(self, header: Header) -> None:
+        """Find out whether there will be certificates."""
+        self._every = every(self._interval, header)
+        self._header = header
+        self._last = np.empty((0, 1 + len(header.columns)))
+        self._is_possible = not missing_for_certificates(Table.of(header, self._last), self._loop)
+
+    def take(self, rows: np.ndarray) -> None:
+        """Write the certificates of the steps that end at these rows."""
+        if not self._is_possible:
+            return
+        rows = np.vstack((self._last, rows))
+        self._last = rows[-1:]
+        starts, ends = rows[:-1], rows[1:]
+        if self._every is not None and len(starts):
+            chosen = self._every.chosen(starts[:, 0])
+            starts, ends = starts[chosen], ends[chosen]
+        if len(starts):
+            if self._lines is None:
+                self._lines = CsvLines(self._path, CERTIFICATE_COLUMNS)
+            found = _certificates(self._header, self._loop, starts, ends)
+            self._lines.write(found.tolist())
+
+    def end(self, ending: Ending) -> None:
+        """Close the file."""
+        if self._lines is not None:
+            self._lines.close()
