@@ -29,9 +29,16 @@ from orchestrator.master.observers.progress import Progress
 from orchestrator.master.observers.selection import Selection, check_interval, matches, matching
 from orchestrator.runs.folder import INCOMPLETE, inner, place_of, publish, replaced
 from orchestrator.runs.preparation import Prepared
-from orchestrator.runs.record import FILES, Stopwatch, write_metrics, write_record
+from orchestrator.runs.record import (
+    CHECKPOINTS,
+    FILES,
+    Stopwatch,
+    checkpoints_of,
+    leave,
+    write_metrics,
+    write_record,
+)
 from orchestrator.runs.request import Files
-from orchestrator.runs.resume import FOLDER, checkpoints_of, leave
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import file_name
 from orchestrator.system.structure import System
@@ -139,7 +146,7 @@ def run_into(
     ):
         kept = checkpoints_of(
             runs,
-            [inner(folder, FOLDER, *filter(None, [below])) for below in folders],
+            [inner(folder, CHECKPOINTS, *filter(None, [below])) for below in folders],
             files.checkpoint_every,
             files.resume,
             files.force,
@@ -315,7 +322,7 @@ def _draw(
 
 def _folders(runs: Sequence[Prepared], figures: Sequence[str]) -> list[str]:
     """The folder of each run, from the first one's on."""
-    taken = [*FILES, _certificates(""), *figures, FOLDER, INCOMPLETE, LEDGER]
+    taken = [*FILES, _certificates(""), *figures, CHECKPOINTS, INCOMPLETE, LEDGER]
     return ["", *(file_name(prepared.scenario.name, taken) for prepared in runs[1:])]
 
 
