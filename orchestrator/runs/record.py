@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import platform
-import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, fields
@@ -124,18 +123,23 @@ def write_record(
             for component in prepared.system.components.values()
         },
         "parameters": {str(name): value for name, value in header.parameters.items()},
-        "versions": {"python": sys.version.split()[0]}
-        | {package: version(package) for package in PACKAGES},
-        "platform": platform.platform(),
     }
     write_files(folder, content)
 
 
-def write_files(folder: Path, content: dict[str, Any]) -> None:
-    """Write a record, with the names of all files beside it."""
+def write_files(
+    folder: Path, content: Mapping[str, object], packages: Sequence[str] = PACKAGES
+) -> None:
+    """Write a record, with versions, the platform, and the names of all files beside it."""
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    text = json.dumps({**content, "files": sorted(files | {RECORD})}, indent=2)
-    (folder / RECORD).write_text(text + "\n", encoding="utf-8")
+    whole = {
+        **content,
+        "versions": {"python": platform.python_version()}
+        | {package: version(package) for package in packages},
+        "platform": platform.platform(),
+        "files": sorted(files | {RECORD}),
+    }
+    (folder / RECORD).write_text(json.dumps(whole, indent=2) + "\n", encoding="utf-8")
 
 
 def _ending_in(record: dict[str, Any]) -> Ending:
