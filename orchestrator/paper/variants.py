@@ -183,7 +183,7 @@ class Sensitivity:
 
     def _arrived(self, scenario: str, consistent: bool) -> np.ndarray:
         """What has come to the reference by its end, with axes for SIGNALS and END_TIMES last."""
-        arrived: np.ndarray = (self.numbers[scenario][..., 3:] <= REACHED).all(axis=-1)
+        arrived = np.asarray((self.numbers[scenario][..., 3:] <= REACHED).all(axis=-1))
         if consistent:
             arrived &= contradicts_nothing(scenario, (*self.of_runs, _SIGNALS, _T_FS))
         return arrived
