@@ -12,8 +12,7 @@ from orchestrator.commands.options import add_fmi, add_options, add_out, add_set
 from orchestrator.commands.streams import OK, show
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
-from orchestrator.runs.bundle import DEFAULT_FOLDERS
-from orchestrator.runs.own_controller import BASES, build_own, new_controller
+from orchestrator.runs.bundle import BASES, DEFAULT_FOLDERS, build_own, new_controller
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.wiring import closed_loop

@@ -13,7 +13,7 @@ from orchestrator.master.fmi.binary import binary_of, check_binary
 from orchestrator.runs.loading import loaded
 from orchestrator.runs.preparation import SOME_TIME, prepare
 from orchestrator.runs.request import Request
-from orchestrator.runs.waypoints import impossible_paths
+from orchestrator.runs.scenario import impossible_paths
 from orchestrator.studies.study import is_study
 from orchestrator.studies.study_file import read_study
 from orchestrator.system.component import Component

@@ -19,8 +19,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.observer import Observer, Progress
 from orchestrator.runs.folder import VIEW, replaced
 from orchestrator.runs.preparation import prepare
+from orchestrator.runs.record import changed_files, read_record, read_result, table_in
 from orchestrator.runs.request import Files, Request
-from orchestrator.runs.stored import changed_files, read_record, read_result, table_in
 from orchestrator.system.names import PortName
 from orchestrator.vehicle.signals import Loop, loops_of, suffixes
 

@@ -8,19 +8,35 @@ contradicts what is printed, it says what.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial, reduce
 from itertools import product
 from types import MappingProxyType
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from auv_fmu.disturbance import Disturbance
 from auv_fmu.euler import STEP
 from auv_fmu.motion_planner import TAU_D
 from auv_fmu.vehicle import Vehicle
 from orchestrator.master.experiment import ORDERS
+from orchestrator.paper.measures import (
+    EFFORT_PD,
+    EFFORT_PROPOSED,
+    FINAL_ERROR_PD,
+    FINAL_ERROR_PROPOSED,
+    sum_without_step,
+)
 from orchestrator.studies.engine import Point
 
 #: The scenarios of the two columns of the table.
 PROPOSED, PD = "fig5", "fig5-pd"
+
+#: What is printed, by scenario: three efforts and three errors.
+PUBLISHED = {
+    PROPOSED: np.array([*EFFORT_PROPOSED, *FINAL_ERROR_PROPOSED]),
+    PD: np.array([*EFFORT_PD, *FINAL_ERROR_PD]),
+}
 
 #: End times that are looked at [s].
 END_TIMES = tuple(map(float, range(20, 201)))
@@ -190,6 +206,18 @@ FORMULAS = (
     Option("mean square, (59) without the root"),
 )
 
+#: Where u, q and r stand, by ORDERS_OF_EFFORTS.
+_ORDERED = ([0, 1, 2], [0, 2, 1])
+
+_T_F = np.array(END_TIMES)[:, np.newaxis]
+
+#: What is printed, of L2 norms with an axis for END_TIMES before the three; by FORMULAS.
+_TABULATED = (
+    lambda l2: l2,
+    partial(sum_without_step, duration=_T_F, h=STEP),
+    lambda l2: l2**2 / _T_F,
+)
+
 #: Choices that are left when a run is done.
 OF_READING = (
     Choice("efforts of the signal", SIGNALS),
@@ -214,8 +242,26 @@ def runs(scenario: str, of_runs: Sequence[Choice] = OF_RUNS) -> Iterator[Point]:
     """A run for each combination, in the order of the choices; the last varies fastest."""
     combinations = product(*(options_of(choice, scenario) for choice in of_runs))
     for number, combination in enumerate(combinations):
-        parameters = {
-            name: value for option in combination for name, value in option.parameters.items()
-        }
-        order = next((option.order for option in combination if option.order), ORDERS[0])
-        yield Point(number, scenario, parameters, END_TIMES[-1], STEP, order)
+        yield run_of(scenario, combination, number)
+
+
+def run_of(scenario: str, combination: Sequence[Option], number: int = 0) -> Point:
+    """The run with an option of each choice."""
+    parameters = {
+        name: value for option in combination for name, value in option.parameters.items()
+    }
+    order = next((option.order for option in combination if option.order), ORDERS[0])
+    return Point(number, scenario, parameters, END_TIMES[-1], STEP, order)
+
+
+def contradicts_nothing(scenario: str, choices: Sequence[Choice]) -> np.ndarray:
+    """Whether a combination of options contradicts nothing that is printed, an axis a choice."""
+    flags = [[not option.against for option in options_of(each, scenario)] for each in choices]
+    found: np.ndarray = reduce(np.logical_and, np.meshgrid(*flags, indexing="ij", sparse=True))
+    return found
+
+
+def as_read(numbers: np.ndarray, order: int, formula: int) -> np.ndarray:
+    """Six numbers as printed, of some with L2 norms; axes for END_TIMES and the six come last."""
+    efforts = _TABULATED[formula](numbers[..., _ORDERED[order]])
+    return np.concatenate((efforts, numbers[..., 3:]), axis=-1)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
@@ -113,6 +114,29 @@ def show_effect(name: str, kept_runs: Sequence[KeptRun], folder: Path) -> str:
     return f"{shown.text}\n\n{picture(found.title, f'{folder.name}/{name}.png')}"
 
 
+#: Names of the actuators' signals in figures.
+_SIGNALS = tuple(rf"$\tau_{k}$" for k in ACTUATORS)
+
+
+def _draw_lines(
+    axes: Axes,
+    x: Sequence[float] | np.ndarray,
+    rows: Sequence[Sequence[float]] | np.ndarray,
+    names: Sequence[str] = _SIGNALS,
+    marker: str = "o",
+) -> None:
+    """Draw a line for each of three numbers, of which a row has one value each."""
+    for name, values, colour, style in zip(
+        names, np.transpose(rows), COLOURS, STYLES, strict=False
+    ):
+        axes.plot(x, values, label=name, color=colour, linestyle=style, marker=marker)
+
+
+def _draw_limit(axes: Axes, run: KeptRun) -> None:
+    _, upper = limits(run.table)
+    axes.axhline(upper[0], color="black", linewidth=1, label="limit of (3)")
+
+
 @effect("effect-disturbance", "Fig. 7 in one figure", *SEVEN)
 def disturbance(*sevens: KeptRun) -> Shown:
     """The three levels of Fig. 7 over each other."""
@@ -177,10 +201,9 @@ def step(*runs: KeptRun) -> Shown:
         (EFFORT_PROPOSED, EFFORT_PD),
         strict=True,
     ):
-        for i, (k, colour, style) in enumerate(zip(ACTUATORS, COLOURS, STYLES, strict=False)):
-            line: Any = {"color": colour, "linestyle": style, "marker": "o"}
-            axes.plot(STEPS, ours[:, i], label=rf"$\tau_{k}$", **line)
-            axes.axhline(published[i], color=colour, linestyle=":", linewidth=1)
+        _draw_lines(axes, STEPS, ours)
+        for value, colour in zip(published, COLOURS, strict=False):
+            axes.axhline(value, color=colour, linestyle=":", linewidth=1)
         axes.set_title(title)
         axes.set(xlabel="step [ms]", ylabel="L2 effort [N·√s, N·m·√s]", xscale="log")
         axes.set_xticks(STEPS, [f"{1e3 * step:g}" for step in STEPS], minor=False)
@@ -210,15 +233,11 @@ def noise(*runs: KeptRun) -> Shown:
     effort, peak = figure.subplots(1, 2)
     # A logarithmic axis that begins at zero: the first level is none at all.
     levels = np.array(NOISE_LEVELS) * 1e3
-    for i, (k, colour, style) in enumerate(zip(ACTUATORS, COLOURS, STYLES, strict=False)):
-        for axes, key in ((effort, "l2_effort"), (peak, "peak_command")):
-            line: Any = {"color": colour, "linestyle": style, "marker": "o"}
-            values = [run.metrics[key][i] for run in runs]
-            axes.plot(levels, values, label=rf"$\tau_{k}$", **line)
-    for axes, title, unit in (
-        (effort, "L2 norm of the applied signals", "N·√s, N·m·√s"),
-        (peak, "peak commands", "N, N·m"),
+    for axes, key, title, unit in (
+        (effort, "l2_effort", "L2 norm of the applied signals", "N·√s, N·m·√s"),
+        (peak, "peak_command", "peak commands", "N, N·m"),
     ):
+        _draw_lines(axes, levels, [run.metrics[key] for run in runs])
         axes.set_title(title)
         axes.set(xlabel="standard deviation of the position [mm]", ylabel=f"[{unit}]")
         axes.set_xscale("symlog", linthresh=0.1)
@@ -227,8 +246,7 @@ def noise(*runs: KeptRun) -> Shown:
         axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axes.yaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_minor_locator(NullLocator())
-    _, upper = limits(runs[0].table)
-    peak.axhline(upper[0], color="black", linewidth=1, label="limit of (3)")
+    _draw_limit(peak, runs[0])
     peak.legend()
     return Shown(
         "The observer multiplies the noise by k_d = 50 (reading 7). White noise of 1 mm leaves "
@@ -244,19 +262,14 @@ def condition_30(*runs: KeptRun) -> Shown:
     """What the gains that Theorem 1 asks for command."""
     figure = Figure(figsize=(WIDTH, 3.2))
     peak, error = figure.subplots(1, 2)
-    for axes, key, members, unit in (
-        (peak, "peak_command", ACTUATORS, "N, N·m"),
-        (error, "final_error", AXES, "m"),
+    for axes, key, names, title, unit in (
+        (peak, "peak_command", _SIGNALS, "peak commands", "N, N·m"),
+        (error, "final_error", AXES, "final errors e_f", "m"),
     ):
-        for i, (k, colour, style) in enumerate(zip(members, COLOURS, STYLES, strict=False)):
-            line: Any = {"color": colour, "linestyle": style, "marker": "o"}
-            values = [run.metrics[key][i] for run in runs]
-            axes.plot(LAMBDAS, values, label=rf"$\tau_{k}$" if axes is peak else k, **line)
+        _draw_lines(axes, LAMBDAS, [run.metrics[key] for run in runs], names)
         axes.axvline(2.0, color="grey", linestyle=":", label="(30) holds above")
-        axes.set(xlabel="lambda [m/s]", ylabel=f"[{unit}]", yscale="log")
-        axes.set_title({"peak_command": "peak commands", "final_error": "final errors e_f"}[key])
-    _, upper = limits(runs[0].table)
-    peak.axhline(upper[0], color="black", linewidth=1, label="limit of (3)")
+        axes.set(xlabel="lambda [m/s]", ylabel=f"[{unit}]", yscale="log", title=title)
+    _draw_limit(peak, runs[0])
     for axes in (peak, error):
         axes.legend()
     paper, met = (runs[LAMBDAS.index(value)].metrics for value in (1.0, 2.1))
@@ -296,9 +309,8 @@ def certificates_along_a_run(quiet: KeptRun) -> Shown:
         panels[1].semilogy(column["time"], norm, linestyle=style, color=colour, label=f"|{name}|")
     panels[1].set_ylabel("composite errors\n(17), (19) [m/s]")
     panels[1].legend()
-    for k, colour, style in zip(ACTUATORS, COLOURS, STYLES, strict=False):
-        margin = column[f"saturation_margin.{k}"]
-        panels[2].plot(column["time"], margin, color=colour, linestyle=style, label=rf"$\tau_{k}$")
+    margins = [column[f"saturation_margin.{k}"] for k in ACTUATORS]
+    _draw_lines(panels[2], column["time"], np.transpose(margins), marker="")
     panels[2].set(ylabel="distance from the\nnearer limit [N, N·m]", xlabel="time [s]")
     panels[2].legend(ncols=3)
     for axes in panels:

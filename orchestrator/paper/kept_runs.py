@@ -100,7 +100,7 @@ class KeptRuns:
 
     def _make(self, runs: Iterable[Request], workers: Workers, ledger: Ledger) -> None:
         missing: dict[str, tuple[int, Request]] = {}
-        for run in runs:
+        for run in dict.fromkeys(runs):
             wanted = replace(run, stop_time=self._stop_time or run.stop_time, kind=self._kind)
             try:
                 prepared = prepared_of(wanted)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import sqrt
 from typing import Any, NamedTuple
 
@@ -9,7 +10,8 @@ import numpy as np
 
 from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.indices import REACHED
-from orchestrator.vehicle.signals import STANDARD, tracking_error
+from orchestrator.vehicle.reducers import LAST_SECONDS
+from orchestrator.vehicle.signals import STANDARD, parameter
 
 #: Control efforts of section 4.2, in the order u, q, r.
 EFFORT_PROPOSED, EFFORT_PD = (130.0, 40.0, 53.0), (235.0, 163.0, 172.0)
@@ -62,23 +64,48 @@ class Approach(NamedTuple):
         return (self.impulse / effort) ** 2
 
 
-def approach_of(table: Table, error: np.ndarray | None = None) -> Approach | None:
-    """The way of a run to its reference; None if it does not come there, or is there already.
+def errors(table: Table) -> np.ndarray:
+    """e of all rows at once, far sooner than :func:`.tracking_error` and equal up to rounding."""
+    _, theta, psi = table.group(*STANDARD.attitude).T
+    ahead = np.cos(theta) * np.cos(psi), np.cos(theta) * np.sin(psi), -np.sin(theta)
+    y = table.group(*STANDARD.position) + parameter(table, STANDARD.ell) * np.column_stack(ahead)
+    error: np.ndarray = y - table.group(*STANDARD.y_d)
+    return error
 
-    Args:
-        table: of the run.
-        error: of each row [m]; None: :func:`.tracking_error`.
 
-    """
-    if error is None:
-        error = tracking_error(table)
-    near = np.linalg.norm(error, axis=1) <= REACHED
+def approach_of(table: Table) -> Approach | None:
+    """The way of a run to its reference; None if it does not come there, or is there already."""
+    near = np.linalg.norm(errors(table), axis=1) <= REACHED
     first = int(near.argmax())
     if not near[first] or not first:
         return None
     # A row holds what was applied in the step that ends there: the first one holds none.
     force = table[STANDARD.applied[0]][1 : first + 1]
     return Approach(float(table.time[first]), float(force @ np.diff(table.time[: first + 1])))
+
+
+def numbers_of(table: Table, end_times: Sequence[float]) -> np.ndarray:
+    """Three L2 norms and three e_f, an axis for applied and commanded and one for the end times.
+
+    Args:
+        table: of a run until the last of them; what has failed before gives no numbers.
+        end_times: in their order [s].
+
+    """
+    if table.time[-1] < end_times[-1] - table.time[1]:
+        return np.full((2, len(end_times), 6), np.nan)
+    h = np.diff(table.time)[:, np.newaxis]
+    # Half a step is more than times are rounded by.
+    ends = np.searchsorted(table.time, np.subtract(end_times, 0.5 * table.time[1]))
+    begins = np.searchsorted(table.time, table.time[ends] - LAST_SECONDS)
+    error = np.abs(errors(table))
+    final = np.stack([error[i : k + 1].max(axis=0) for i, k in zip(begins, ends, strict=True)])
+    # A row holds the signal of the step that ends there: the first one holds none.
+    efforts = (
+        np.sqrt(np.cumsum(table.group(*names)[1:] ** 2 * h, axis=0)[ends - 1])
+        for names in (STANDARD.applied, STANDARD.commanded)
+    )
+    return np.stack([np.hstack((effort, final)) for effort in efforts])
 
 
 def turning_radius(table: Table) -> float:
@@ -95,7 +122,7 @@ def total_variation_until(table: Table, stop_time: float) -> float:
 
 def largest_error_after(table: Table, start: float) -> float:
     """Largest tracking error of any axis after a time [m]; zero for a shorter run."""
-    return float(np.abs(tracking_error(table)[table.time > start]).max(initial=0.0))
+    return float(np.abs(errors(table)[table.time > start]).max(initial=0.0))
 
 
 def largest_estimate(table: Table) -> float:

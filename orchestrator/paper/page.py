@@ -1,4 +1,4 @@
-"""Pages of the report: numbers as text, tables, Markdown to HTML."""
+"""Pages of the report: numbers as text, tables, pages of docs/ that it holds, Markdown to HTML."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import base64
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
 from itertools import groupby, pairwise
 from operator import itemgetter
 from pathlib import Path
@@ -17,6 +18,23 @@ from markdown_it.token import Token
 
 from fmus.ports.quantities import TAU
 from orchestrator.figures.style import printed_unit
+
+_TEMPLATE = Path(__file__).with_name("report.html")
+
+_MARKDOWN = MarkdownIt("commonmark", {"html": False}).enable("table")
+
+#: Where the pages are: with the package that was built, or in the repository.
+_FOLDERS = Path(__file__).with_name("pages"), Path(__file__).parents[2] / "docs"
+
+#: Where links between pages lead in the report, which has no others.
+_ANCHORS = {"paper.md": "#what-is-wrong-in-the-paper", "readings.md": "#readings"}
+
+_LINK = re.compile(r"\[([^\]]+)\]\(([\w/-]+\.md)(?:#[\w-]+)?\)")
+_FILLED = re.compile(r"<!-- (?:filled: \w+|/) -->")
+_READING = re.compile(r"^#+ Reading (\d+)$", re.MULTILINE)
+
+#: Mentions outside headings.
+_MENTION = re.compile(r"(?<!# )\b[Rr]eadings? \d+(?:(?:, | to | and )\d+)*")
 
 
 def numbers(values: Sequence[float]) -> str:
@@ -58,11 +76,6 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def picture(title: str, file: str) -> str:
     """A picture in Markdown that leads to its file in full size."""
     return f"[![{title}]({file})]({file})"
-
-
-_TEMPLATE = Path(__file__).with_name("report.html")
-
-_MARKDOWN = MarkdownIt("commonmark", {"html": False}).enable("table")
 
 
 class Heading(NamedTuple):
@@ -137,3 +150,43 @@ def _name_cells(tokens: Sequence[Token]) -> None:
 def _embedded(file: Path) -> str:
     content = base64.b64encode(file.read_bytes()).decode()
     return f'loading="lazy" src="data:image/png;base64,{content}"'
+
+
+def errata() -> str:
+    """What is wrong in the paper, in Markdown, with headings of the third and fourth level."""
+    _, _, text = _page_of_docs("paper.md").partition("\n")
+    points, _, _ = text.partition("\n## The theorem in numbers\n")
+    return _deeper(points, 1)
+
+
+def readings() -> str:
+    """The readings in Markdown, with a heading of the fourth level each."""
+    _, first, text = _page_of_docs("readings.md").partition("\n## ")
+    return _deeper(first + text, 2)
+
+
+def linked(text: str) -> str:
+    """Markdown in which every mention of a reading leads to its section."""
+    known = _READING.findall(_page_of_docs("readings.md"))
+
+    def link(number: re.Match[str]) -> str:
+        return f"[{number[0]}](#reading-{number[0]})" if number[0] in known else number[0]
+
+    return _MENTION.sub(lambda mention: re.sub(r"\d+", link, mention[0]), text)
+
+
+@cache
+def _page_of_docs(name: str) -> str:
+    """A page, without marks of what is filled in, and without links to pages that are elsewhere."""
+    folder = next(folder for folder in _FOLDERS if (folder / name).is_file())
+    text = _FILLED.sub("", (folder / name).read_text(encoding="utf-8"))
+    return _LINK.sub(_local, text)
+
+
+def _local(link: re.Match[str]) -> str:
+    text, page = link.groups()
+    return f"[{text}]({_ANCHORS[page]})" if page in _ANCHORS else text
+
+
+def _deeper(text: str, levels: int) -> str:
+    return re.sub("^(?=#)", levels * "#", text.strip(), flags=re.MULTILINE)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import csv
-import platform
 from collections.abc import Iterator, Sequence
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +11,18 @@ import numpy as np
 from auv_fmu.euler import STEP
 from orchestrator.machine.ledger import RECORD
 from orchestrator.machine.workers import workers
-from orchestrator.paper.choices import AGAINST_FIVE, END_TIMES, FIVE, PD, PROPOSED, VEHICLE
-from orchestrator.paper.page import numbers, plain, table
-from orchestrator.paper.sensitivity import (
-    FARTHEST,
+from orchestrator.paper.choices import (
+    AGAINST_FIVE,
+    END_TIMES,
+    FIVE,
+    PD,
+    PROPOSED,
     PUBLISHED,
+    VEHICLE,
+)
+from orchestrator.paper.page import numbers, plain, table
+from orchestrator.paper.variants import (
+    FARTHEST,
     QUANTILES,
     SAME,
     SEARCHED,
@@ -26,8 +31,8 @@ from orchestrator.paper.sensitivity import (
     Found,
     Sensitivity,
     Variant,
+    all_variants,
 )
-from orchestrator.paper.variants import all_variants
 from orchestrator.runs.folder import replaced
 from orchestrator.runs.record import PACKAGES, Stopwatch, write_files
 from orchestrator.vehicle.indices import REACHED
@@ -81,9 +86,10 @@ def _paragraphs(found: Found) -> Iterator[str]:
     )
     ranges = [*(f"range, {formula}" for formula in _FORMULAS), "range of all"]
     yield table(["", "printed", *_TITLES, *ranges], list(_rows(found, variants)))
+    held_by = [found.six, found.six, found.six, found.five]
     yield "\n".join(
         f"- {title}: {_described(held, variant)}."
-        for title, variant, held in zip(_TITLES, variants, _held(found), strict=True)
+        for title, variant, held in zip(_TITLES, variants, held_by, strict=True)
     )
     yield _starts(variants)
     yield _reached(found)
@@ -91,11 +97,6 @@ def _paragraphs(found: Found) -> Iterator[str]:
     yield table(
         ["open", "option", "best score", "best of all", "contradicts"], list(_options(found))
     )
-
-
-def _held(found: Found) -> list[Sensitivity]:
-    """Where each of the variants is from."""
-    return [found.six, found.six, found.six, found.five]
 
 
 def _rows(found: Found, variants: Sequence[Variant]) -> Iterator[list[str]]:
@@ -274,18 +275,9 @@ def write_table(folder: Path, command: Sequence[str], force: bool = False) -> tu
         text = f"# The printed table of section 4.2\n\n{section(found)}\n"
         (unfinished / _TEXT).write_text(text, encoding="utf-8")
         write_variants(unfinished / _VARIANTS, found)
-        write_files(unfinished, _record(command, clock))
+        content = {"command": list(command), **clock.times()}
+        write_files(unfinished, content, (*PACKAGES, "numba"))
     return folder / _TEXT, folder / _VARIANTS
-
-
-def _record(command: Sequence[str], clock: Stopwatch) -> dict[str, object]:
-    return {
-        "command": list(command),
-        **clock.times(),
-        "versions": {"python": platform.python_version()}
-        | {package: version(package) for package in (*PACKAGES, "numba")},
-        "platform": platform.platform(),
-    }
 
 
 def write_variants(path: Path, found: Found) -> None:

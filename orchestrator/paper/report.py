@@ -13,11 +13,11 @@ from typing import Any
 from fmus.kinds import PYTHON
 from orchestrator.machine.ledger import RECORD
 from orchestrator.machine.workers import Workers, workers
-from orchestrator.paper import printed_table, prose
+from orchestrator.paper import printed_table
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS, show_effect
 from orchestrator.paper.kept_runs import KeptRuns
-from orchestrator.paper.page import contents, html, table
+from orchestrator.paper.page import contents, errata, html, linked, readings, table
 from orchestrator.paper.sections import (
     Section,
     draw_section,
@@ -112,12 +112,17 @@ def write_report(
             held = printed_table.section(all_variants(crew)) if variants else _NO_VARIANTS
         shown = list(study_sections(made, folder / _STUDIES, unfinished))
         parts = _text(chapters, kept_runs, notes, effects, command, unfinished, fmus, shown, held)
-        body = "\n\n".join(parts)
-        body = prose.linked(body)
-        text = f"{_TITLE}\n\n{prose.linked(_INTRODUCTION)}\n\n{contents(body)}\n\n{body}\n"
+        body = linked("\n\n".join(parts))
+        text = f"{_TITLE}\n\n{linked(_INTRODUCTION)}\n\n{contents(body)}\n\n{body}\n"
         (unfinished / _MARKDOWN).write_text(text, encoding="utf-8")
         (unfinished / _PAGE).write_text(html(text, unfinished), encoding="utf-8")
-        write_files(unfinished, _record(command, clock, kept_runs))
+        record = {
+            "title": _TITLE.removeprefix("# "),
+            "command": list(command),
+            **clock.times(),
+            "runs": [f"auv-fmu run {label}" for label in kept_runs.labels],
+        }
+        write_files(unfinished, record)
     kept_runs.forget_others()
     return folder / _PAGE, folder / _MARKDOWN
 
@@ -171,9 +176,9 @@ def _text(
     yield "## Gain conditions"
     yield f"`auv-fmu gains`:\n\n```\n{gain_check(closed_loop(fmus))}\n```"
     yield "## What is wrong in the paper"
-    yield prose.errata()
+    yield errata()
     yield "## Readings"
-    yield prose.readings()
+    yield readings()
     yield "## Versions and commands"
     versions = ", ".join(f"{package} {version(package)}" for package in PACKAGES)
     yield f"Python {platform.python_version()}, {versions}. Written by `{shlex.join(command)}`."
@@ -189,15 +194,3 @@ def _claims(kept_runs: KeptRuns) -> str:
         runs = ", ".join(f"`{kept_runs.label(run)}`" for run in claim.runs)
         rows.append([cell.replace("|", "\\|") for cell in (*cells, runs)])
     return table(["claim", "paper", "ours", "verdict", "run"], rows)
-
-
-def _record(command: Sequence[str], clock: Stopwatch, kept_runs: KeptRuns) -> dict[str, object]:
-    return {
-        "title": _TITLE.removeprefix("# "),
-        "command": list(command),
-        **clock.times(),
-        "runs": [f"auv-fmu run {label}" for label in kept_runs.labels],
-        "versions": {"python": platform.python_version()}
-        | {package: version(package) for package in PACKAGES},
-        "platform": platform.platform(),
-    }

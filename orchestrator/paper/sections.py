@@ -86,34 +86,31 @@ def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Request]:
     """The run of a scenario and what it is drawn with: its companion, or its twin without noise."""
     request = Request(reference, kind=kind)
     try:
-        system = prepared_of(request).system
+        prepared = prepared_of(request)
     except InputError:
         # The report says why it cannot be made.
         return {scenario.legend: request}
     if scenario.compare:
-        [companion] = companions(request)
-        label = read_scenario(scenario.compare).legend
-        return {scenario.legend: request, label + " (2)" * (label == scenario.legend): companion}
-    noise = port_name(_NOISE)
+        [_, companion] = with_companion(prepared, request)
+        label = companion.scenario.legend
+        label += " (2)" * (label == scenario.legend)
+        return {scenario.legend: request, label: as_request(companion, prepared, request)}
+    noise, system = port_name(_NOISE), prepared.system
     if scenario.figure == "tracking" and system.has(noise) and system.value(noise):
         quiet = replace(request, parameters={_NOISE: 0.0})
         return {"with noise": request, "without noise": quiet}
     return {scenario.legend: request}
 
 
-def companions(request: Request) -> list[Request]:
-    """Runs that are drawn together with one: of its companion, with the least changes to it.
+def as_request(prepared: Prepared, compared: Prepared, request: Request) -> Request:
+    """What was prepared as the companion of a run, as the least that changes its own scenario.
 
-    Raises:
-        InputError: the scenario or the changes are not usable.
+    Args:
+        prepared: the companion.
+        compared: the run that it is drawn together with.
+        request: of that run.
 
     """
-    found = with_companion(prepared_of(request), request)
-    return [_as_request(request, found[0], one) for one in found[1:]]
-
-
-def _as_request(request: Request, compared: Prepared, prepared: Prepared) -> Request:
-    """What was prepared as the companion of a run, as what changes its own scenario."""
     standard = Request(compared.scenario.compare, kind=request.kind)
     own = prepared_of(standard)
     experiment, table = prepared.experiment, prepared.input_table

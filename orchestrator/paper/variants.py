@@ -1,43 +1,261 @@
-"""The runs of all variants, and the numbers of the printed table read off them."""
+"""All variants of the printed table: their runs, and how its numbers move with what is open."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from orchestrator.machine.workers import Workers
-from orchestrator.master.observers.table import Table
 from orchestrator.paper.choices import (
     END_TIMES,
+    FORMULAS,
+    OF_READING,
     OF_RUNS,
     OF_RUNS_OF_FIVE,
-    SIGNALS,
+    ORDERS_OF_EFFORTS,
+    PROPOSED,
+    PUBLISHED,
     Choice,
+    as_read,
+    contradicts_nothing,
     options_of,
+    run_of,
     runs,
 )
-from orchestrator.paper.measures import Approach, approach_of
-from orchestrator.paper.sensitivity import (
-    FARTHEST,
-    PUBLISHED,
-    QUANTILES,
-    SEARCHED,
-    SHOWN,
-    Found,
-    Sensitivity,
-    Variant,
-)
+from orchestrator.paper.measures import Approach, approach_of, numbers_of
 from orchestrator.runs.loading import loaded
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.studies.sweep import check_installed
-from orchestrator.vehicle.reducers import LAST_SECONDS
-from orchestrator.vehicle.signals import AXES, STANDARD, parameter
+from orchestrator.vehicle.indices import REACHED
+from orchestrator.vehicle.signals import AXES
+
+#: How far a start is moved along each axis, at most [m].
+FARTHEST = 1e-6
+
+#: Numbers of the starts that variants of five degrees of freedom are compared by, and of others
+#: from which every variant is made that is printed.
+SEARCHED, SHOWN = range(31), range(31, 131)
+
+#: Of each number over the starts.
+QUANTILES = (0.1, 0.5, 0.9)
+
+#: Bands that are wider, in parts of the number, are printed.
+SAME = 0.01
+
+#: Orders and formulas of the efforts, by their numbers.
+_READINGS = tuple(product(range(len(ORDERS_OF_EFFORTS)), range(len(FORMULAS))))
+
+_SIGNALS, *_, _T_FS = OF_READING
 
 #: Runs that a worker makes at a time.
 _BLOCK = 16
+
+
+class Bounds(NamedTuple):
+    """Smallest and largest of six numbers."""
+
+    low: np.ndarray
+    high: np.ndarray
+
+
+class Variant(NamedTuple):
+    """A combination of options and what it gives.
+
+    Attributes:
+        options: of each choice the index of one.
+        score: sum of |ln(ours / printed)| over the twelve numbers.
+        numbers: six by scenario.
+        bands: of these, by scenario, where they depend on the last bits of the start; the numbers
+            are medians then.
+
+    """
+
+    options: tuple[int, ...]
+    score: float
+    numbers: Mapping[str, np.ndarray]
+    bands: Mapping[str, Bounds] | None = None
+
+    @property
+    def factor(self) -> float:
+        """Between ours and printed, in the geometric mean."""
+        return float(np.exp(self.score / sum(map(len, self.numbers.values()))))
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """The printed numbers of all variants.
+
+    Attributes:
+        numbers: by scenario, with L2 norms for efforts; an axis for each of `of_runs`, then for
+            SIGNALS, END_TIMES and the six. A choice that a scenario has not has one element, and a
+            run that has failed has NaN.
+        of_runs: choices that the runs depend on.
+        approaches: to the reference, by scenario; an axis for each of `of_runs`, then the two
+            numbers of :class:`.Approach`, which are NaN for a run that has not come there.
+
+    """
+
+    numbers: Mapping[str, np.ndarray]
+    of_runs: Sequence[Choice]
+    approaches: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def choices(self) -> tuple[Choice, ...]:
+        """All choices; the end time is the last."""
+        return (*self.of_runs, *OF_READING)
+
+    @cached_property
+    def scores(self) -> np.ndarray:
+        """Sum of |ln(ours / printed)|, an axis a choice; infinite where a run has failed."""
+        readings = [
+            sum(
+                _distance(as_read(numbers, *reading), PUBLISHED[scenario])
+                for scenario, numbers in self.numbers.items()
+            )
+            for reading in _READINGS
+        ]
+        together = np.nan_to_num(np.stack(readings, axis=-2), nan=np.inf)
+        shape = (len(ORDERS_OF_EFFORTS), len(FORMULAS), len(END_TIMES))
+        scores: np.ndarray = together.reshape(*together.shape[:-2], *shape)
+        return scores
+
+    def _scores(self, consistent: bool) -> np.ndarray:
+        if not consistent:
+            return self.scores
+        return np.where(contradicts_nothing(PROPOSED, self.choices), self.scores, np.inf)
+
+    @property
+    def ours(self) -> Variant:
+        """The variant that the scenarios have."""
+        return self.variant(tuple(choice.ours for choice in self.choices))
+
+    def nearest(self, consistent: bool) -> Variant:
+        """The variant whose score is least.
+
+        Args:
+            consistent: among those that contradict nothing that is printed; else among all.
+
+        """
+        scores = self._scores(consistent)
+        best = np.unravel_index(int(scores.argmin()), scores.shape)
+        return self.variant(tuple(map(int, best)))
+
+    def best_with_each(self, axis: int, consistent: bool) -> np.ndarray:
+        """The least score with each option of a choice, of variants as :meth:`nearest` takes them.
+
+        It is infinite where there is none.
+        """
+        others = tuple(other for other in range(len(self.choices)) if other != axis)
+        best: np.ndarray = self._scores(consistent).min(axis=others)
+        return best
+
+    def most_within(self, tolerance: float) -> int:
+        """How many of the twelve are at once no farther from the printed ones, at most."""
+        return max(
+            int(
+                sum(
+                    (
+                        np.abs(as_read(numbers, *reading) / PUBLISHED[scenario] - 1.0) <= tolerance
+                    ).sum(axis=-1, dtype=np.int8)
+                    for scenario, numbers in self.numbers.items()
+                ).max()
+            )
+            for reading in _READINGS
+        )
+
+    def efforts_within(self, formula: int) -> float:
+        """How near all six efforts are at once, in parts of the printed ones: the farthest of them.
+
+        At best, of what contradicts nothing that is printed and has come to the reference.
+        """
+        farthest = []
+        for scenario, numbers in self.numbers.items():
+            efforts = as_read(numbers, 0, formula)[..., :3]
+            away = np.abs(efforts / PUBLISHED[scenario][:3] - 1.0).max(axis=-1)
+            farthest.append(np.where(self._arrived(scenario, consistent=True), away, np.inf))
+        return float(np.maximum(*farthest).min())
+
+    def _arrived(self, scenario: str, consistent: bool) -> np.ndarray:
+        """What has come to the reference by its end, with axes for SIGNALS and END_TIMES last."""
+        arrived = np.asarray((self.numbers[scenario][..., 3:] <= REACHED).all(axis=-1))
+        if consistent:
+            arrived &= contradicts_nothing(scenario, (*self.of_runs, _SIGNALS, _T_FS))
+        return arrived
+
+    def span(self, scenario: str, consistent: bool, formula: int | None = None) -> Bounds:
+        """Over what has come to the reference by its end.
+
+        Args:
+            scenario: of the numbers.
+            consistent: of variants that contradict nothing that is printed; else of all.
+            formula: of the efforts, by FORMULAS; None: all.
+
+        """
+        arrived = self._arrived(scenario, consistent)
+        sixes = (
+            as_read(self.numbers[scenario], *reading)[arrived]
+            for reading in _READINGS
+            if formula in (None, reading[1])
+            and not (consistent and ORDERS_OF_EFFORTS[reading[0]].against)
+        )
+        lows, highs = zip(*((six.min(axis=0), six.max(axis=0)) for six in sixes), strict=True)
+        return Bounds(np.min(lows, axis=0), np.max(highs, axis=0))
+
+    def ways_of(self, scenario: str) -> list[Approach]:
+        """The ways to the reference of the runs that contradict nothing that is printed."""
+        approaches = self.approaches[scenario]
+        taken = contradicts_nothing(scenario, self.of_runs) & ~np.isnan(approaches[..., 0])
+        return [Approach(*way) for way in approaches[taken].tolist()]
+
+    def variant(self, options: tuple[int, ...]) -> Variant:
+        """What a combination of options gives."""
+        n, sixes = len(self.of_runs), {}
+        for scenario, numbers in self.numbers.items():
+            of_run = np.minimum(options[:n], np.subtract(numbers.shape[:n], 1))
+            sixes[scenario] = _six(numbers[tuple(of_run)], options[n:])
+        return Variant(options, float(self.scores[options]), sixes)
+
+    def over_starts(self, variant: Variant, quantiles: Mapping[str, np.ndarray]) -> Variant:
+        """A variant with medians and bands, where its numbers depend on the start's last bits.
+
+        Args:
+            variant: of these.
+            quantiles: the low, the median and the high of numbers as this class has them, over
+                moved starts, by scenario.
+
+        """
+        found = {
+            scenario: _six(three, variant.options[len(self.of_runs) :])
+            for scenario, three in quantiles.items()
+        }
+        if all((high - low <= SAME * np.abs(median)).all() for low, median, high in found.values()):
+            return variant
+        medians = {scenario: median for scenario, (_, median, _) in found.items()}
+        score = sum(_distance(six, PUBLISHED[scenario]) for scenario, six in medians.items())
+        bands = {scenario: Bounds(low, high) for scenario, (low, _, high) in found.items()}
+        return Variant(variant.options, float(score), medians, bands)
+
+
+class Found(NamedTuple):
+    """All variants, and the ones whose numbers are printed.
+
+    Attributes:
+        six: all with six degrees of freedom.
+        five: those with five that contradict nothing else, by medians over moved starts.
+        printed: what the scenarios have; the nearest of the six that contradicts nothing that is
+            printed, the nearest of all of them, and the nearest of the five.
+
+    """
+
+    six: Sensitivity
+    five: Sensitivity
+    printed: tuple[Variant, ...]
 
 
 def all_variants(
@@ -63,8 +281,14 @@ def all_variants(
     """
     check_installed()
     engine = BatchEngine({scenario: loaded(scenario)[1] for scenario in PUBLISHED})
-    six = _six(crew, engine, of_runs)
-    five = _five(crew, engine, of_five, searched)
+    made = _made(crew, of_runs, partial(_numbers_and_ways, engine), _BLOCK, "block of runs")
+    numbers, ways = (
+        {scenario: [each[i] for each in found] for scenario, found in made.items()} for i in (0, 1)
+    )
+    six = Sensitivity(_by_choice(numbers, of_runs), of_runs, _by_choice(ways, of_runs))
+    medians = partial(_medians, engine, searched)
+    made = _made(crew, of_five, medians, 1, "variant of five degrees of freedom")
+    five = Sensitivity(_by_choice(made, of_five), of_five)
     nearest = (
         (six, six.ours),
         (six, six.nearest(consistent=True)),
@@ -72,7 +296,7 @@ def all_variants(
         (five, five.nearest(consistent=True)),
     )
     tasks = {
-        (i, scenario): partial(quantiles_of, engine, _run_of(found, variant, scenario), shown)
+        (i, scenario): partial(quantiles_of, engine, _run(found, variant, scenario), shown)
         for i, (found, variant) in enumerate(nearest)
         for scenario in PUBLISHED
     }
@@ -84,71 +308,69 @@ def all_variants(
     return Found(six, five, printed)
 
 
-def _six(crew: Workers, engine: BatchEngine, of_runs: Sequence[Choice]) -> Sensitivity:
-    """Each combination by one run."""
+def _made(
+    crew: Workers,
+    of_runs: Sequence[Choice],
+    make: Callable[[Sequence[Point]], list[Any]],
+    size: int,
+    unit: str,
+) -> dict[str, list[Any]]:
+    """What workers make of all runs, of so many at a time, by scenario."""
     blocks = {
-        (scenario, first): partial(taken_of, engine, found[first : first + _BLOCK])
+        (scenario, first): partial(make, found[first : first + size])
         for scenario in PUBLISHED
         for found in [list(runs(scenario, of_runs))]
-        for first in range(0, len(found), _BLOCK)
+        for first in range(0, len(found), size)
     }
-    taken = dict(crew.results(blocks, "block of runs"))
-    numbers, approaches = {}, {}
-    for scenario in PUBLISHED:
-        parts = (taken[block] for block in blocks if block[0] == scenario)
-        sixes, pairs = map(np.concatenate, zip(*parts, strict=True))
-        numbers[scenario] = _by_choice(sixes, scenario, of_runs)
-        approaches[scenario] = _by_choice(pairs, scenario, of_runs)
-    return Sensitivity(numbers, approaches, of_runs)
-
-
-def _five(
-    crew: Workers, engine: BatchEngine, of_runs: Sequence[Choice], starts: Sequence[int]
-) -> Sensitivity:
-    """Each combination by medians over starts."""
-    tasks = {
-        (scenario, run.number): partial(quantiles_of, engine, run, starts)
+    taken = dict(crew.results(blocks, unit))
+    return {
+        scenario: [one for block in blocks if block[0] == scenario for one in taken[block]]
         for scenario in PUBLISHED
-        for run in runs(scenario, of_runs)
     }
-    taken = dict(crew.results(tasks, "variant of five degrees of freedom"))
-    middle = QUANTILES.index(0.5)
-    numbers, approaches = {}, {}
-    for scenario in PUBLISHED:
-        medians = np.stack([taken[task][middle] for task in tasks if task[0] == scenario])
-        numbers[scenario] = _by_choice(medians, scenario, of_runs)
-        approaches[scenario] = np.full(
-            (*numbers[scenario].shape[:-3], len(Approach._fields)), np.nan
-        )
-    return Sensitivity(numbers, approaches, of_runs)
 
 
-def _by_choice(found: np.ndarray, scenario: str, of_runs: Sequence[Choice]) -> np.ndarray:
+def _by_choice(
+    made: Mapping[str, Sequence[Any]], of_runs: Sequence[Choice]
+) -> dict[str, np.ndarray]:
     """With an axis for each choice in place of one for the runs."""
-    return found.reshape(*(len(options_of(each, scenario)) for each in of_runs), *found.shape[1:])
+    return {
+        scenario: np.reshape(
+            found, (*(len(options_of(each, scenario)) for each in of_runs), *np.shape(found[0]))
+        )
+        for scenario, found in made.items()
+    }
 
 
-def _run_of(found: Sensitivity, variant: Variant, scenario: str) -> Point:
+def _run(found: Sensitivity, variant: Variant, scenario: str) -> Point:
     """The run of a variant in a scenario."""
-    shape = found.numbers[scenario].shape[: len(found.of_runs)]
-    options = np.minimum(variant.options[: len(shape)], np.subtract(shape, 1))
-    all_runs = list(runs(scenario, found.of_runs))
-    return all_runs[int(np.ravel_multi_index(tuple(options), shape))]
+    open_there = (options_of(choice, scenario) for choice in found.of_runs)
+    chosen = zip(open_there, variant.options, strict=False)
+    return run_of(scenario, [options[min(i, len(options) - 1)] for options, i in chosen])
 
 
-def taken_of(engine: BatchEngine, block: Sequence[Point]) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers and ways of some runs, an axis for the runs first; a task for a worker.
+def _numbers_and_ways(
+    engine: BatchEngine, block: Sequence[Point]
+) -> list[tuple[np.ndarray, Sequence[float]]]:
+    """Numbers and ways of some runs; a task for a worker.
 
     Of a run that has failed they are not numbers, nor is the way of one that has not arrived.
     """
-    tables = [engine.table(run) for run in block]
-    approaches = [approach_of(table, errors(table)) or (np.nan, np.nan) for table in tables]
-    return np.stack([numbers_of(table) for table in tables]), np.array(approaches)
+    tables = map(engine.table, block)
+    return [
+        (numbers_of(table, END_TIMES), approach_of(table) or (np.nan, np.nan)) for table in tables
+    ]
+
+
+def _medians(
+    engine: BatchEngine, starts: Sequence[int], block: Sequence[Point]
+) -> list[np.ndarray]:
+    """The numbers of some runs in the middle of those from moved starts; a task for a worker."""
+    return [quantiles_of(engine, run, starts)[QUANTILES.index(0.5)] for run in block]
 
 
 def quantiles_of(engine: BatchEngine, run: Point, starts: Sequence[int]) -> np.ndarray:
     """The numbers of a run from moved starts, an axis for QUANTILES first; a task for a worker."""
-    found = [numbers_of(engine.table(each)) for each in moved(engine, run, starts)]
+    found = [numbers_of(engine.table(each), END_TIMES) for each in moved(engine, run, starts)]
     quantiles: np.ndarray = np.quantile(found, QUANTILES, axis=0)
     return quantiles
 
@@ -164,33 +386,14 @@ def moved(engine: BatchEngine, run: Point, starts: Sequence[int]) -> Iterator[Po
         )
 
 
-def errors(table: Table) -> np.ndarray:
-    """e of all rows at once, far sooner than :func:`.tracking_error` and equal up to rounding."""
-    _, theta, psi = table.group(*STANDARD.attitude).T
-    ahead = np.cos(theta) * np.cos(psi), np.cos(theta) * np.sin(psi), -np.sin(theta)
-    y = table.group(*STANDARD.position) + parameter(table, STANDARD.ell) * np.column_stack(ahead)
-    error: np.ndarray = y - table.group(*STANDARD.y_d)
-    return error
+def _six(numbers: np.ndarray, reading: Sequence[int]) -> np.ndarray:
+    """The six of a reading, of axes for SIGNALS, END_TIMES and the six, which come last."""
+    signal, order, formula, end = reading
+    six: np.ndarray = as_read(numbers[..., signal, :, :], order, formula)[..., end, :]
+    return six
 
 
-def numbers_of(table: Table) -> np.ndarray:
-    """Three L2 norms and three e_f, an axis each for SIGNALS and END_TIMES before the six.
-
-    Args:
-        table: of a run until the last of END_TIMES; what has failed before gives no numbers.
-
-    """
-    if table.time[-1] < END_TIMES[-1] - table.time[1]:
-        return np.full((len(SIGNALS), len(END_TIMES), 6), np.nan)
-    h = np.diff(table.time)[:, np.newaxis]
-    # Half a step is more than times are rounded by.
-    ends = np.searchsorted(table.time, np.subtract(END_TIMES, 0.5 * table.time[1]))
-    begins = np.searchsorted(table.time, table.time[ends] - LAST_SECONDS)
-    error = np.abs(errors(table))
-    final = np.stack([error[i : k + 1].max(axis=0) for i, k in zip(begins, ends, strict=True)])
-    # A row holds the signal of the step that ends there: the first one holds none.
-    efforts = (
-        np.sqrt(np.cumsum(table.group(*names)[1:] ** 2 * h, axis=0)[ends - 1])
-        for names in (STANDARD.applied, STANDARD.commanded)
-    )
-    return np.stack([np.hstack((effort, final)) for effort in efforts])
+def _distance(six: np.ndarray, published: np.ndarray) -> np.ndarray:
+    """Sum of |ln(ours / printed)| over six numbers."""
+    distance: np.ndarray = np.abs(np.log(six / published)).sum(axis=-1)
+    return distance

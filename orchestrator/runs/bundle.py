@@ -1,18 +1,21 @@
-"""The FMUs of the installed sources, built when they are needed, and their bill of materials.
+"""Building: the bundle of FMUs with its bill of materials, and the FMU of a user's own controller.
 
-`auv-fmu build` writes it where the user wants it. Runs use FMUs of their own in the user's cache
-folder, one folder for each version of the sources and each kind of FMU, so that nothing appears
-where they are called.
+`auv-fmu build` writes the bundle where the user wants it. Runs use FMUs of their own in the user's
+cache folder, one folder for each version of the sources and each kind of FMU, so that nothing
+appears where they are called.
 """
 
 from __future__ import annotations
 
 import json
+import keyword
+import re
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -29,68 +32,23 @@ from orchestrator.runs.folder import replaced
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import WRITABLE
 
-CHECKSUMS, BILL = "SHA256SUMS", "bom.cdx.json"
-
-
-def checksums(files: Sequence[Path]) -> bytes:
-    """Checksums as `sha256sum --check` reads them."""
-    return "".join(f"{digest_of(path)}  {path.name}\n" for path in files).encode()
-
-
-def bill(files: Sequence[Path], contained: Sequence[str]) -> bytes:
-    """CycloneDX 1.5: the files of the bundle and the packages whose code they contain.
-
-    Without time and serial number: the same bundle has the same bill.
-
-    Args:
-        files: of the bundle.
-        contained: the packages, besides ours.
-
-    """
-    ours, *others = map(_package, ("auv-fmu", *contained))
-    content = {
-        "bomFormat": "CycloneDX",
-        "specVersion": "1.5",
-        "version": 1,
-        "metadata": {"component": ours},
-        "components": [
-            *others,
-            *(
-                {
-                    "type": "file",
-                    "name": path.name,
-                    "hashes": [{"alg": "SHA-256", "content": digest_of(path)}],
-                }
-                for path in files
-            ),
-        ],
-        "dependencies": [
-            {"ref": ours["bom-ref"], "dependsOn": [package["bom-ref"] for package in others]}
-        ],
-    }
-    return (json.dumps(content, indent=2) + "\n").encode()
-
-
-def _package(name: str) -> dict[str, Any]:
-    reference = f"pkg:pypi/{name}@{version(name)}"
-    return {
-        "type": "library",
-        "bom-ref": reference,
-        "name": name,
-        "version": version(name),
-        "licenses": [{"license": {"id": "MIT"}}],
-        "purl": reference,
-    }
-
-
 #: Where `auv-fmu build` writes each kind unless another folder is named.
 DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "native")}
 
-#: The archive of the closed loop, and what was built beside it, from what.
-ARCHIVE, MANIFEST = "auv.ssp", "build.json"
+#: The archive of the closed loop, and what was built beside it, from what; with their papers.
+_ARCHIVE, MANIFEST = "auv.ssp", "build.json"
+_CHECKSUMS, _BILL = "SHA256SUMS", "bom.cdx.json"
 
 #: What the FMUs of runs are in the user's cache folder.
 _CATEGORY = "fmus"
+
+_TEMPLATES = Path(__file__).with_name("templates")
+
+#: What a script can stand on: plain PythonFMU, or the base that the bundle's components have.
+BASES = ("plain", "hardened")
+
+#: Names in the templates that give way to the user's own.
+_CLASS, _MODULE = "OwnController", "own_controller"
 
 
 def build(
@@ -120,7 +78,7 @@ def build(
         InputError: the folder cannot be written, or the FMUs cannot be built.
 
     """
-    with replaced(folder, (ARCHIVE, MANIFEST, CHECKSUMS, BILL), force=force) as unfinished:
+    with replaced(folder, (_ARCHIVE, MANIFEST, _CHECKSUMS, _BILL), force=force) as unfinished:
         # What is up to date is taken along, and not written anew.
         for path in (*folder.glob("*.fmu"), folder / MANIFEST):
             if path.is_file():
@@ -129,17 +87,66 @@ def build(
         options += ["--loader", loader] if loader is not None else []
         options += ["--platforms", platforms] if platforms is not None else []
         run_fmus("build", unfinished, *options)
-        archive = unfinished / ARCHIVE
+        archive = unfinished / _ARCHIVE
         archive.write_bytes(ssp_bytes(closed_loop(unfinished, versions=WRITABLE)))
         files = [*sorted(unfinished.glob("*.fmu")), archive]
-        (unfinished / CHECKSUMS).write_bytes(checksums(files))
-        (unfinished / BILL).write_bytes(bill(files, CONTAINED[kind]))
+        digests = {path.name: digest_of(path) for path in files}
+        # As `sha256sum --check` reads them.
+        lines = "".join(f"{digest}  {name}\n" for name, digest in digests.items())
+        (unfinished / _CHECKSUMS).write_bytes(lines.encode())
+        (unfinished / _BILL).write_bytes(_bill(digests, CONTAINED[kind]))
         for path in unfinished.iterdir():
             before = folder / path.name
             if before.is_file() and before.read_bytes() == path.read_bytes():
                 path.unlink()
         written = sorted(path.name for path in unfinished.iterdir())
     return [folder / name for name in written]
+
+
+def _bill(digests: Mapping[str, str], contained: Sequence[str]) -> bytes:
+    """CycloneDX 1.5: the files of the bundle and the packages whose code they contain.
+
+    Without time and serial number: the same bundle has the same bill.
+
+    Args:
+        digests: SHA-256 of the files of the bundle, by their names.
+        contained: the packages, besides ours.
+
+    """
+    ours, *others = map(_package, ("auv-fmu", *contained))
+    content = {
+        "bomFormat": "CycloneDX",
+        "specVersion": "1.5",
+        "version": 1,
+        "metadata": {"component": ours},
+        "components": [
+            *others,
+            *(
+                {
+                    "type": "file",
+                    "name": name,
+                    "hashes": [{"alg": "SHA-256", "content": digest}],
+                }
+                for name, digest in digests.items()
+            ),
+        ],
+        "dependencies": [
+            {"ref": ours["bom-ref"], "dependsOn": [package["bom-ref"] for package in others]}
+        ],
+    }
+    return (json.dumps(content, indent=2) + "\n").encode()
+
+
+def _package(name: str) -> dict[str, Any]:
+    reference = f"pkg:pypi/{name}@{version(name)}"
+    return {
+        "type": "library",
+        "bom-ref": reference,
+        "name": name,
+        "version": version(name),
+        "licenses": [{"license": {"id": "MIT"}}],
+        "purl": reference,
+    }
 
 
 def settings_of(folder: Path) -> dict[str, str]:
@@ -209,3 +216,85 @@ def _built(key: str, *options: str) -> Path:
         run_fmus("build", Path(temporary), *options)
         files = {path.name: path.read_bytes() for path in sorted(Path(temporary).iterdir())}
     return keep(_CATEGORY, key, files)[0].parent
+
+
+def new_controller(name: str, folder: Path | None = None, base: str = BASES[0]) -> list[Path]:
+    """Make a folder with a controller that runs in the closed loop.
+
+    Args:
+        name: of the controller, `MyLaw` or `my_law`.
+        folder: made if it does not exist; None: one with the name, in the current folder.
+        base: one of :data:`BASES`.
+
+    Returns:
+        The script, the scenario, the README and the FMU.
+
+    Raises:
+        InputError: the name is not usable, the folder is not empty or cannot be written.
+
+    """
+    module, class_name = _names(name)
+    folder = Path(name) if folder is None else folder
+    contents = {
+        f"{module}.py": f"{base}.py.txt",
+        "scenario.toml": "scenario.toml",
+        "README.md": "README.md",
+    }
+    if folder.is_dir() and any(folder.iterdir()):
+        raise InputError(f"{folder}: is not empty, and nothing in it is replaced")
+    with replaced(folder, contents) as unfinished:
+        for target, template in contents.items():
+            text = (_TEMPLATES / template).read_text(encoding="utf-8")
+            text = text.replace(_CLASS, class_name).replace(_MODULE, module)
+            (unfinished / target).write_text(text, encoding="utf-8")
+    return [*(folder / target for target in contents), build_own(folder / f"{module}.py")]
+
+
+def build_own(
+    script: Path,
+    folder: Path | None = None,
+    loader: str | None = None,
+    *,
+    force: bool = False,
+) -> Path:
+    """Build the FMU of a user's script.
+
+    Args:
+        script: a Python file with one slave.
+        folder: of the FMU, which gets the name of the slave's class; None: the script's own.
+        loader: `native` or `plain`; None: native where it can be compiled.
+        force: move aside a file of the user's that has the name of the FMU.
+
+    Raises:
+        InputError: the script is missing or fails, or the folder cannot be written.
+
+    """
+    if not (script.is_file() and script.suffix == ".py"):
+        raise InputError(f"{script}: no such Python file")
+    options = [str(script), *(("--loader", loader) if loader else ())]
+    with TemporaryDirectory(dir=process_folder()) as temporary:
+        [built] = run_fmus("python.own", Path(temporary), *options)
+        place = script.parent if folder is None else folder
+        with replaced(place, [built.name], force=force) as unfinished:
+            shutil.copyfile(built, unfinished / built.name)
+    return place / built.name
+
+
+def _names(name: str) -> tuple[str, str]:
+    """Names of the module and of the class.
+
+    Raises:
+        InputError: Python would not take them, or has such a module already.
+
+    """
+    if not (name.isascii() and name.isidentifier() and name[0].isalpha()):
+        raise InputError(
+            f"{name!r}: not a name for a controller; use letters, digits and underscores, a "
+            "letter first"
+        )
+    module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+    words = [word for word in module.split("_") if word]
+    class_name = name if name[0].isupper() else "".join(word.capitalize() for word in words)
+    if keyword.iskeyword(module) or keyword.iskeyword(class_name) or find_spec(module):
+        raise InputError(f"{name!r}: {module} is taken in Python; choose another name")
+    return module, class_name

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
 
 from auv_fmu.euler import STEP
 from orchestrator.machine.errors import Findings, InputError
@@ -25,17 +24,14 @@ from orchestrator.master.observers.observer import Ending, Observer
 from orchestrator.master.plan import Identity, Plan, identity, planned
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.inputs import Inputs, read_inputs
 from orchestrator.runs.loading import doubts_of, first_given, loaded
 from orchestrator.runs.request import Request
-from orchestrator.runs.scenario import Scenario, check_events, read_scenario
+from orchestrator.runs.scenario import Inputs, Scenario, check_events, read_inputs, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.runs.wiring import closed_loop, read_wiring
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 from orchestrator.vehicle.signals import STANDARD
-
-T = TypeVar("T")
 
 #: The components that a comparison exchanges, and keeps.
 CONTROLLER, PLANNER = STANDARD.controller, STANDARD.planner
@@ -52,7 +48,7 @@ class Prepared:
     """A run that is ready to be made, and the scenario that it comes from.
 
     Attributes:
-        scenario: as its file has it.
+        scenario: as its file has it, with the events that the request has in their place.
         plan: the system, and its steps.
         isolation: of the FMUs in processes of their own; None: they run in this one.
         loop: that makes the steps.
@@ -136,20 +132,19 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     """
     findings, values = Findings(request.strict), request.values
     system = system.with_parameters(values)
-    input_table, inputs = None, scenario.inputs
-    if request.inputs is not None:
-        inputs = Inputs(Path(request.inputs))
+    if request.inputs is None:
+        inputs, given = scenario.inputs, {*values, *scenario.parameters}
+    else:
+        inputs, given = Inputs(Path(request.inputs)), {*values}
+    input_table = None
     if inputs is not None:
-        given = set(values)
-        if request.inputs is None:
-            given |= set(scenario.parameters)
         with findings.collecting():
             system, input_table = read_inputs(inputs, system, given)
-    events = _events(request)
-    if events is None:
-        events = scenario.events
-    else:
-        check_events("events", events)
+    if isinstance(request.events, str):
+        scenario = replace(scenario, events=read_scenario(request.events).events)
+    elif request.events is not None:
+        check_events("events", request.events)
+        scenario = replace(scenario, events=request.events)
     stop_time = first_given(request.stop_time, scenario.stop_time, system.stop_time)
     if stop_time is None:
         raise InputError(f"{scenario.name}: names no stop time; give one with --stop-time")
@@ -157,8 +152,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     step = first_given(request.step, scenario.step, system.step)
     if step is None:
         system = with_common_step(system)
-        step = first_given(system.step, DEFAULT_STEP)
-        assert step is not None
+        step = DEFAULT_STEP if system.step is None else system.step
     order = request.order or scenario.order or ORDERS[0]
     coupling = first_given(request.coupling, scenario.coupling)
     if request.strict and coupling is None and order == GAUSS_SEIDEL:
@@ -166,21 +160,13 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     experiment = Experiment(stop_time, step, order, system.start_time or 0.0, coupling)
     plan = planned(system, experiment)
     with findings.collecting():
-        happening = read_events(scenario.name, events, replace(system, step=step))
+        events = read_events(scenario.name, scenario.events, replace(system, step=step))
     findings.refuse()
     isolation = isolation_of(request.isolate, request.step_timeout)
     loop = chosen(request.loop, experiment, isolation)
     if request.real_time is not None:
         check_factor(request.real_time)
-    return Prepared(
-        scenario,
-        plan,
-        isolation,
-        loop,
-        request.real_time,
-        happening,
-        input_table,
-    )
+    return Prepared(scenario, plan, isolation, loop, request.real_time, events, input_table)
 
 
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
@@ -210,16 +196,14 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         for name, step in {**scenario.steps, **request.steps}.items()
         if name in system.components
     }
-    events = _events(request)
-    if events is None:
-        events = companion.events or scenario.events
+    own = companion.events if request.events is None else ()
     same = replace(
         companion,
         stop_time=scenario.stop_time,
         step=scenario.step,
         order=scenario.order,
         coupling=scenario.coupling,
-        events=shared_events(events, system),
+        events=shared_events(own or scenario.events, system),
         inputs=scenario.inputs or companion.inputs,
     )
     wanted = replace(request, parameters=shared, steps=steps, events=None)
@@ -286,10 +270,3 @@ def _beside(
         if name in new.components and name != PLANNER
     }
     return replace(companion, parameters=values), replace(new.with_parameters(values), steps=steps)
-
-
-def _events(request: Request) -> Sequence[Mapping[str, Any]] | None:
-    """The events that a request has in the place of the scenario's; None: the scenario's own."""
-    if isinstance(request.events, str):
-        return read_scenario(request.events).events
-    return request.events

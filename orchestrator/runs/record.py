@@ -1,25 +1,38 @@
-"""`run.json`: what a result was made from, and with what."""
+"""What a run leaves, written and read again: `run.json` says of what it was made; checkpoints."""
 
 from __future__ import annotations
 
 import json
 import platform
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, fields
 from datetime import UTC, datetime
 from importlib.metadata import version
+from math import inf, isfinite
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
+import numpy as np
+
 from fmus.kinds import NATIVE, PYTHON
-from orchestrator.machine.ledger import RECORD
-from orchestrator.master import plan as identity
+from orchestrator.figures.style import Drawn
+from orchestrator.figures.visible import VisibleRows
+from orchestrator.formats.tables import read_columns, read_rows
+from orchestrator.machine.errors import InputError
+from orchestrator.machine.ledger import RECORD, is_changed, located
+from orchestrator.machine.user_files import explained, text_of
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.binary import runs_python
+from orchestrator.master.hooks.checkpoint import (
+    Checkpoints,
+    check_gives_states,
+    interval_in,
+)
 from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
+from orchestrator.master.plan import PACKAGES, digest_of
 from orchestrator.runs.preparation import Prepared
 from orchestrator.system.names import port_name
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
@@ -31,8 +44,14 @@ METRICS = "metrics.json"
 TABLES = tuple(f"result.{ending}" for ending in FORMATS)
 FILES = (*TABLES, METRICS, RECORD)
 
+#: The folder of checkpoints, within the folder of the result.
+CHECKPOINTS = "checkpoint"
+
 #: Packages whose versions a result depends on.
-PACKAGES = (*identity.PACKAGES, "matplotlib")
+_PACKAGES = (*PACKAGES, "matplotlib")
+
+#: What a file is not that cannot be read.
+_WHAT = "not the record of a run"
 
 
 class Stopwatch:
@@ -82,7 +101,7 @@ def write_record(
         "label": prepared.scenario.label,
         "z_up": prepared.scenario.z_up,
         "sha256": prepared.scenario.digest,
-        "identity": identity.digest_of(prepared.identity),
+        "identity": digest_of(prepared.identity),
         "command": list(command),
         **clock.times(),
         "failure": ending.failure,
@@ -104,21 +123,26 @@ def write_record(
             for component in prepared.system.components.values()
         },
         "parameters": {str(name): value for name, value in header.parameters.items()},
-        "versions": {"python": sys.version.split()[0]}
-        | {package: version(package) for package in PACKAGES},
-        "platform": platform.platform(),
     }
     write_files(folder, content)
 
 
-def write_files(folder: Path, content: dict[str, Any]) -> None:
-    """Write a record, with the names of all files beside it."""
+def write_files(
+    folder: Path, content: Mapping[str, object], packages: Sequence[str] = PACKAGES
+) -> None:
+    """Write a record, with versions, the platform, and the names of all files beside it."""
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    text = json.dumps({**content, "files": sorted(files | {RECORD})}, indent=2)
-    (folder / RECORD).write_text(text + "\n", encoding="utf-8")
+    whole = {
+        **content,
+        "versions": {"python": platform.python_version()}
+        | {package: version(package) for package in packages},
+        "platform": platform.platform(),
+        "files": sorted(files | {RECORD}),
+    }
+    (folder / RECORD).write_text(json.dumps(whole, indent=2) + "\n", encoding="utf-8")
 
 
-def read_ending(record: dict[str, Any]) -> Ending:
+def _ending_in(record: dict[str, Any]) -> Ending:
     """How a run has ended, from its record."""
     events = record.get("events", ())
     return Ending(
@@ -128,7 +152,7 @@ def read_ending(record: dict[str, Any]) -> Ending:
     )
 
 
-def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
+def _header_in(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
     """The header of a table, from the record beside it."""
     stated = record["experiment"]
     known = {field.name: stated[field.name] for field in fields(Experiment) if field.name in stated}
@@ -141,6 +165,184 @@ def read_header(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
     )
 
 
-def read_loops(record: dict[str, Any]) -> tuple[Loop, ...]:
+def _loops_in(record: dict[str, Any]) -> tuple[Loop, ...]:
     """The loops of the vehicles of a run, from its record; of one without, the standard one."""
     return tuple(Loop(**names) for names in record.get("vehicles", ())) or (STANDARD,)
+
+
+def read_result(
+    path: Path, watched: Callable[[Sequence[str]], Collection[str]] | None = None
+) -> Drawn:
+    """What can be seen of a stored result, by its name.
+
+    Args:
+        path: a folder that a run has written, or a table in CSV or Parquet. Of a table without a
+            record beside it, no parameters are known.
+        watched: chooses the columns that will be drawn among the ones there are; None: what the
+            paper's figures draw.
+
+    Raises:
+        InputError: there is no result, or it cannot be read.
+
+    """
+    file = table_in(path)
+    record = read_record(file)
+    texts = record.get("texts", [])
+    place = located(file)
+    columns = tuple(name for name in read_columns(place) if name not in texts)
+    blocks = read_rows(place, texts)
+    first = next(blocks, None)
+    if first is None:
+        raise InputError(f"{file}: has no rows")
+    loops = _loops_in(record)
+    drawn = {name for loop in loops for name in loop.drawn()}
+    table = VisibleRows(drawn if watched is None else watched(columns))
+    table.begin(_header(record, columns, first, file))
+    table.take(first)
+    for rows in blocks:
+        table.take(rows)
+    table.end(_ending_in(record))
+    label = str(record.get("label") or record.get("scenario") or file.stem)
+    return Drawn(label, table, bool(record.get("z_up")), loops)
+
+
+def table_in(path: Path) -> Path:
+    """The file with the table of a result.
+
+    Raises:
+        InputError: there is none.
+
+    """
+    with explained(path, "not the name of a result"):
+        for file in (path, *(path / name for name in TABLES)):
+            if located(file).is_file():
+                return file
+    raise InputError(f"{path}: holds no result.csv or result.parquet")
+
+
+def changed_files(table: Path) -> list[Path]:
+    """The table of a result and its record, as far as they are not what the run wrote."""
+    return [file for file in (table, table.with_name(RECORD)) if is_changed(file)]
+
+
+def read_record(table: Path) -> dict[str, Any]:
+    """The record of the run that has written a table; empty if none beside it names the table.
+
+    Raises:
+        InputError: it is broken.
+
+    """
+    file = located(table.with_name(RECORD))
+    if not file.exists():
+        return {}
+    with explained(file, _WHAT):
+        record = json.loads(text_of(file, _WHAT))
+        try:
+            if table.name not in record["files"]:
+                return {}
+            header, *_ = _header_in(record, ()), _ending_in(record), _loops_in(record)
+            frozenset(record.get("texts", []))
+        except (KeyError, TypeError, AttributeError):
+            raise ValueError("it lacks what a run writes") from None
+        except InputError as error:
+            raise ValueError(str(error)) from None
+        if not all(map(_is_value, header.parameters.values())):
+            raise ValueError("it holds parameters that no run has")
+    return dict(record)
+
+
+def _is_value(value: object) -> bool:
+    return isfinite(value) if isinstance(value, float) else isinstance(value, int | str)
+
+
+def _header(
+    record: dict[str, Any], columns: tuple[str, ...], rows: np.ndarray, file: Path
+) -> Header:
+    """The header of a table, with its first rows; where no record tells the step, the first is."""
+    if record:
+        return _header_in(record, columns)
+    step = float(rows[1, 0] - rows[0, 0]) if len(rows) > 1 else 1.0
+    if not 0.0 < step < inf:
+        raise InputError(f"{file}: times must grow")
+    return Header(columns, Experiment(step, step))
+
+
+def checkpoints_of(
+    runs: Sequence[Prepared],
+    folders: Sequence[Path],
+    every: float | None,
+    resume: bool,
+    force: bool = False,
+    token: str = "",
+    say: Callable[[str], None] = lambda _: None,
+) -> list[Checkpoints]:
+    """The checkpoints of some runs, one after the other.
+
+    Args:
+        runs: whose results go into a folder: of the first into it, of the others below it.
+        folders: of their checkpoints.
+        every: one for so many simulated seconds [s]; None: as often as before, if runs are resumed.
+        resume: begin with those that are there.
+        force: move aside what is there otherwise.
+        token: random, for new ones; empty: one is drawn.
+        say: takes notes for the user.
+
+    Returns:
+        None at all, if none are wanted.
+
+    Raises:
+        InputError: there is nothing to resume, or something else; or an FMU has no state.
+
+    """
+    if resume and every is None:
+        every = interval_in(folders[0])
+        if every is None:
+            raise InputError(
+                f"there is nothing to resume in {folders[0]}; a run leaves something there with "
+                "--checkpoint-every"
+            )
+    if every is None:
+        return []
+    for prepared in runs:
+        check_gives_states(prepared.system)
+    found = [
+        Checkpoints(folder, prepared.identity, every, resume, force, token)
+        for folder, prepared in zip(folders, runs, strict=True)
+    ]
+    for checkpoints in found:
+        # FMUs may change the current folder.
+        checkpoints.folder = checkpoints.folder.absolute()
+    times = [checkpoints.time for checkpoints in found]
+    for prepared, time in zip(runs, times, strict=True):
+        if time is not None:
+            say(f"{prepared.scenario.name}: goes on at t = {time:g} s")
+    if resume and not any(times):
+        say(f"there is nothing to resume in {folders[0]}: begins at the start")
+    return found
+
+
+def leave(
+    kept: Sequence[Checkpoints], is_whole: bool, say: Callable[[str], None] = lambda _: None
+) -> None:
+    """Remove checkpoints that are not needed any more, or say where they are.
+
+    Args:
+        kept: of runs that belong together.
+        is_whole: whether all of these have come to their end.
+        say: takes notes for the user.
+
+    """
+    # The folder with the first one's holds the others'.
+    for checkpoints in reversed(kept):
+        if is_whole:
+            checkpoints.remove()
+        elif checkpoints.time is not None:
+            place = _shown(checkpoints.folder)
+            say(f"--resume goes on from t = {checkpoints.time:g} s, from {place}")
+
+
+def _shown(folder: Path) -> Path:
+    """A folder as it is called from the current one, if that holds it."""
+    with suppress(OSError, ValueError):
+        return folder.relative_to(Path.cwd())
+    return folder

@@ -23,9 +23,15 @@ from orchestrator.master.observers.table import Table
 from orchestrator.runs.folder import locked, replaced
 from orchestrator.runs.loading import check_brings_its_own, loaded, warned
 from orchestrator.runs.preparation import Prepared, prepare
-from orchestrator.runs.record import FILES, Stopwatch, write_metrics, write_record
+from orchestrator.runs.record import (
+    FILES,
+    Stopwatch,
+    checkpoints_of,
+    leave,
+    write_metrics,
+    write_record,
+)
 from orchestrator.runs.request import Request
-from orchestrator.runs.resume import checkpoints_of, leave
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System

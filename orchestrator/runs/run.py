@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from shutil import rmtree
@@ -35,9 +36,16 @@ from orchestrator.master.observers.observer import (
 )
 from orchestrator.runs.folder import INCOMPLETE, inner, place_of, publish, replaced
 from orchestrator.runs.preparation import Prepared
-from orchestrator.runs.record import FILES, Stopwatch, write_metrics, write_record
+from orchestrator.runs.record import (
+    CHECKPOINTS,
+    FILES,
+    Stopwatch,
+    checkpoints_of,
+    leave,
+    write_metrics,
+    write_record,
+)
 from orchestrator.runs.request import Files
-from orchestrator.runs.resume import FOLDER, checkpoints_of, leave
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import file_name
 from orchestrator.system.structure import System
@@ -73,32 +81,6 @@ class Finished:
     notes: Sequence[str] = ()
 
 
-@dataclass
-class _Done:
-    """A run that has ended: its folder, what metrics.json will hold, and what figures show."""
-
-    folder: Path
-    prepared: Prepared
-    metrics: dict[str, Any]
-    seen: VisibleRows
-    ending: Ending
-    real_time: RealTime | None
-    resumed_at: float | None
-
-    @property
-    def remarks(self) -> dict[str, object]:
-        """What else the record says."""
-        return {
-            **({} if self.real_time is None else {"real_time": self.real_time.record()}),
-            **({} if self.resumed_at is None else {"resumed_at": self.resumed_at}),
-        }
-
-    @property
-    def notes(self) -> list[str]:
-        """What else the user is told, in lines."""
-        return [] if self.real_time is None else [str(self.real_time)]
-
-
 def run_into(
     folder: Path,
     runs: Sequence[Prepared],
@@ -129,7 +111,7 @@ def run_into(
     # there are rows to lose.
     np.linalg.inv(np.eye(1))
     clock = Stopwatch()
-    done: list[_Done] = []
+    done: list[_Running] = []
     loops = loops_of(runs[0].system)
     figures = figure_files(runs[0].scenario.figure, runs[0].scenario.stem, loops)
     folders = _folders(runs, figures)
@@ -145,7 +127,7 @@ def run_into(
     ):
         kept = checkpoints_of(
             runs,
-            [inner(folder, FOLDER, *filter(None, [below])) for below in folders],
+            [inner(folder, CHECKPOINTS, *filter(None, [below])) for below in folders],
             files.checkpoint_every,
             files.resume,
             files.force,
@@ -162,17 +144,15 @@ def run_into(
                 target = unfinished / below
                 target.mkdir(exist_ok=True)
                 run = _Running(target, prepared, files, columns, checkpoints)
-
-                def give_up(run: _Running = run) -> None:
-                    _give_up(run, done, unfinished, folder, command, clock, say)
-
+                give_up = partial(_give_up, run, done, unfinished, folder, command, clock, say)
                 with interrupts.insistence(give_up):
                     ending = prepared.run(run.observers, run.hooks)
-                done.append(run.ended(ending))
+                run.end(ending)
+                done.append(run)
                 missed = [] if ending.failure else prepared.missed(ending)
                 said = [f"did not happen: {event}" for event in missed]
-                said += cautions_beside(done[-1].seen, runs[0].scenario.name, done[0].seen, loops)
-                said += cautions_after(done[-1].seen, loops_of(prepared.system))
+                said += cautions_beside(run.seen, runs[0].scenario.name, done[0].seen, loops)
+                said += cautions_after(run.seen, loops_of(prepared.system))
                 for caution in said:
                     say(f"warning: {prepared.scenario.name}: {caution}")
                 if interrupts:
@@ -205,7 +185,7 @@ def run_into(
 
 
 class _Running:
-    """A run and the observers of its rows."""
+    """A run and the observers of its rows, and what has come of it once it has ended."""
 
     def __init__(
         self,
@@ -215,12 +195,13 @@ class _Running:
         columns: Sequence[str] | None,
         checkpoints: Checkpoints | None,
     ) -> None:
-        self._folder, self._prepared = folder, prepared
+        self.folder, self.prepared = folder, prepared
+        self.ending, self.metrics = Ending(), dict[str, Any]()
         loops = loops_of(prepared.system)
         self._metrics = Metrics(loops)
         # Without figures only the cautions look at what was seen.
         seen = watched if files.no_figures else Loop.drawn
-        self._seen = VisibleRows({name for loop in loops for name in seen(loop)})
+        self.seen = VisibleRows({name for loop in loops for name in seen(loop)})
         self._table = FORMATS[files.format](folder / f"result.{files.format}")
         self.observers: list[Observer] = [
             Selection(self._table, files.interval, columns),
@@ -229,46 +210,50 @@ class _Running:
                 for loop, vehicle in suffixes(loops).items()
             ),
             self._metrics,
-            self._seen,
+            self.seen,
             Progress(prepared.scenario.name),
         ]
         self.hooks: list[Hook] = []
+        self._real_time = None if prepared.real_time is None else RealTime(prepared.real_time)
         self._resumed_at = None
         if checkpoints is not None:
             self.observers.append(checkpoints)
             self.hooks.append(checkpoints)
             self._resumed_at = checkpoints.time
-        self._real_time = None if prepared.real_time is None else RealTime(prepared.real_time)
         if self._real_time is not None:
             self.hooks.append(self._real_time)
 
-    def ended(self, ending: Ending) -> _Done:
-        """When its observers have been told the end."""
-        values = self._metrics.content(self._prepared.scenario.name, self._prepared.system)
-        return self._done(values, ending)
+    def end(self, ending: Ending) -> None:
+        """Take note of the end, of which its observers have been told."""
+        self.ending = ending
+        self.metrics = self._metrics.content(self.prepared.scenario.name, self.prepared.system)
 
-    def given_up(self) -> _Done:
-        """Without what else can end it."""
-        ending = Ending("was ended: an FMU did not return from its step")
-        self._table.end(ending)
-        values = {"scenario": self._prepared.scenario.name, "failure": ending.failure}
-        return self._done(values, ending)
+    def give_up(self) -> None:
+        """End it without what else can end it."""
+        self.ending = Ending("was ended: an FMU did not return from its step")
+        self._table.end(self.ending)
+        self.metrics = {
+            "scenario": self.prepared.scenario.name,
+            "failure": self.ending.failure,
+        }
 
-    def _done(self, metrics: dict[str, Any], ending: Ending) -> _Done:
-        return _Done(
-            self._folder,
-            self._prepared,
-            metrics,
-            self._seen,
-            ending,
-            self._real_time,
-            self._resumed_at,
-        )
+    @property
+    def remarks(self) -> dict[str, object]:
+        """What else the record says."""
+        return {
+            **({} if self._real_time is None else {"real_time": self._real_time.record()}),
+            **({} if self._resumed_at is None else {"resumed_at": self._resumed_at}),
+        }
+
+    @property
+    def notes(self) -> list[str]:
+        """What else the user is told, in lines."""
+        return [] if self._real_time is None else [str(self._real_time)]
 
 
 def _give_up(
     run: _Running,
-    done: Sequence[_Done],
+    done: Sequence[_Running],
     unfinished: Path,
     folder: Path,
     command: Sequence[str],
@@ -278,9 +263,10 @@ def _give_up(
     """Keep what is there and end the process; the thread that steps the FMUs never will."""
     try:
         (unfinished / _SPARE).unlink()
-        _write_ends([*done, last := run.given_up()], command, clock)
+        run.give_up()
+        _write_ends([*done, run], command, clock)
         place = publish(Ledger(folder))
-        say(f"{last.prepared.scenario.name} {last.ending.failure}; its rows are in {place}")
+        say(f"{run.prepared.scenario.name} {run.ending.failure}; its rows are in {place}")
         rmtree(process_folder(), ignore_errors=True)
     except Exception as error:
         say(f"ended: an FMU did not return; its rows are in {unfinished}: {reason(error)}")
@@ -288,7 +274,7 @@ def _give_up(
         os._exit(_FAILED)
 
 
-def _write_ends(done: Sequence[_Done], command: Sequence[str], clock: Stopwatch) -> None:
+def _write_ends(done: Sequence[_Running], command: Sequence[str], clock: Stopwatch) -> None:
     """Write what is written last; the record of the first names the files of all."""
     for run in reversed(done):
         write_metrics(run.folder, run.metrics)
@@ -297,7 +283,7 @@ def _write_ends(done: Sequence[_Done], command: Sequence[str], clock: Stopwatch)
 
 
 def _draw(
-    scenario: Scenario, done: Sequence[_Done], folder: Path, interrupts: Interrupts
+    scenario: Scenario, done: Sequence[_Running], folder: Path, interrupts: Interrupts
 ) -> list[str]:
     """Draw all figures or, where one of them cannot be written, none; notes on what is left out."""
     drawn = [
@@ -321,7 +307,7 @@ def _draw(
 
 def _folders(runs: Sequence[Prepared], figures: Sequence[str]) -> list[str]:
     """The folder of each run, from the first one's on."""
-    taken = [*FILES, _certificates(""), *figures, FOLDER, INCOMPLETE, LEDGER]
+    taken = [*FILES, _certificates(""), *figures, CHECKPOINTS, INCOMPLETE, LEDGER]
     return ["", *(file_name(prepared.scenario.name, taken) for prepared in runs[1:])]
 
 

@@ -1,21 +1,29 @@
-"""Scenarios: a title, a stop time and parameters over the closed loop, in a TOML file."""
+"""Scenarios: parameters and more over the closed loop in a TOML file, and the tables they name."""
 
 from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from auv_fmu import path_planner
+from auv_fmu.actuators import Limits
+from auv_fmu.path_planner import MOST, Parameters, Waypoints
+from auv_fmu.vehicle import Vehicle
+from orchestrator.formats.tables import read_columns, read_rows, records
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import explained, names_in, path_of, text_of
 from orchestrator.master.experiment import Order
-from orchestrator.runs.inputs import Inputs
-from orchestrator.runs.waypoints import path_parameters
+from orchestrator.master.hooks.timing import InputTable
 from orchestrator.system.names import PortName, file_name, flattened, port_name
-from orchestrator.vehicle.signals import STANDARD
+from orchestrator.system.structure import System
+from orchestrator.system.values import finite, type_of, typed
+from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
 #: What a message calls a file that cannot be read.
 _WHAT = "not a scenario"
@@ -24,6 +32,29 @@ FOLDER = Path(__file__).parent / "scenarios"
 
 #: What is run besides the scenarios that come with the bundle.
 _OTHERS = "a .toml, .ssp, .ssd or .fmu file, an OspSystemStructure.xml, or a folder with a .ssd"
+
+#: So many seconds are farther apart than two numbers can be, apart from rounding [s].
+_FARTHEST = 1e308
+
+#: The model of the planners that run through waypoints.
+_PATH_PLANNER = "PathPlanner"
+
+#: The columns of a table of waypoints, without times and with them.
+_PLACE, _TIMED = ["x", "y", "z"], ["t", "x", "y", "z"]
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """A table of inputs, as a scenario or the command line names it.
+
+    Attributes:
+        file: with the table.
+        between: what continuous Real inputs do between two rows, `linear` or `hold`.
+
+    """
+
+    file: Path
+    between: str = "linear"
 
 
 @dataclass(frozen=True)
@@ -107,7 +138,11 @@ def _scenario(path: Path, text: str) -> Scenario:
         port_name(key): value for key, value in flattened(content.get("parameters", {}))
     }
     if "path" in content:
-        content["parameters"] |= _path_parameters(path, content.pop("path"), content["parameters"])
+        said, others = content.pop("path"), content["parameters"]
+        found = path_parameters(path.parent / said["file"], said.get("component", STANDARD.planner))
+        for name in found.keys() & others.keys():
+            raise InputError(f"{path}: {name} is given by {said['file']} already")
+        content["parameters"] |= found
     if "inputs" in content:
         said = content["inputs"]
         content["inputs"] = Inputs(**said | {"file": path.parent / said["file"]})
@@ -121,11 +156,138 @@ def _scenario(path: Path, text: str) -> Scenario:
     return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
 
 
-def _path_parameters(
-    path: Path, said: Mapping[str, str], others: Mapping[PortName, Any]
-) -> dict[PortName, Any]:
-    """What a path comes to, in a scenario with other parameters."""
-    found = path_parameters(path.parent / said["file"], said.get("component", STANDARD.planner))
-    for name in found.keys() & others.keys():
-        raise InputError(f"{path}: {name} is given by {said['file']} already")
-    return found
+def read_inputs(
+    inputs: Inputs, system: System, given: Collection[PortName]
+) -> tuple[System, InputTable]:
+    """A system that begins with the first values of a table, and what follows.
+
+    Args:
+        inputs: that are wanted.
+        system: that has them.
+        given: ports that have values from where the table is named: it must not name them, too.
+
+    Raises:
+        InputError: the table cannot be read, or a column is no input that is to be had.
+
+    """
+    file = inputs.file
+    targets = tuple(system.named(port_name(name)) for name in read_columns(file))
+    rows = np.vstack([np.empty((0, 1 + len(targets))), *read_rows(file)])
+    try:
+        _check_rows(rows, targets)
+        for target, column in zip(targets, rows[:, 1:].T, strict=True):
+            if target in map(system.named, given):
+                raise InputError(f"{target} is given a value of its own beside the table")
+            _check_column(system, target, column)
+        linear = [_is_linear(system, target, inputs.between) for target in targets]
+        input_table = InputTable(targets, rows[:, 0], rows[:, 1:], np.array(linear))
+        start = system.start_time or 0.0
+        values = map(_number, input_table.at(start, int((input_table.times <= start).sum()) - 1))
+        return system.with_parameters(dict(zip(targets, values, strict=True))), input_table
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from error
+
+
+def _check_rows(rows: np.ndarray, targets: tuple[PortName, ...]) -> None:
+    if not len(rows) or not targets:
+        raise InputError("holds no inputs: write a column time, one for each input, and rows")
+    if len(set(targets)) < len(targets):
+        raise InputError("two columns have the same name")
+    if not np.isfinite(rows).all():
+        raise InputError("all times and values must be finite")
+    if (rows[1:, 0] < rows[:-1, 0]).any():
+        raise InputError("times must not fall")
+    if rows[-1, 0] / 2 - rows[0, 0] / 2 > _FARTHEST / 2:
+        raise InputError(f"times must lie less than {_FARTHEST:g} s apart")
+
+
+def _check_column(system: System, target: PortName, column: np.ndarray) -> None:
+    """Check that an input can be supplied, and takes all values of its column."""
+    variable = system.component(target.component).variable(target.port)
+    if variable.causality != "input":
+        raise InputError(f"{target} is of causality {variable.causality}, not input")
+    if type_of(variable) == "String":
+        raise InputError(f"{target} is a String: a table has numbers")
+    for connection in system.connections:
+        if connection.target == target:
+            raise InputError(f"{target} is fed by {connection.source} and cannot be set")
+    is_real = type_of(variable) == "Real"
+    for value in (column.min(), column.max()) if is_real else np.unique(column):
+        typed(str(target), variable, _number(value))
+
+
+def _number(value: float) -> str:
+    """A number as an Integer is written as well: without a point where it is whole."""
+    return f"{value:.17g}"
+
+
+def _is_linear(system: System, target: PortName, between: str) -> bool:
+    variable = system.component(target.component).variable(target.port)
+    # FMI has it that what is discrete changes at events only.
+    return (type_of(variable), variable.variability, between) == ("Real", "continuous", "linear")
+
+
+def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
+    """Parameters with which a planner runs through the waypoints of a table.
+
+    Args:
+        path: CSV with a line of names, x, y, z and maybe t, and a line a waypoint.
+        component: that is the planner.
+
+    Raises:
+        InputError: there is no such table, or it has a mistake.
+
+    """
+    with records(path, "not a table of waypoints", _are_of_waypoints) as (first, rows):
+        names = [*map(_plain, first)]
+        if not _are_of_waypoints(first):
+            raise ValueError(f"its columns are {', '.join(names)}; use x, y, z or t, x, y, z")
+        waypoints = [
+            {n: finite(text, f"line {line}, {n}:") for n, text in zip(names, values, strict=True)}
+            for line, values in rows
+        ]
+        if not 2 <= len(waypoints) <= MOST:
+            raise ValueError(f"it has {len(waypoints)} waypoints; a path has 2 to {MOST}")
+    values: dict[str, Any] = {"count": len(waypoints), "timed": "t" in names}
+    for number, waypoint in enumerate(waypoints, start=1):
+        values |= {f"waypoint[{number}].{name}": value for name, value in waypoint.items()}
+    return {PortName(component, port): value for port, value in values.items()}
+
+
+def impossible_paths(system: System) -> Iterator[str]:
+    """What PathPlanners of a system will refuse of their paths, without a run of them."""
+    for name, component in system.components.items():
+        if component.description.modelName != _PATH_PLANNER:
+            continue
+        try:
+            path_planner.check(_planned({**component.starts, **system.parameters_of(name)}))
+        except KeyError:
+            # Another model of that name.
+            continue
+        except ArithmeticError as error:
+            yield f"{name}: {error}"
+
+
+def _planned(values: Mapping[str, Any]) -> Parameters:
+    """Parameters of the equations, from the values of ports."""
+    x, y, z, t = (
+        tuple(values[f"waypoint[{k}].{axis}"] for k in range(1, 1 + MOST)) for axis in "xyzt"
+    )
+    timed, cruise, rounding = (values[name] for name in ("timed", "cruise", "rounding"))
+    limits = (tuple(values[f"{end}.{name}"] for name in ACTUATORS) for end in Limits._fields)
+    return Parameters(
+        Waypoints(values["count"], x, y, z, t, timed, cruise, rounding),
+        Vehicle(*(values[name.replace("_", ".")] for name in Vehicle._fields)),
+        values["ell"],
+        Limits(*limits),
+        values["speed_max"],
+        values["turn_max"],
+    )
+
+
+def _plain(name: str) -> str:
+    return name.strip().lower()
+
+
+def _are_of_waypoints(names: Sequence[str]) -> bool:
+    return sorted(map(_plain, names)) in (_PLACE, _TIMED)

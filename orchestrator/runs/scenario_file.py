@@ -8,9 +8,11 @@ from pydantic import Field, model_validator
 
 from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.master.experiment import COUPLINGS
-from orchestrator.runs.inputs import WAYS
 from orchestrator.runs.scenario_events import ACTIONS
 from orchestrator.vehicle.signals import STANDARD
+
+#: What an input does between two rows of its table; the first is the default.
+WAYS = ("linear", "hold")
 
 #: Actions of an event after which there is nothing left that could end.
 _AT_ONCE = ("release", "reset", "stop")

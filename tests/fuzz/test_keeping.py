@@ -36,7 +36,7 @@ from orchestrator.machine.ledger import LEDGER
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.paper import report
 from orchestrator.paper.sections import Section
-from orchestrator.runs import bundle, own_controller, run
+from orchestrator.runs import bundle, run
 from orchestrator.runs.bundle import MANIFEST, current_fmus
 from orchestrator.studies.engine import Engine, Outcome, Point
 from orchestrator.studies.store import Store
@@ -182,7 +182,6 @@ def quick(here: Path) -> Iterator[None]:
     with ExitStack() as stack:
         for what, name, instead in (
             (bundle, "run_fmus", copied),
-            (own_controller, "run_fmus", copied),
             (run, "draw", drawn),
             (report, "draw_section", shown),
             (report, "workers", lambda: nullcontext(InThisProcess())),

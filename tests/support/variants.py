@@ -10,11 +10,12 @@ from orchestrator.paper.choices import (
     ORDERS_OF_EFFORTS,
     PD,
     PROPOSED,
+    PUBLISHED,
     SIGNALS,
     Choice,
     Option,
 )
-from orchestrator.paper.sensitivity import PUBLISHED, Found, Sensitivity
+from orchestrator.paper.variants import Found, Sensitivity
 
 #: A choice of both controllers, and one of the proposed alone.
 SEA = Choice("sea", (Option("calm"), Option("rough", against="4.1: calm")))
@@ -44,8 +45,8 @@ def planted(**cells):
     ways[PD][0] = 16.0, 1200.0
     return Sensitivity(
         {scenario: values * PUBLISHED[scenario] for scenario, values in numbers.items()},
-        ways,
         (SEA, OBSERVER),
+        ways,
     )
 
 

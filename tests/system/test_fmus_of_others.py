@@ -16,8 +16,8 @@ from orchestrator.commands.main import main
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.master.hooks.timing import Playback
-from orchestrator.runs.inputs import Inputs, read_inputs
-from orchestrator.runs.stored import read_result
+from orchestrator.runs.record import read_result
+from orchestrator.runs.scenario import Inputs, read_inputs
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System

@@ -11,7 +11,7 @@ from shutil import which
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.runs.stored import read_result
+from orchestrator.runs.record import read_result
 from support.machine import contents
 
 BROWSER = which("chromium") or which("chromium-browser") or which("google-chrome")

@@ -26,7 +26,7 @@ from orchestrator.formats.tables import read_rows
 from orchestrator.machine.disk import claimed
 from orchestrator.runs import record
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.stored import read_result
+from orchestrator.runs.record import read_result
 from support.machine import (
     LOOPS,
     called,

@@ -12,8 +12,7 @@ from auv_fmu import path_planner
 from auv_fmu.path_planner import Waypoints
 from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.scenario import read_scenario
-from orchestrator.runs.waypoints import impossible_paths
+from orchestrator.runs.scenario import impossible_paths, read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName

@@ -13,7 +13,7 @@ from orchestrator.commands import many_runs
 from orchestrator.commands.main import main
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
-from orchestrator.paper.prose import errata
+from orchestrator.paper.page import errata
 from orchestrator.paper.report import write_report
 from orchestrator.paper.sections import make_studies, study_sections
 from orchestrator.runs.wiring import closed_loop

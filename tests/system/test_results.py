@@ -23,8 +23,8 @@ from orchestrator.machine.user_files import unpacked
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.plan import planned
 from orchestrator.runs.preparation import Prepared
+from orchestrator.runs.record import read_result
 from orchestrator.runs.scenario import Scenario
-from orchestrator.runs.stored import read_result
 from orchestrator.studies.engine import FmuEngine, Point
 from support.others import build, system_of
 

@@ -11,11 +11,10 @@ import pytest
 from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.paper import printed_table as table
-from orchestrator.paper.choices import OF_RUNS, OF_RUNS_OF_FIVE, PD, PROPOSED, Choice
+from orchestrator.paper.choices import OF_RUNS, OF_RUNS_OF_FIVE, PD, PROPOSED, PUBLISHED, Choice
 from orchestrator.paper.measures import approach_of
 from orchestrator.paper.printed_table import NUMBERS
-from orchestrator.paper.sensitivity import FARTHEST, PUBLISHED
-from orchestrator.paper.variants import all_variants
+from orchestrator.paper.variants import FARTHEST, all_variants
 from support.runs import InThisProcess
 
 pytest.importorskip("numba", reason="needs the extra `studies`")

@@ -16,7 +16,7 @@ from auv_fmu.pd import PdGains
 from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
 from auv_fmu.vehicle import Vehicle, accelerations
 from orchestrator.paper.measures import EFFORT_PD, EFFORT_PROPOSED, TURNING_RADIUS, sum_without_step
-from orchestrator.paper.prose import errata, readings
+from orchestrator.paper.page import errata, readings
 from orchestrator.runs.wiring import closed_loop as loop_of
 from orchestrator.vehicle.proof import gain_check, stated, theorem_of
 from support.markdown import DOCS, sections

@@ -9,7 +9,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
 from orchestrator.paper.kept_runs import KeptRuns, key_of
-from orchestrator.paper.sections import companions
+from orchestrator.paper.sections import as_request
 from orchestrator.runs.preparation import prepared_of, with_companion
 from orchestrator.runs.request import Request
 from support.runs import InThisProcess
@@ -32,6 +32,11 @@ QUIET = Request("fig4", {"plant.noise.std": 0.0})
 )  # fmt: skip
 def test_label_is_what_the_user_types(run, label):
     assert run.command_line == label
+
+
+def companions(run):
+    own, *rest = with_companion(prepared_of(run), run)
+    return [as_request(one, own, run) for one in rest]
 
 
 def test_a_companion_that_changes_nothing_is_the_scenario_itself():

@@ -1,4 +1,4 @@
-"""Markdown as a page: anchors, cells, pictures, and texts of strangers."""
+"""Markdown as a page: anchors, cells, pictures, mentions of readings, and texts of strangers."""
 
 import base64
 import re
@@ -10,9 +10,11 @@ from orchestrator.paper.page import (
     contents,
     headings,
     html,
+    linked,
     numbers,
     picture,
     plain,
+    readings,
     table,
 )
 
@@ -73,3 +75,20 @@ def test_numbers_have_three_digits_and_units():
     assert numbers([1234.5, 0.00123456, 2.0]) == "1.23e+03, 0.00123, 2"
     assert actuator_values([80.0, 1.0, 2.5]) == "80 N; 1, 2.5 N·m"
     assert actuator_values([80.0, 1.0, 2.5], "·s") == "80 N·s; 1, 2.5 N·m·s"
+
+
+def test_mentions_lead_to_their_sections():
+    assert linked("see reading 6)") == "see reading [6](#reading-6))"
+    assert linked("Readings 1 to 3, 7.") == (
+        "Readings [1](#reading-1) to [3](#reading-3), [7](#reading-7)."
+    )
+
+
+def test_what_is_no_mention_stays():
+    for text in ("#### Reading 6", "reading 99 is none", "readings of 3 sensors", "6 readings"):
+        assert linked(text) == text
+
+
+def test_readings_are_numbered():
+    numbers = re.findall(r"^#### Reading (\d+)$", readings(), re.MULTILINE)
+    assert numbers == [str(n) for n in range(1, 17)]

@@ -1,15 +1,27 @@
-"""Scenario files: what each entry becomes, and mistakes by name."""
+"""Scenario files: what each entry becomes, the tables that they name, and mistakes by name."""
 
 from __future__ import annotations
 
 from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.scenario import Scenario, names, read_scenario
+from orchestrator.runs.loading import load, loaded
+from orchestrator.runs.preparation import prepare
+from orchestrator.runs.request import Request
+from orchestrator.runs.scenario import (
+    Inputs,
+    Scenario,
+    names,
+    path_parameters,
+    read_inputs,
+    read_scenario,
+)
 from orchestrator.runs.scenario_file import ScenarioFile
+from orchestrator.system.names import port_name
 from support.texts import mentions
 
 TEXT = """
@@ -28,6 +40,8 @@ plant.noise.std = 0.0
 [ours]
 plant.noise.std = "no sensor"
 """
+
+U = port_name("plant.tau.u")
 
 
 def read(folder: Path, text: str) -> Scenario:
@@ -65,14 +79,21 @@ def test_an_empty_file_is_the_closed_loop_as_it_is(tmp_path: Path):
         ("steps.plant = true", "steps"),
         ('[wires]\n"plant.tau" = true', "wires"),
         ("events = 1", "events"),
-        ('[inputs]\nbetween = "linear"', "inputs file"),
+        ("inputs = {}", "inputs file"),
+        ("[inputs]\nfile = 3", "file 3"),
+        ('[inputs]\nfile = "a.csv"\nform = "x"', "'form'"),
+        ('[inputs]\nfile = "a.csv"\nbetween = "spline"', "'spline' linear hold"),
         ("[path]", "path file"),
+        ('[path]\nfiel = "path.csv"', "path 'fiel' file?"),
+        ('[path]\nfile = "none.csv"', "none.csv"),
+        ('[path]\nfile = "path.csv"\n[parameters]\nplanner.count = 2', "planner.count path.csv"),
         ("[parameters]\nell = 1.0", "'ell'"),
         ("stop_time = ", "mine.toml"),
         ("title = 1\nlabel = 2", "title 1 more"),
     ],
 )
 def test_mistakes_are_named(tmp_path: Path, text: str, culprits: str):
+    (tmp_path / "path.csv").write_text("x,y,z\n0,0,0\n9,0,0\n")
     with pytest.raises(InputError) as error:
         read(tmp_path, text)
     assert mentions(str(error.value), culprits), error.value
@@ -87,3 +108,131 @@ def test_unknown_names_are_refused_with_those_that_there_are():
 def test_every_entry_of_a_scenario_can_be_written():
     fields = set(Scenario.__dataclass_fields__) - {"name", "digest"}
     assert ScenarioFile.model_fields.keys() == fields | {"path"}
+
+
+def read_table(tmp_path, text, between="linear", given=(), scenario="fig3a"):
+    file = tmp_path / "inputs.csv"
+    file.write_text(text)
+    return read_inputs(Inputs(file, between), load(scenario, "native"), given)
+
+
+def test_a_run_begins_with_what_the_table_says_of_its_start(tmp_path):
+    text = "time,plant.tau.u,plant.tau.q\n-1,0.0,5.0\n1,4.0,5.0\n"
+    system, _ = read_table(tmp_path, text)
+    assert system.parameters[U] == 2.0
+    system, _ = read_table(tmp_path, text, "hold")
+    assert system.parameters[U] == 0.0
+    system, _ = read_table(tmp_path, "time,plant.tau.u\n3,8.0\n")
+    assert system.parameters[U] == 8.0
+
+
+def test_a_straight_line_may_be_steeper_than_any_number(tmp_path):
+    """Its ends are finite, and so is all that lies between."""
+    text = "time,plant.tau.u,plant.tau.q\n-1,-1.5e308,2.0\n1,1.5e308,4.0\n"
+    system, input_table = read_table(tmp_path, text)
+    assert system.parameters[U] == 0.0
+    for time, expected in ((-1.0, [-1.5e308, 2.0]), (0.5, [0.75e308, 3.5]), (1.0, [1.5e308, 4.0])):
+        row = 1 if time == 1.0 else 0
+        np.testing.assert_allclose(input_table.at(time, row), expected, rtol=1e-12)
+
+
+def test_other_tables_have_other_digests(tmp_path):
+    texts = ["time,plant.tau.u\n0,1\n", "time,plant.tau.u\n0,2\n", "time,plant.tau.q\n0,1\n"]
+    assert len({read_table(tmp_path, text)[1].digest for text in texts}) == len(texts)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("t,plant.tau.u\n0,1\n", "first column is 't'"),
+        ("time\n0\n", "holds no inputs"),
+        ("time,plant.tau.u\n", "holds no inputs"),
+        ("time,plant.tau.u\n0,nan\n", "must be finite"),
+        ("time,plant.tau.u\n1,1\n0,1\n", "times must not fall"),
+        ("time,plant.tau.u\n-1e308,1\n1e308,1\n", "must lie less than 1e+308 s apart"),
+        ("time,plant.tau.u,plant.tau.u\n0,1,1\n", "two columns have the same name"),
+        ("time,plant.tau.x\n0,1\n", "did you mean"),
+        ("time,plant.eta.x\n0,1\n", "of causality output"),
+        ("time,plant.m11\n0,1\n", "of causality parameter"),
+        ("time,plant.tau.u\n0,1\n0,1,2\n", "not a table"),
+    ],
+)
+def test_a_table_that_is_none_is_refused(tmp_path, text, reason):
+    with pytest.raises(InputError) as refused:
+        read_table(tmp_path, text)
+    assert reason in str(refused.value)
+    assert "inputs.csv: " in str(refused.value)
+
+
+def test_an_input_that_is_fed_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"is fed by controller\.tau\.u"):
+        read_table(tmp_path, "time,plant.tau.u\n0,1\n", scenario="fig4")
+
+
+def test_a_value_beside_the_table_is_refused(tmp_path):
+    with pytest.raises(InputError, match="beside the table"):
+        read_table(tmp_path, "time,plant.tau.u\n0,1\n", given=[U])
+    # On the command line it wins over what the scenario has.
+    inputs = tmp_path / "inputs.csv"
+    prepared = prepare(*loaded("fig3a", "native"), Request(kind="native", inputs=inputs))
+    assert prepared.system.parameters[U] == 1.0
+    assert np.array_equal(prepared.input_table.values, [[1.0]])
+
+
+def parameters(path: Path, text: str) -> dict[str, object]:
+    path.write_text(text, encoding="utf-8")
+    return {str(name): value for name, value in path_parameters(path, "planner").items()}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x,y,z\n1,2,3\n4,5,-6.5\n",
+        "\ufeffz; X; y\r\n3; 1; 2\r\n-6.5; 4; 5\r\n",
+        '"x"\t"y"\t"z"\n1\t2\t3\n4\t5\t-6.5\n\n',
+    ],
+)
+def test_waypoints_are_run_through_at_the_cruise_speed(tmp_path: Path, text: str):
+    assert parameters(tmp_path / "path.csv", text) == {
+        "planner.count": 2,
+        "planner.timed": False,
+        "planner.waypoint[1].x": 1.0,
+        "planner.waypoint[1].y": 2.0,
+        "planner.waypoint[1].z": 3.0,
+        "planner.waypoint[2].x": 4.0,
+        "planner.waypoint[2].y": 5.0,
+        "planner.waypoint[2].z": -6.5,
+    }
+
+
+def test_waypoints_with_times_are_passed_at_them(tmp_path: Path):
+    found = parameters(tmp_path / "path.csv", "t,x,y,z\n0,0,0,0\n20,9,0,0\n")
+    assert (found["planner.timed"], found["planner.waypoint[2].t"]) == (True, 20.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "columns t, x, y, z"),
+        ("x,y\n1,2\n3,4\n", "columns t, x, y, z"),
+        ("x,y,z,x\n1,2,3,4\n", "columns x,"),
+        ("x,y,z\n1,2,3\n", "1 2 32"),
+        ("x,y,z\n" + 33 * "1,2,3\n", "33 2 32"),
+        ("x,y,z\n1,2,3\n1,2\n", "line 3 values"),
+        ("x,y,z\n1,2,3\n1,2,3,4\n", "line 3 values"),
+        ("x,y,z\n1,2,3\n1,2,deep\n", "3, z: 'deep'"),
+        ("x,y,z\n1,2,3\n1,2,nan\n", "3, z: 'nan'"),
+    ],
+)
+def test_table_that_is_no_path_is_refused_in_one_line(tmp_path: Path, text: str, reason: str):
+    with pytest.raises(InputError) as error:
+        parameters(tmp_path / "path.csv", text)
+    assert str(error.value).startswith(f"{tmp_path / 'path.csv'}: ")
+    assert mentions(str(error.value), reason)
+    assert "\n" not in str(error.value)
+
+
+def test_path_of_a_scenario_lies_beside_it_and_goes_to_its_planner(tmp_path: Path):
+    (tmp_path / "path.csv").write_text("x,y,z\n0,0,0\n9,0,0\n")
+    found = read(tmp_path, '[path]\nfile = "path.csv"\ncomponent = "leader"\n')
+    assert found.parameters[port_name("leader.waypoint[2].x")] == 9.0

@@ -140,10 +140,3 @@ def test_all_that_is_wrong_with_a_file_is_found_at_once(tmp_path):
     assert {text.partition(":")[0] for text in found} == {
         "unknown entry 'titel'; did you mean title?", "event 1", "event 2", "inputs",
     }  # fmt: skip
-
-
-def test_a_file_of_events_is_checked_where_it_is_read(tmp_path):
-    file = tmp_path / "bad.toml"
-    file.write_text('[[events]]\nat = 1.0\nlose = "plant.tau.u"\ndrop = "plant.y"\n')
-    with pytest.raises(InputError, match=r"bad\.toml: event 1"):
-        read_scenario(str(file))

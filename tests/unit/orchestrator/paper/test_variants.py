@@ -9,19 +9,21 @@ import pytest
 
 from orchestrator.paper import choices
 from orchestrator.paper.choices import (
+    END_TIMES,
     FIVE,
     FORMULAS,
     OF_RUNS,
     OF_RUNS_OF_FIVE,
     PD,
     PROPOSED,
+    PUBLISHED,
     SIGNALS,
+    as_read,
     runs,
 )
-from orchestrator.paper.measures import Approach
+from orchestrator.paper.measures import Approach, errors, numbers_of
 from orchestrator.paper.printed_table import section, write_variants
-from orchestrator.paper.sensitivity import PUBLISHED, as_read
-from orchestrator.paper.variants import errors, moved, numbers_of
+from orchestrator.paper.variants import moved
 from orchestrator.runs.loading import loaded
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
@@ -67,7 +69,8 @@ def test_numbers_are_read_off_rows():
             plant__eta__x=1.0,
             planner__y_d__x=y_d,
             planner__y_d__z=5.0,
-        )
+        ),
+        END_TIMES,
     )
     for time in (20.0, 57.0, 200.0):
         applied, commanded = found[:, T_F[time]]
@@ -83,14 +86,16 @@ def test_errors_of_all_rows_are_the_tracking_error():
 
 
 def test_a_run_that_ends_early_has_no_numbers():
-    assert np.isnan(numbers_of(run_of(9_000))).all()
+    assert np.isnan(numbers_of(run_of(9_000), END_TIMES)).all()
 
 
 def test_formulas_are_those_that_someone_would_code():
     """By the rows themselves, at every end time."""
     tau = np.random.default_rng(2).uniform(-80.0, 80.0, (10_000, 3))
     columns = zip(STANDARD.applied, np.vstack(([0.0] * 3, tau)).T, strict=True)
-    numbers = numbers_of(run_of(**{name.replace(".", "__"): tau for name, tau in columns}))
+    numbers = numbers_of(
+        run_of(**{name.replace(".", "__"): tau for name, tau in columns}), END_TIMES
+    )
     for time in (20.0, 82.0, 200.0):
         taken = tau[: round(time / 0.02)]
         for formula, coded in (
