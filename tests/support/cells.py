@@ -162,6 +162,9 @@ class Trial:
         status = make(host, call, self.saved)
         assert status == self._status(), f"the status is {status.name}"
         logged = {f"fmi2{message.status.name}" for message in host.messages}
+        if host.library.answers:
+            categories = [(m.category, f"logStatus{m.status.name}") for m in host.messages]
+            assert all(found == wanted for found, wanted in categories), categories
         if self.state != ERROR or not answer.fails:
             assert not answer.message or answer.message in logged, f"messages: {logged or 'none'}"
         if self.cell.leads_to != ERROR:
