@@ -163,8 +163,9 @@ class Trial:
         assert status == self._status(), f"the status is {status.name}"
         logged = {f"fmi2{message.status.name}" for message in host.messages}
         if host.library.answers:
-            categories = [(m.category, f"logStatus{m.status.name}") for m in host.messages]
-            assert all(found == wanted for found, wanted in categories), categories
+            for message in host.messages:
+                # PythonFMU tells what it does not support under a name of its own.
+                assert message.category in (f"logStatus{message.status.name}", "cppfmu"), message
         if self.state != ERROR or not answer.fails:
             assert not answer.message or answer.message in logged, f"messages: {logged or 'none'}"
         if self.cell.leads_to != ERROR:
