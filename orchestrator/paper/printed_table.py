@@ -34,7 +34,7 @@ from orchestrator.paper.variants import (
     all_variants,
 )
 from orchestrator.runs.folder import replaced
-from orchestrator.runs.record import PACKAGES, Stopwatch, write_files
+from orchestrator.runs.record import RECORDED, Stopwatch, write_files
 from orchestrator.vehicle.indices import REACHED
 from orchestrator.vehicle.signals import ACTUATORS, AXES
 
@@ -276,7 +276,7 @@ def write_table(folder: Path, command: Sequence[str], force: bool = False) -> tu
         (unfinished / _TEXT).write_text(text, encoding="utf-8")
         write_variants(unfinished / _VARIANTS, found)
         content = {"command": list(command), **clock.times()}
-        write_files(unfinished, content, (*PACKAGES, "numba"))
+        write_files(unfinished, content, (*RECORDED, "numba"))
     return folder / _TEXT, folder / _VARIANTS
 
 

@@ -48,7 +48,7 @@ FILES = (*TABLES, METRICS, RECORD)
 CHECKPOINTS = "checkpoint"
 
 #: Packages whose versions a result depends on.
-_PACKAGES = (*PACKAGES, "matplotlib")
+RECORDED = (*PACKAGES, "matplotlib")
 
 #: What a file is not that cannot be read.
 _WHAT = "not the record of a run"
@@ -128,7 +128,7 @@ def write_record(
 
 
 def write_files(
-    folder: Path, content: Mapping[str, object], packages: Sequence[str] = PACKAGES
+    folder: Path, content: Mapping[str, object], packages: Sequence[str] = RECORDED
 ) -> None:
     """Write a record, with versions, the platform, and the names of all files beside it."""
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}

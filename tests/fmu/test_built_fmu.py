@@ -23,7 +23,7 @@ from fmpy.validation import validate_fmu
 import auv_fmu
 import fmus
 from support.instances import FmuInstance, unpacked
-from support.settings import NAMES, WITH_INPUTS
+from support.settings import EACH, NAMES
 
 each = pytest.mark.parametrize("name", NAMES)
 
@@ -73,30 +73,6 @@ def test_reset_is_a_new_beginning(fmu: FmuInstance):
     assert fmu.initialise().run(0, 30) == expected
 
 
-def test_reset_clears_a_fault(fmu: FmuInstance):
-    fmu.initialise()
-    with pytest.raises(FMICallException):
-        fmu.step(-1.0)
-    assert fmu.get("fault")
-    fmu.fmu.reset()
-    assert not fmu.initialise().get("fault")
-
-
-@pytest.mark.parametrize("serialised", [False, True])
-def test_state_round_trip_continues_bit_for_bit(fmu: FmuInstance, serialised: bool):
-    fmu.initialise().run(0, 50)
-    time, state = fmu.time, fmu.fmu.getFMUstate()
-    if serialised:
-        content = fmu.fmu.serializeFMUstate(state)
-        fmu.fmu.freeFMUstate(state)
-        state = fmu.fmu.deSerializeFMUstate(content)
-    expected = fmu.run(50, 100)
-    fmu.fmu.setFMUstate(state)
-    fmu.fmu.freeFMUstate(state)
-    fmu.time = time
-    assert fmu.run(50, 100) == expected
-
-
 def test_serialised_state_continues_in_another_instance(fmu: FmuInstance):
     fmu.initialise().run(0, 50)
     time, content = fmu.time, fmu.fmu.serializeFMUstate(fmu.fmu.getFMUstate())
@@ -117,21 +93,6 @@ def test_two_instances_do_not_know_of_each_other(fmu: FmuInstance):
         assert other.run(0, 20) == expected
     finally:
         other.fmu.freeInstance()
-
-
-@pytest.mark.parametrize("bad", [nan, inf])
-@pytest.mark.parametrize("fmu", WITH_INPUTS, indirect=True)
-def test_bad_input_ends_in_discard_and_fault_not_in_a_crash(fmu: FmuInstance, bad: float):
-    fmu.initialise().run(0, 5)
-    before = fmu.outputs()
-    with pytest.raises(FMICallException) as failure:
-        fmu.fmu.setReal(fmu.references("input")[:1], [bad])
-    assert failure.value.status == fmi2Discard
-    assert fmu.get("fault")
-    assert fmu.outputs() == before
-    fmu.step()
-    fmu.excite(6)
-    fmu.step()
 
 
 @pytest.mark.parametrize(
@@ -159,40 +120,6 @@ def test_no_run_begins_with_another_parameter(dist, tmp_path, name, parameter, v
             fmu.set(**{parameter: value})
         assert failure.value.status == fmi2Discard, "the run goes on with the one that it has"
         fmu.step()
-
-
-@pytest.mark.parametrize("h", [-0.02, nan])
-def test_impossible_step_ends_in_discard(fmu: FmuInstance, h: float):
-    fmu.initialise().run(0, 5)
-    before = fmu.outputs()
-    with pytest.raises(FMICallException) as failure:
-        fmu.fmu.doStep(fmu.time, h)
-    assert failure.value.status == fmi2Discard
-    assert fmu.outputs() == before
-
-
-def test_zero_and_long_steps_are_accepted(fmu: FmuInstance):
-    fmu.initialise().run(0, 5)
-    before = fmu.outputs()
-    fmu.step(0.0)
-    assert fmu.outputs() == before
-    fmu.step(0.5)
-    assert not fmu.get("fault")
-
-
-def test_unknown_value_reference_is_an_error_and_not_the_end_of_the_process(fmu: FmuInstance):
-    fmu.initialise()
-    for call in (lambda: fmu.fmu.getReal([4711]), lambda: fmu.fmu.setReal([4711], [1.0])):
-        fmu.step()
-        with pytest.raises(FMICallException) as failure:
-            call()
-        assert failure.value.status == fmi2Error
-    with pytest.raises(FMICallException) as failure:
-        fmu.step()
-    assert failure.value.status == fmi2Error
-    assert not fmu.get("fault")
-    fmu.fmu.reset()
-    fmu.initialise().step()
 
 
 def test_all_numbers_can_be_read_with_the_function_for_reals(fmu: FmuInstance):
@@ -328,7 +255,7 @@ def test_resources_need_nothing_but_an_old_standard_library(dist: Path, name: st
     assert imported <= own | set(sys.stdlib_module_names)
 
 
-@each
+@pytest.mark.parametrize("name", EACH)
 def test_runs_alone_from_the_command_line_of_fmpy(dist: Path, tmp_path: Path, name: str):
     output = tmp_path / "result.csv"
     subprocess.run(

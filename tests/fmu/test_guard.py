@@ -1,21 +1,21 @@
 """What no slave can be told: wrong pointers, dead handles, text that is none, FMUs without a slave.
 
-None of it may end the host. Each test is one class of mistakes, on one small FMU of each kind: the
-guard is the loader's, or that of the FMUs in C, and the same for all.
+None of it may end the host. Each test is one class of mistakes beside those of docs/status.md, on
+one small FMU of each kind: the guard is the loader's or the runtime's, and the same for all FMUs.
 """
 
 from __future__ import annotations
 
-import ctypes
 import gc
-import math
 import os
 import shutil
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
-from ctypes import c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from collections.abc import Callable, Iterator
+from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from functools import partial
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -24,26 +24,38 @@ import pytest
 
 from fmus.python.own import build_own
 from fmus.python.packaging import loader_compiler
+from support.fmi3 import Fmi3Library
 from support.kinds import FIXTURES
-from support.raw_fmi import (
-    DISCARD,
-    ERROR,
-    FATAL,
+from support.raw import (
     MODEL_EXCHANGE,
-    OF_MODEL_EXCHANGE,
-    OK,
-    RawFmu,
-)  # fmt: skip
+    Host,
+    Library,
+    Message,
+    Status,
+    harmless,
+    initialised,
+    instance,
+)
 
 pytestmark = pytest.mark.skipif(loader_compiler() is None, reason="there is no C compiler")
 
-#: A Real input and the String parameter of the controller, and what is no UTF-8.
 NOT_UTF8 = [b"\xff", b"\xc0\xaf", b"\xed\xa0\x80", b"\xf4\x90\x80\x80", b"\xe2\x82", b"\x80"]
+
+#: A value reference of no port.
+UNKNOWN = 4711
+
+OK, ERROR = Status.OK, Status.Error
+
+
+def unpacked(
+    fmus: Path, temporary: pytest.TempPathFactory, name: str = "ObserverController"
+) -> Path:
+    return Path(fmpy.extract(fmus / f"{name}.fmu", temporary.mktemp("guarded")))
 
 
 @pytest.fixture(scope="module")
-def python_folder(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return unpacked(dist, tmp_path_factory)
+def python(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Library:
+    return Library(unpacked(dist, tmp_path_factory))
 
 
 @pytest.fixture(scope="module", params=FIXTURES.values(), ids=FIXTURES.keys())
@@ -54,48 +66,54 @@ def fmus(request: pytest.FixtureRequest) -> Path:
 
 
 @pytest.fixture(scope="module")
-def folder(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return unpacked(fmus, tmp_path_factory)
+def library(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Library:
+    return Library(unpacked(fmus, tmp_path_factory))
 
 
-def unpacked(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    target = tmp_path_factory.mktemp("guarded")
-    fmpy.extract(fmus / "ObserverController.fmu", unzipdir=target)
-    return target
+@pytest.fixture(scope="module")
+def planner(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Library:
+    """Of the same kind."""
+    return Library(unpacked(fmus, tmp_path_factory, "MotionPlanner"))
+
+
+@pytest.fixture(scope="module", params=[*FIXTURES.values(), "dist3"], ids=[*FIXTURES, "FMI 3.0"])
+def of_any_version(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Library:
+    folder = unpacked(request.getfixturevalue(request.param), tmp_path_factory)
+    return Fmi3Library(folder) if request.param == "dist3" else Library(folder)
 
 
 @pytest.fixture
-def python_fmu(python_folder: Path) -> RawFmu:
-    return RawFmu(python_folder)
+def host(library: Library) -> Iterator[Host]:
+    with initialised(library) as host:
+        yield host
 
 
-@pytest.fixture
-def fmu(folder: Path) -> RawFmu:
-    return RawFmu(folder)
+def reference(host: Host, name: str) -> int:
+    return host.description.find(name).reference
 
 
-@pytest.fixture
-def component(fmu: RawFmu) -> Iterator[int]:
-    made = fmu.initialised()
-    yield made
-    fmu.FreeInstance(made)
+def put(host: Host, name: str, value: Any) -> Status:
+    port = host.description.find(name)
+    return host.set(port.kind, [port.reference], [value])
 
 
-def reference(folder: Path, name: str) -> Any:
-    [found] = (
-        variable.valueReference
-        for variable in fmpy.read_model_description(folder).modelVariables
-        if variable.name == name
-    )
-    return (c_uint * 1)(found)
-
-
-def steps(fmu: RawFmu, component: int) -> int:
-    status: int = fmu.DoStep(component, 0.0, 0.02, 1)
-    return status
+def in_error(host: Host) -> None:
+    assert host.call("fmi2SetReal", None, 1, None) == ERROR
 
 
 # Instances
+
+
+def refused(library: Library, **arguments: Any) -> Message:
+    """What is said, with logging off, where there is no instance."""
+    host = Host(library)
+    before = list(sys.path)
+    assert not host.instantiate(**arguments, logging=False)
+    assert sys.path == before
+    [message] = host.messages
+    return message
 
 
 @pytest.mark.parametrize(
@@ -104,15 +122,13 @@ def steps(fmu: RawFmu, component: int) -> int:
         ("has no name", {"name": None}),
         *(("name of the instance is not UTF-8", {"name": b"a" + bad}) for bad in NOT_UTF8),
         ("GUID is not UTF-8", {"guid": b"\xff"}),
-        ("is not that of this FMU", {"guid": b"{00000000-0000-0000-0000-000000000000}"}),
         ("is not that of this FMU", {"guid": b"{}"}),
         ("co-simulation only", {"kind": MODEL_EXCHANGE}),
         ("co-simulation only", {"kind": 77}),
     ],
 )
-def test_instance_that_cannot_be_is_null_with_one_message(fmu, what, arguments):
-    assert fmu.instantiate(**arguments, logging=0) is None
-    [message] = fmu.messages
+def test_instance_that_cannot_be_is_null_with_one_message(library, what, arguments):
+    message = refused(library, **arguments)
     assert message.text.startswith("fmi2Instantiate: ")
     assert what in message.text
     assert (message.status, message.category) == (ERROR, "logStatusError")
@@ -121,34 +137,36 @@ def test_instance_that_cannot_be_is_null_with_one_message(fmu, what, arguments):
 @pytest.mark.parametrize(
     ("what", "location"),
     [
-        ("no resource location", None),
         ("not UTF-8", b"file:///tmp/%ff"),
         ("zero byte", b"file:///tmp%00/x"),
         ("%%20", b"file:///tmp/a%2520b"),
-        ("No such file", b"file:///nowhere"),
         ("slavemodule.txt", b"file://"),
         ("File name too long", b"file:///" + 100_000 * b"x"),
     ],
 )
-def test_place_without_a_slave_is_null_with_one_message(python_fmu, what, location):
-    before = list(sys.path)
-    assert python_fmu.instantiate(location=location, logging=0) is None
-    [message] = python_fmu.messages
+def test_place_without_a_slave_is_null_with_one_message(python, what, location):
+    message = refused(python, location=location)
     assert what in message.text
     assert (message.status, message.category) == (ERROR, "logStatusError")
-    assert sys.path == before
 
 
-def test_guid_is_that_of_the_description_or_not_stated(fmu: RawFmu, folder: Path):
-    stated = fmpy.read_model_description(folder).guid.encode()
+def test_guid_is_that_of_the_description_or_not_stated(of_any_version: Library):
+    stated = of_any_version.description.guid.encode()
     bare = stated.strip(b"{}")
     for guid in (None, b"", stated, bare, stated.upper(), bare.upper(), bare.lower()):
-        made = fmu.instantiate(guid=guid)
-        assert made
-        fmu.FreeInstance(made)
-    assert fmu.messages == []
+        with instance(of_any_version, guid=guid) as host:
+            assert host.messages == []
     for guid in (stated + b"x", b"x" + stated, stated[:-2]):
-        assert fmu.instantiate(guid=guid) is None
+        assert not Host(of_any_version).instantiate(guid=guid)
+
+
+@pytest.fixture
+def resources(python: Library, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(python.folder / "resources", tmp_path / "resources"))
+
+
+def script_of(resources: Path) -> str:
+    return (resources / "slavemodule.txt").read_text()
 
 
 @pytest.mark.parametrize(
@@ -180,40 +198,27 @@ def test_guid_is_that_of_the_description_or_not_stated(fmu: RawFmu, folder: Path
          "_get_log_queue"),
     ],
 )  # fmt: skip
-def test_folder_without_a_slave_is_null_with_one_message(
-    python_fmu, python_folder, tmp_path, files, what
-):
-    resources = tmp_path / "resources"
-    shutil.copytree(python_folder / "resources", resources)
-    script = (resources / "slavemodule.txt").read_text()
+def test_folder_without_a_slave_is_null_with_one_message(python, resources, files, what):
+    script = script_of(resources)
     for name, content in files.items():
         path = resources / name.format(script=script)
         path.unlink(missing_ok=True)
         if content is not None:
             path.write_bytes(content)
-    before = list(sys.path)
-    assert python_fmu.instantiate(location=resources.as_uri().encode(), logging=0) is None
-    [message] = python_fmu.messages
+    message = refused(python, location=resources.as_uri().encode())
     assert what in message.text
-    assert message.status in (ERROR, FATAL)
-    assert sys.path == before
-    made = python_fmu.instantiate()
-    assert made, "the sound one still works"
-    python_fmu.FreeInstance(made)
+    assert message.status in (ERROR, Status.Fatal)
+    with instance(python):
+        pass  # The sound one still works.
 
 
 @pytest.mark.parametrize(
     "name", ["slavemodule.txt", "guid.txt", "{script}.py", "__pycache__/{script}.{tag}.pyc"]
 )
 @pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
-def test_resource_that_is_no_file_is_not_waited_for(
-    python_fmu, python_folder, tmp_path, name: str, kind: str
-):
+def test_resource_that_is_no_file_is_not_waited_for(python, resources, name: str, kind: str):
     """A pipe would be read from for ever, and so would the device."""
-    resources = tmp_path / "resources"
-    shutil.copytree(python_folder / "resources", resources)
-    script = (resources / "slavemodule.txt").read_text()
-    path = resources / name.format(script=script, tag=sys.implementation.cache_tag)
+    path = resources / name.format(script=script_of(resources), tag=sys.implementation.cache_tag)
     path.parent.mkdir(exist_ok=True)
     path.unlink(missing_ok=True)
     if kind == "pipe":
@@ -222,472 +227,246 @@ def test_resource_that_is_no_file_is_not_waited_for(
         path.symlink_to("/dev/zero")
     else:
         path.mkdir()
-    assert python_fmu.instantiate(location=resources.as_uri().encode(), logging=0) is None
-    [message] = python_fmu.messages
+    message = refused(python, location=resources.as_uri().encode())
     assert f"{path} is no regular file" in message.text or kind == "folder"
 
 
-def test_library_beside_the_loader_is_found_where_the_loader_was(
-    python_folder, tmp_path, monkeypatch
-):
+def test_library_beside_the_loader_is_found_where_the_loader_was(python, tmp_path, monkeypatch):
     """A host may load by a path from the current folder, and then go elsewhere."""
     libraries = "binaries/linux64"
     for name in ("ours", "theirs"):
-        shutil.copytree(python_folder / libraries, tmp_path / name / libraries)
+        shutil.copytree(python.folder / libraries, tmp_path / name / libraries)
+    shutil.copy(python.folder / "modelDescription.xml", tmp_path / "ours")
     (tmp_path / "theirs" / libraries / "ObserverController_pythonfmu.so").write_text("planted")
     monkeypatch.chdir(tmp_path / "ours")
-    fmu = RawFmu(Path())
+    library = Library(Path())
     monkeypatch.chdir(tmp_path / "theirs")
-    made = fmu.instantiate(location=(python_folder / "resources").as_uri().encode())
-    assert made, fmu.messages
-    fmu.FreeInstance(made)
+    with instance(library, location=python.location.encode()):
+        pass
 
 
-@pytest.mark.parametrize("logger", [False, True])
-def test_host_without_a_logger_is_survived(fmu: RawFmu, capfd, logger: bool):
-    nothing = (c_void_p * 5)() if logger else None
-    made = fmu.instantiate(callbacks=nothing)
-    assert fmu.SetReal(made, None, 1, None) == ERROR
-    fmu.FreeInstance(made)
+@pytest.mark.parametrize("callbacks", ["none", "no logger"])
+def test_host_without_a_logger_is_survived(library: Library, capfd, callbacks: str):
+    with instance(library, callbacks=callbacks) as host:
+        in_error(host)
     assert "raw: logStatusError: fmi2SetReal: no array" in capfd.readouterr().err
 
 
 # Arguments
 
 ONE = (c_uint * 1)(0)
-REALS, INTEGERS = (c_double * 2)(), (c_int * 2)()
 STRINGS = (c_char_p * 1)(b"tanh")
-TOO_MANY = 2**31
+ARRAYS = {"Real": (c_double * 2)(), "Integer": (c_int * 2)(), "Boolean": (c_int * 2)(),
+          "String": STRINGS}  # fmt: skip
+TOO_MANY = c_size_t(2**31)
 
-#: Function, arguments that cannot be forwarded.
+#: Function, and arguments that cannot be forwarded, beside those of docs/status.md.
 WRONG = [
     *(
-        (f"{verb}{kind}", arguments)
-        for kind, values in (("Real", REALS), ("Integer", INTEGERS), ("Boolean", INTEGERS),
-                             ("String", STRINGS))
+        (f"{verb}{kind}", (ONE, n, values))
+        for kind, values in ARRAYS.items()
         for verb in ("Get", "Set")
-        for arguments in ((None, 1, values), (ONE, 1, None), (None, 1, None),
-                          (ONE, TOO_MANY, values), (ONE, 2**64 - 1, values))
+        for n in (TOO_MANY, c_size_t(2**64 - 1))
     ),
-    ("SetString", (ONE, 1, (c_char_p * 1)())),
-    *(("SetString", (ONE, 1, (c_char_p * 1)(bad))) for bad in NOT_UTF8),
-    ("SetDebugLogging", (1, 1, None)),
-    ("SetDebugLogging", (1, 1, (c_char_p * 1)())),
-    ("SetDebugLogging", (1, 1, (c_char_p * 1)(b"\xff"))),
+    *(("SetString", (ONE, c_size_t(1), (c_char_p * 1)(bad))) for bad in NOT_UTF8),
     ("SetDebugLogging", (1, TOO_MANY, STRINGS)),
-    ("GetFMUstate", (None,)),
-    ("GetFMUstate", (c_void_p(4711),)),
-    ("SetFMUstate", (None,)),
-    ("SetFMUstate", (4711,)),
-    ("FreeFMUstate", (None,)),
-    ("FreeFMUstate", (c_void_p(4711),)),
-    ("SerializedFMUstateSize", (None, c_size_t())),
-    ("SerializedFMUstateSize", (4711, c_size_t())),
-    ("SerializedFMUstateSize", (None, None)),
-    ("SerializeFMUstate", (None, b"", 0)),
-    ("SerializeFMUstate", (4711, b"0123", 4)),
-    ("DeSerializeFMUstate", (None, 4, c_void_p())),
-    ("DeSerializeFMUstate", (b"{}", 2, None)),
-    ("DeSerializeFMUstate", (b"{}", 2, c_void_p(4711))),
-    ("DeSerializeFMUstate", (b"", 0, c_void_p())),
-    ("DeSerializeFMUstate", (b"{}", 2**63, c_void_p())),
-    *((f"Get{kind}Status", (2, None)) for kind in ("", "Real", "Integer", "Boolean", "String")),
-]  # fmt: skip
+    ("GetFMUstate", (byref(c_void_p(4711)),)),
+    ("DeSerializeFMUstate", (b"{}", c_size_t(2), byref(c_void_p(4711)))),
+    ("DeSerializeFMUstate", (b"{}", c_size_t(2**63), byref(c_void_p()))),
+]
 
 
 @pytest.mark.parametrize(("function", "arguments"), WRONG)
-def test_wrong_argument_is_an_error_with_one_message(fmu, component, function, arguments):
-    assert getattr(fmu, function)(component, *arguments) == ERROR
-    [message] = fmu.messages
+def test_wrong_argument_is_an_error_with_one_message(host: Host, function, arguments):
+    assert host.call(f"fmi2{function}", *arguments) == ERROR
+    [message] = host.messages
     assert message.text.startswith(f"fmi2{function}: ")
     assert (message.status, message.category) == (ERROR, "logStatusError")
 
 
-def test_no_values_need_no_arrays(fmu: RawFmu, component: int):
-    for kind in ("Real", "Integer", "Boolean", "String"):
-        for verb in ("Get", "Set"):
-            assert getattr(fmu, f"{verb}{kind}")(component, None, 0, None) == OK
-    assert fmu.SetDebugLogging(component, 1, 0, None) == OK
-    assert steps(fmu, component) == OK
-    assert fmu.messages == []
+#: What is refused of an FMU that is initialised, and the answer.
+REFUSED = [
+    *(
+        (Status.Discard, lambda host, name=name, value=value: put(host, name, value))
+        for name, value in (("y.x", nan), ("k_d", -1.0), ("tau.u", 1.0), ("h_max", 1.0),
+                            ("saturation", b"sigmoid"))
+    ),
+    (Status.Discard, lambda host: host.step(0.0, -1.0)),
+    (ERROR, lambda host: host.get("Real", [UNKNOWN])[0]),
+    (ERROR, lambda host: host.get("Boolean", [reference(host, "y.x")])[0]),
+    (ERROR, lambda host: host.set("Real", [UNKNOWN], [1.0])),
+    (ERROR, Host.enter),
+]  # fmt: skip
 
 
-#: What is refused, as function, arguments of an initialised FMU, and answer.
-def refusals(folder: Path) -> list[tuple[str, tuple[Any, ...], int]]:
-    an_input, output, gain = (reference(folder, name) for name in ("y.x", "tau.u", "k_d"))
-    fixed, choice = reference(folder, "h_max"), reference(folder, "saturation")
-    unknown, nan, one = (c_uint * 1)(4711), (c_double * 1)(math.nan), (c_double * 1)(1.0)
-    return [
-        ("SetReal", (an_input, 1, nan), DISCARD),
-        ("SetReal", (gain, 1, (c_double * 1)(-1.0)), DISCARD),
-        ("SetReal", (output, 1, one), DISCARD),
-        ("SetReal", (fixed, 1, one), DISCARD),
-        ("SetString", (choice, 1, (c_char_p * 1)(b"sigmoid")), DISCARD),
-        ("DoStep", (0.0, -1.0, 1), DISCARD),
-        ("GetReal", (unknown, 1, one), ERROR),
-        ("GetBoolean", (an_input, 1, INTEGERS), ERROR),
-        ("CancelStep", (), ERROR),
-        ("EnterEventMode", (), ERROR),
-        ("SetReal", (unknown, 1, one), ERROR),
-        ("EnterInitializationMode", (), ERROR),
-    ]
-
-
-def test_what_is_refused_is_told_with_logging_off(fmu: RawFmu, folder: Path):
+@pytest.mark.parametrize(("status", "call"), REFUSED)
+def test_what_is_refused_is_told_with_logging_off(of_any_version: Library, status, call):
     """Each in its call, and answered again where it is not told again."""
-    for function, arguments, answer in refusals(folder):
-        fmu.messages.clear()
-        made = fmu.instantiate(logging=0)
-        fmu.SetupExperiment(made, 0, 0.0, 0.0, 0, 0.0)
-        fmu.EnterInitializationMode(made)
-        assert fmu.ExitInitializationMode(made) == OK
-        assert fmu.messages == []
-        assert getattr(fmu, function)(made, *arguments) == answer, function
-        [message] = fmu.messages
-        assert message.status == answer
-        assert message.category == {DISCARD: "logStatusDiscard", ERROR: "logStatusError"}[answer]
-        assert getattr(fmu, function)(made, *arguments) == answer, function
-        fmu.FreeInstance(made)
-
-
-def test_fixed_parameters_may_be_set_to_what_they_are(fmu, folder, component):
-    """As a host does that sets all start values once more."""
-    fixed = [
-        variable
-        for variable in fmpy.read_model_description(folder).modelVariables
-        if (variable.causality, variable.variability) == ("parameter", "fixed")
-    ]
-    assert {variable.type for variable in fixed} >= {"Real", "Boolean", "String"}
-    types = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
-    for variable in fixed:
-        values = (types[variable.type] * 1)()
-        arguments = (component, (c_uint * 1)(variable.valueReference), 1, values)
-        assert getattr(fmu, f"Get{variable.type}")(*arguments) == OK
-        assert getattr(fmu, f"Set{variable.type}")(*arguments) == OK, variable.name
-    assert steps(fmu, component) == OK
-    assert fmu.messages == []
+    with initialised(of_any_version, logging=False) as host:
+        assert [call(host), call(host)] == [status] * 2
+        [message] = host.messages
+        assert (message.status, message.category) == (status, f"logStatus{status.name}")
+        assert host.fault() is (status == Status.Discard)
+        assert host.value(host.description.find("y.x")) == 0.0
 
 
 @pytest.mark.parametrize(
     ("bad", "value", "answer"),
-    [("y.y", math.nan, DISCARD), ("k_d", -1.0, DISCARD), ("h_max", 0.5, DISCARD),
-     ("tau.u", 0.0, DISCARD), (None, 0.0, ERROR)],
+    [("y.y", nan, Status.Discard), ("k_d", -1.0, Status.Discard), ("h_max", 0.5, Status.Discard),
+     ("tau.u", 0.0, Status.Discard), (None, 0.0, ERROR), ("lambda", 0.5, OK)],
 )  # fmt: skip
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_of_several_values_all_are_taken_or_none(
-    fmu, folder, component, bad: str | None, value: float, answer: int, place: int
+    host: Host, bad: str | None, value: float, answer: Status, place: int
 ):
-    """An input and a tunable parameter beside a value that is bad, wherever it stands."""
-    good = [reference(folder, "y.x")[0], reference(folder, "k_d")[0]]
-    read, all_three = (c_double * 2)(), [(r, v) for r, v in zip(good, (0.5, 60.0), strict=True)]
-    all_three.insert(place, (4711 if bad is None else reference(folder, bad)[0], value))
-    before = (c_double * 2)()
-    assert fmu.GetReal(component, (c_uint * 2)(*good), 2, before) == OK
-    names, values = (
-        (c_uint * 3)(*(r for r, _ in all_three)),
-        (c_double * 3)(*(v for _, v in all_three)),
-    )
-    assert fmu.SetReal(component, names, 3, values) == answer
-    assert fmu.GetReal(component, (c_uint * 2)(*good), 2, read) == OK
-    assert [*read] == [*before]
-    assert steps(fmu, component) == (OK if answer == DISCARD else ERROR)
-    assert len(fmu.messages) == 1
-
-
-def test_several_parameters_are_taken_in_one_call_while_stepping(fmu, folder, component):
-    names = (c_uint * 3)(*(reference(folder, name)[0] for name in ("k_d", "lambda", "y.x")))
-    values, read = (c_double * 3)(60.0, 0.5, 0.25), (c_double * 3)()
-    assert fmu.SetReal(component, names, 3, values) == OK
-    assert fmu.GetReal(component, names, 3, read) == OK
-    assert [*read] == [*values]
-    assert steps(fmu, component) == OK
-
-
-@pytest.mark.parametrize("function", OF_MODEL_EXCHANGE)
-def test_functions_of_model_exchange_are_there_and_do_nothing(fmu, component, function: str):
-    """Some hosts look for them in every FMU."""
-    assert getattr(fmu, function)(component, *CALLS[function]) == ERROR
-    [message] = fmu.messages
-    assert message.text == f"FMI function not supported: fmi2{function}"
-    assert steps(fmu, component) == OK
-
-
-def in_error(fmu: RawFmu, component: int) -> None:
-    assert fmu.SetReal(component, None, 1, None) == ERROR
-
-
-def test_error_state_lets_through_what_does_not_go_on(fmu, folder, component):
-    """Values and states can be read, nothing can be set or stepped, until reset or restored."""
-    gain = reference(folder, "k_d")
-    state, value = c_void_p(), (c_double * 1)(1.0)
-    assert fmu.GetFMUstate(component, state) == OK
-    in_error(fmu, component)
-    for kind, values in (("Real", value), ("Integer", INTEGERS), ("Boolean", INTEGERS),
-                         ("String", STRINGS)):  # fmt: skip
-        assert getattr(fmu, f"Set{kind}")(component, gain, 1, values) == ERROR
-    assert fmu.SetupExperiment(component, 0, 0.0, 0.0, 0, 0.0) == ERROR
-    for function in ("EnterInitializationMode", "ExitInitializationMode", "Terminate",
-                     "CancelStep"):  # fmt: skip
-        assert getattr(fmu, function)(component) == ERROR
-    assert steps(fmu, component) == ERROR
-    before = value[0]
-    assert fmu.GetReal(component, gain, 1, value) == OK
-    assert value[0] != before
-    other, size = c_void_p(), c_size_t()
-    assert fmu.GetFMUstate(component, other) == OK
-    assert fmu.SerializedFMUstateSize(component, other, size) == OK
-    assert fmu.FreeFMUstate(component, other) == OK
-    assert fmu.SetFMUstate(component, state) == OK
-    assert steps(fmu, component) == OK
-    in_error(fmu, component)
-    assert fmu.Reset(component) == OK
-    assert fmu.SetupExperiment(component, 0, 0.0, 0.0, 0, 0.0) == OK
+    """An input and a tunable parameter beside a value that may be bad, wherever it stands."""
+    good = [reference(host, "y.x"), reference(host, "k_d")]
+    before, given = host.get("Real", good), [0.5, 60.0]
+    references, values = [*good], [*given]
+    references.insert(place, UNKNOWN if bad is None else reference(host, bad))
+    values.insert(place, value)
+    assert host.set("Real", references, values) == answer
+    assert host.get("Real", good) == ((OK, given) if answer == OK else before)
+    assert host.step(0.0, 0.02) == (ERROR if answer == ERROR else OK)
+    assert len(host.messages) == (answer != OK)
 
 
 # What is not alive
 
 
-def zero(kind: Any) -> Any:
-    """What nobody may look at."""
-    return kind() if kind in (c_int, c_double, c_size_t) else None
+def test_no_function_touches_what_is_not_alive(library: Library, capfd):
+    with initialised(library) as gone:
+        freed = gone.component
+    with initialised(library) as host:
+        assert host.component is not None
+        for component in (None, freed, host.get_state(), host.component + 1, 2**64 - 1):
+            capfd.readouterr()
+            for function, arguments in harmless().items():
+                assert host.call_on(component, function, *arguments) == ERROR, function
+                expected = f"{function}: not a live instance of this FMU\n"
+                assert capfd.readouterr().err == expected
+            library.functions.fmi2FreeInstance(c_void_p(component))
+        assert host.messages == []
 
 
-#: Everything that takes a component, with arguments that are right, or that nobody may look at.
-CALLS = {
-    **{f"{verb}{kind}": (ONE, 1, values)
-       for kind, values in (("Real", REALS), ("Integer", INTEGERS), ("Boolean", INTEGERS),
-                            ("String", STRINGS))
-       for verb in ("Get", "Set")},
-    "SetDebugLogging": (1, 0, None),
-    "SetupExperiment": (0, 0.0, 0.0, 0, 0.0),
-    "EnterInitializationMode": (),
-    "ExitInitializationMode": (),
-    "Terminate": (),
-    "Reset": (),
-    "GetFMUstate": (c_void_p(),),
-    "SetFMUstate": (4711,),
-    "FreeFMUstate": (c_void_p(4711),),
-    "SerializedFMUstateSize": (4711, c_size_t()),
-    "SerializeFMUstate": (4711, b"0123", 4),
-    "DeSerializeFMUstate": (b"{}", 2, c_void_p()),
-    "GetDirectionalDerivative": (ONE, 1, ONE, 1, REALS, REALS),
-    "SetRealInputDerivatives": (ONE, 1, INTEGERS, REALS),
-    "GetRealOutputDerivatives": (ONE, 1, INTEGERS, REALS),
-    "DoStep": (0.0, 0.02, 1),
-    "CancelStep": (),
-    **{name: tuple(zero(kind) for kind in kinds) for name, kinds in OF_MODEL_EXCHANGE.items()},
-    **{f"Get{kind}Status": (2, values)
-       for kind, values in (("", INTEGERS), ("Real", REALS), ("Integer", INTEGERS),
-                            ("Boolean", INTEGERS), ("String", STRINGS))},
-}  # fmt: skip
+def test_handle_of_another_fmu_is_told_from_ones_own(host: Host, planner: Library):
+    with initialised(planner) as other:
+        assert host.call_on(other.component, "fmi2Reset") == ERROR
+        assert host.set_state(other.get_state()) == ERROR
+        host.library.functions.fmi2FreeInstance(c_void_p(other.component))
+        assert other.step(0.0, 0.02) == OK
 
 
-def dead(fmu: RawFmu) -> dict[str, int | None]:
-    """Components that are none."""
-    freed, state = fmu.initialised(), c_void_p()
-    fmu.FreeInstance(freed)
-    alive = fmu.initialised()
-    assert fmu.GetFMUstate(alive, state) == OK
-    return {
-        "NULL": None,
-        "freed": freed,
-        "a state": state.value,
-        "next to one": alive + 1,
-        "an address": ctypes.addressof(REALS),
-        "all bits": 2**64 - 1,
-    }
-
-
-def test_no_function_touches_what_is_not_alive(fmu: RawFmu, capfd):
-    for what, component in dead(fmu).items():
-        capfd.readouterr()
-        for function, arguments in CALLS.items():
-            assert getattr(fmu, function)(component, *arguments) == ERROR, (what, function)
-            expected = f"fmi2{function}: not a live instance of this FMU\n"
-            assert capfd.readouterr().err == expected
-        fmu.FreeInstance(component)
-    assert fmu.messages == []
-
-
-def test_handle_of_another_fmu_is_told_from_ones_own(fmu: RawFmu, fmus: Path, tmp_path: Path):
-    fmpy.extract(fmus / "MotionPlanner.fmu", unzipdir=tmp_path)
-    other = RawFmu(tmp_path)
-    theirs, ours = other.initialised(), fmu.initialised()
-    assert steps(fmu, theirs) == ERROR
-    state = c_void_p()
-    assert other.GetFMUstate(theirs, state) == OK
-    assert fmu.SetFMUstate(ours, state) == ERROR
-    fmu.FreeInstance(theirs)
-    assert steps(other, theirs) == OK
-    other.FreeInstance(theirs)
-    fmu.FreeInstance(ours)
-
-
-def test_freed_state_and_its_copies_are_dead(fmu: RawFmu, component: int):
-    state = c_void_p()
-    assert fmu.GetFMUstate(component, state) == OK
-    copy = c_void_p(state.value)
-    assert fmu.FreeFMUstate(component, state) == OK
-    assert state.value is None
-    assert fmu.FreeFMUstate(component, state) == OK, "there is nothing to free"
-    assert fmu.SetFMUstate(component, copy) == ERROR
-    assert fmu.FreeFMUstate(component, copy) == ERROR
-    assert fmu.GetFMUstate(component, copy) == ERROR
-
-
-def test_handle_is_given_once(fmu: RawFmu, component: int):
+def test_handle_is_given_once(host: Host):
     """Whatever is freed in between, and with more alive than a table begins with."""
-    handles = []
+    handles = [host.component]
     for _ in range(100):
-        made = fmu.instantiate()
-        handles.append(made)
-        fmu.FreeInstance(made)
-    states = [c_void_p() for _ in range(3000)]
+        with instance(host.library) as other:
+            handles.append(other.component)
     for _ in range(2):
+        states = [host.get_state() for _ in range(3000)]
+        handles += states
+        assert host.set_state(states[-1]) == OK
         for state in states:
-            assert fmu.GetFMUstate(component, state) == OK
-        handles += [state.value for state in states]
-        assert fmu.SetFMUstate(component, states[-1]) == OK
-        for state in states:
-            assert fmu.FreeFMUstate(component, state) == OK
-    assert len({component, *handles}) == 1 + len(handles)
+            assert host.free_state(state) == OK
+    assert len({*handles}) == len(handles)
 
 
-def test_states_end_with_their_instance(fmu: RawFmu, component: int):
-    other, state = fmu.initialised(), c_void_p()
-    assert fmu.GetFMUstate(other, state) == OK
-    assert fmu.SetFMUstate(component, state) == OK
-    fmu.FreeInstance(other)
-    assert fmu.SetFMUstate(component, state) == ERROR
+def test_states_end_with_their_instance(host: Host):
+    with initialised(host.library) as other:
+        state = other.get_state()
+        assert host.set_state(state) == OK
+    assert host.set_state(state) == ERROR
 
 
-def test_state_that_is_given_is_used_again(fmu: RawFmu, component: int):
+def test_state_that_is_given_is_used_again(host: Host):
     """And holds what it is now."""
-    first, kept = c_void_p(), c_void_p()
-    assert fmu.GetFMUstate(component, first) == OK
+    first = c_void_p()
+    assert host.call("fmi2GetFMUstate", byref(first)) == OK
     before = first.value
+    assert before
 
     def again(times: int) -> int:
         for _ in range(times):
-            assert steps(fmu, component) == OK
-            assert fmu.GetFMUstate(component, first) == OK
+            assert host.step(0.0, 0.02) == OK
+            assert host.call("fmi2GetFMUstate", byref(first)) == OK
         gc.collect()
         return sys.getallocatedblocks()
 
     blocks = again(100)
     assert again(500) - blocks < 500, "less than one object a call"
     assert first.value == before
-    assert fmu.GetFMUstate(component, kept) == OK
-    assert serialised(fmu, component, first) == serialised(fmu, component, kept)
-
-
-def serialised(fmu: RawFmu, component: int, state: c_void_p) -> bytes:
-    size = c_size_t()
-    assert fmu.SerializedFMUstateSize(component, state, size) == OK
-    content = ctypes.create_string_buffer(size.value)
-    assert fmu.SerializeFMUstate(component, state, content, size) == OK
-    return content.raw
-
-
-@pytest.mark.parametrize("difference", [-1, 1, 1000, 2**40])
-def test_size_is_that_of_the_state(fmu: RawFmu, component: int, difference: int):
-    """PythonFMU copies as many bytes as it is told, whatever lies behind the state."""
-    state = c_void_p()
-    assert fmu.GetFMUstate(component, state) == OK
-    size = len(serialised(fmu, component, state))
-    content = ctypes.create_string_buffer(size + 1000)
-    assert fmu.SerializeFMUstate(component, state, content, size + difference) == ERROR
-    assert content.raw == bytes(size + 1000)
-
-
-@pytest.mark.parametrize("content", [b"nothing", b"{}", 1000 * b"x"])
-def test_bytes_that_are_no_state_end_in_the_error_state(fmu, component, content: bytes):
-    state, good = c_void_p(), c_void_p()
-    assert fmu.GetFMUstate(component, good) == OK
-    before = serialised(fmu, component, good)
-    assert fmu.DeSerializeFMUstate(component, content, len(content), state) == OK
-    assert fmu.SetFMUstate(component, state) == ERROR
-    [message] = fmu.messages
-    assert message.text.startswith("state refused: ")
-    assert fmu.GetFMUstate(component, state) == OK
-    assert serialised(fmu, component, state) == before
-    assert steps(fmu, component) == ERROR
-    assert fmu.SetFMUstate(component, good) == OK
-    assert steps(fmu, component) == OK
+    assert host.serialised(before) == host.content()
 
 
 # Calls within calls
 
 
-def test_logger_that_calls_back_is_refused(fmu: RawFmu, component: int, capfd):
+def test_logger_that_calls_back_is_refused(host: Host, capfd):
     answers = []
 
     def call() -> None:
-        answers.append(steps(fmu, component))
-        fmu.FreeInstance(component)
+        answers.append(host.step(0.0, 0.02))
+        host.library.functions.fmi2FreeInstance(c_void_p(host.component))
 
-    fmu.when_told = call
-    in_error(fmu, component)
-    fmu.when_told = lambda: None
+    host.when_told = call
+    in_error(host)
+    host.when_told = lambda: None
     assert answers == [ERROR]
     assert "fmi2FreeInstance: called by the logger" in capfd.readouterr().err
-    assert fmu.Reset(component) == OK
+    assert host.call("fmi2Reset") == OK
 
 
-def test_messages_of_a_call_are_told_in_their_order_after_all_is_done(fmu, folder, component):
+def test_messages_of_a_call_are_told_in_their_order_after_all_is_done(host: Host):
     """Also where the logger calls back: the instance is let go, and its values are as they stay."""
-    unknown = range(4711, 4716)
-    references, values = (c_uint * 6)(*reference(folder, "k_d"), *unknown), (c_double * 6)()
+    unknown = range(UNKNOWN, UNKNOWN + 5)
     answers = []
-    fmu.when_told = lambda: answers.append(steps(fmu, component))
-    assert fmu.GetReal(component, references, 6, values) == ERROR
-    fmu.when_told = lambda: None
+    host.when_told = lambda: answers.append(host.step(0.0, 0.02))
+    status, values = host.get("Real", [reference(host, "k_d"), *unknown])
+    host.when_told = lambda: None
+    assert status == ERROR
     expected = [f"no Real has the value reference {reference}" for reference in unknown]
-    assert [message.text for message in fmu.messages] == expected
+    assert [message.text for message in host.messages] == expected
     assert answers == [ERROR] * 5
     assert values[0] > 0.0
     assert values[1:] == [0.0] * 5
-    assert steps(fmu, component) == OK
+    assert host.step(0.0, 0.02) == OK
 
 
-def test_threads_on_one_instance_take_turns(fmu: RawFmu, component: int):
-    answers: list[int] = []
+def at_once(*tasks: Callable[[], object]) -> None:
+    """Do something in threads."""
+    threads = [threading.Thread(target=task) for task in tasks]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+
+
+def test_threads_on_one_instance_take_turns(host: Host):
+    answers: list[Status] = []
 
     def run() -> None:
         for _ in range(200):
-            state = c_void_p()
-            answers.append(fmu.GetFMUstate(component, state))
-            answers.append(fmu.FreeFMUstate(component, state))
-            answers.append(fmu.DoStep(component, 0.0, 0.02, 1))
+            answers.append(host.free_state(host.get_state()))
+            answers.append(host.step(0.0, 0.02))
 
-    threads = [threading.Thread(target=run) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert answers == [OK] * (4 * 200 * 3)
+    at_once(*[run] * 4)
+    assert answers == [OK] * (4 * 200 * 2)
 
 
 def test_threads_that_make_instances_leave_the_process_as_it_was(
-    fmus: Path, folder: Path, tmp_path: Path
+    library: Library, planner: Library
 ):
     """Each of the Python kind puts its folder on sys.path while others look for theirs."""
-    fmpy.extract(fmus / "MotionPlanner.fmu", unzipdir=tmp_path)
     before, answers = list(sys.path), []
 
-    def run(place: Path) -> None:
-        fmu = RawFmu(place)
+    def run(library: Library) -> None:
         for _ in range(10):
-            made = fmu.initialised()
-            answers.append(steps(fmu, made))
-            fmu.FreeInstance(made)
-            assert fmu.instantiate(guid=b"{0}", location=b"file:///nowhere") is None
+            with initialised(library) as host:
+                answers.append(host.step(0.0, 0.02))
+            assert not Host(library).instantiate(guid=b"{0}", location=b"file:///nowhere")
 
-    threads = [threading.Thread(target=run, args=(place,)) for place in 3 * (folder, tmp_path)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    at_once(*(partial(run, one) for one in 3 * (library, planner)))
     assert answers == [OK] * 60
     assert sys.path == before
 
@@ -696,9 +475,9 @@ def test_threads_that_make_instances_leave_the_process_as_it_was(
 FORKS = """
 import os, sys, threading
 from pathlib import Path
-from support.raw_fmi import RawFmu
+from support.raw import Host, Library
 
-slow, quick = map(RawFmu, map(Path, sys.argv[1:]))
+slow, quick = (Host(Library(Path(folder))) for folder in sys.argv[1:])
 thread = threading.Thread(target=slow.instantiate)
 thread.start()
 while not hasattr(sys, "is_being_made"):
@@ -727,11 +506,11 @@ class Slow(Fmi2Slave):
 """
 
 
-def test_child_that_is_forked_waits_for_no_thread_of_its_parent(python_folder, tmp_path):
+def test_child_that_is_forked_waits_for_no_thread_of_its_parent(python, tmp_path):
     (tmp_path / "slow.py").write_text(SLOW)
     fmpy.extract(build_own(tmp_path / "slow.py", tmp_path), unzipdir=tmp_path / "slow")
     subprocess.run(
-        [sys.executable, "-c", FORKS, tmp_path / "slow", python_folder],
+        [sys.executable, "-c", FORKS, tmp_path / "slow", python.folder],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
         check=True,
         timeout=30,
@@ -771,78 +550,59 @@ class Foreign(Fmi2Slave):
 
 
 @pytest.fixture(scope="module")
-def foreign_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def foreign(tmp_path_factory: pytest.TempPathFactory) -> Library:
     folder = tmp_path_factory.mktemp("foreign")
     (folder / "foreign_slave.py").write_text(FOREIGN)
-    fmpy.extract(build_own(folder / "foreign_slave.py", folder), unzipdir=folder / "unpacked")
-    return folder / "unpacked"
+    fmu = build_own(folder / "foreign_slave.py", folder)
+    return Library(Path(fmpy.extract(fmu, folder / "unpacked")))
 
 
-@pytest.fixture
-def foreign(foreign_folder: Path) -> RawFmu:
-    return RawFmu(foreign_folder)
-
-
-def test_percent_signs_arrive_as_a_format_that_prints_them(foreign: RawFmu):
-    foreign.FreeInstance(foreign.initialised())
-    [message] = foreign.messages
+def test_percent_signs_arrive_as_a_format_that_prints_them(foreign: Library):
+    with instance(foreign) as host:
+        assert host.enter() == host.exit() == OK
+    [message] = host.messages
     assert message.text == "50%% of 100%%d"
     assert message.category == "logStatusWarning"
 
 
-def test_categories_choose_messages_but_not_errors(foreign: RawFmu):
+def test_categories_choose_messages_but_not_errors(foreign: Library):
     for categories, heard in (([b"logStatusWarning"], 1), ([b"logEvents", b"x"], 0)):
-        foreign.messages.clear()
-        made = foreign.instantiate(logging=0)
-        chosen = (c_char_p * len(categories))(*categories)
-        assert foreign.SetDebugLogging(made, 1, len(categories), chosen) == OK
-        foreign.SetupExperiment(made, 0, 0.0, 0.0, 0, 0.0)
-        foreign.EnterInitializationMode(made)
-        foreign.ExitInitializationMode(made)
-        assert len(foreign.messages) == heard
-        assert foreign.DoStep(made, 1.0, 0.1, 1) == DISCARD
-        assert "foreign_slave.py:18: ValueError: not at one" in foreign.messages[-1].text
-        foreign.FreeInstance(made)
+        with instance(foreign, logging=False) as host:
+            n = len(categories)
+            chosen = (c_char_p * n)(*categories)
+            assert host.call("fmi2SetDebugLogging", 1, c_size_t(n), chosen) == OK
+            assert host.enter() == host.exit() == OK
+            assert len(host.messages) == heard
+            assert host.step(1.0, 0.1) == Status.Discard
+            assert "foreign_slave.py:18: ValueError: not at one" in host.messages[-1].text
 
 
-def test_after_fatal_nobody_is_called(foreign: RawFmu):
-    made, other, state = foreign.initialised(), foreign.initialised(), c_void_p()
-    assert foreign.GetFMUstate(made, state) == OK
-    foreign.messages.clear()
-    assert foreign.SetFMUstate(made, state) == FATAL
-    [message] = foreign.messages
-    assert "ValueError('no way back')" in message.text
-    for function, arguments in CALLS.items():
-        assert getattr(foreign, function)(made, *arguments) == FATAL, function
-    foreign.FreeInstance(made)
-    assert foreign.DoStep(made, 0.0, 0.1, 1) == ERROR, "freed, and nothing more"
-    assert foreign.DoStep(other, 0.0, 0.1, 1) == OK
-    foreign.FreeInstance(other)
+def test_after_fatal_nobody_is_called(foreign: Library):
+    with initialised(foreign) as other:
+        with initialised(foreign) as host:
+            assert host.set_state(host.get_state()) == Status.Fatal
+            [message] = host.messages
+            assert "ValueError('no way back')" in message.text
+            for function, arguments in harmless().items():
+                assert host.call(function, *arguments) == Status.Fatal, function
+            freed = host.component
+        assert host.call_on(freed, "fmi2Reset") == ERROR, "freed, and nothing more"
+        assert other.step(0.0, 0.1) == OK
 
 
-def test_value_of_another_type_is_told_in_the_call_that_meets_it(foreign, foreign_folder):
-    made, value = foreign.initialised(), (c_double * 1)()
-    x = reference(foreign_folder, "x")
-    assert foreign.GetReal(made, x, 1, value) == OK
-    assert foreign.DoStep(made, 2.0, 0.1, 1) == OK
-    foreign.messages.clear()
-    assert foreign.GetReal(made, x, 1, value) == ERROR
-    assert "could not convert string to float" in foreign.messages[-1].text
-    assert foreign.messages[-1].status == ERROR
-    assert foreign.DoStep(made, 3.0, 0.1, 1) == DISCARD
-    foreign.FreeInstance(made)
+def test_value_of_another_type_is_told_in_the_call_that_meets_it(foreign: Library):
+    with initialised(foreign) as host:
+        x = [reference(host, "x")]
+        assert host.get("Real", x) == (OK, [1.0])
+        assert host.step(2.0, 0.1) == OK
+        assert host.get("Real", x)[0] == ERROR
+        assert "could not convert string to float" in host.messages[-1].text
+        assert host.messages[-1].status == ERROR
+        assert host.step(3.0, 0.1) == Status.Discard
 
 
-def test_text_of_a_slave_that_cannot_be_encoded_is_survived(foreign, foreign_folder):
-    made, value = foreign.initialised(), (c_char_p * 1)()
-    foreign.messages.clear()
-    assert foreign.DoStep(made, 3.0, 0.1, 1) == OK
-    assert [message.text for message in foreign.messages] == ["? and ü"]
-    assert foreign.GetString(made, reference(foreign_folder, "s"), 1, value) == OK
-    assert value[0] == b"?"
-    foreign.FreeInstance(made)
-
-
-def test_refusal_of_a_step_is_no_error(fmu: RawFmu, component: int):
-    assert fmu.DoStep(component, 0.0, -1.0, 1) == DISCARD
-    assert steps(fmu, component) == OK
+def test_text_of_a_slave_that_cannot_be_encoded_is_survived(foreign: Library):
+    with initialised(foreign) as host:
+        assert host.step(3.0, 0.1) == OK
+        assert [message.text for message in host.messages] == ["? and ü"]
+        assert host.get("String", [reference(host, "s")]) == (OK, [b"?"])

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import sysconfig
+from collections.abc import Sequence
 from pathlib import Path
 
 import fmpy
@@ -14,14 +14,13 @@ import pytest
 from fmus.python.own import build_own
 from fmus.python.packaging import LOADER, LOADER_FLAGS, loader_compiler
 from orchestrator.runs import bundle
+from support.hosts import bare_root, host, unpacked
 from support.settings import NAMES
 from support.tiers import slow
 
 LIBPYTHON = Path(
     str(sysconfig.get_config_var("LIBDIR")), str(sysconfig.get_config_var("INSTSONAME"))
 )
-
-CHROOT = shutil.which("chroot")
 
 #: Processes a test with threads.
 REPETITIONS = 8
@@ -34,41 +33,30 @@ needs_libpython = pytest.mark.skipif(
 pytestmark = needs_compiler
 
 
-def compile_c(source: Path, target: Path, *options: str) -> Path:
-    command = [str(loader_compiler()), "-Wall", "-Wextra", "-Werror", "-g", "-pthread", *options]
-    subprocess.run([*command, "-o", target, source, "-ldl"], check=True)
-    return target
-
-
-def compiled_host(folder: Path, *options: str, name: str = "host") -> Path:
-    return compile_c(Path(__file__).with_name(f"{name}.c"), folder / name, *options)
-
-
 def preloaded(folder: Path, text: str) -> str:
     """A library that is put before the C library's functions."""
     source = folder / "preloaded.c"
     source.write_text(f"#define _GNU_SOURCE\n{text}")
-    return str(compile_c(source, folder / "preloaded.so", "-shared", "-fPIC"))
+    command = [
+        str(loader_compiler()),
+        "-shared",
+        "-fPIC",
+        "-o",
+        folder / "preloaded.so",
+        source,
+        "-ldl",
+    ]
+    subprocess.run(command, check=True)
+    return str(folder / "preloaded.so")
 
 
 #: A host that finds this Python's libpython, as one does where it is installed.
 FINDS_LIBPYTHON = ("-Wl,--disable-new-dtags", f"-Wl,-rpath,{LIBPYTHON.parent}")
 
 
-def unpacked(dist: Path, folder: Path) -> list[str]:
-    """Library and resource location of every FMU, as arguments of the host."""
-    arguments = []
-    for name in NAMES:
-        target = folder / name
-        fmpy.extract(dist / f"{name}.fmu", unzipdir=target)
-        arguments += [str(target / "binaries/linux64" / f"{name}.so"),
-                      (target / "resources").as_uri()]  # fmt: skip
-    return arguments
-
-
-def run(host: Path, *arguments: str, under: tuple[str, ...] = (), **environment: str):
+def run(program: Path, *arguments: str, under: Sequence[str] = (), **environment: str):
     return subprocess.run(
-        [*under, str(host), *arguments],
+        [*under, str(program), *arguments],
         env=environment,
         capture_output=True,
         text=True,
@@ -79,7 +67,7 @@ def run(host: Path, *arguments: str, under: tuple[str, ...] = (), **environment:
 
 @pytest.fixture
 def with_libpython(tmp_path: Path) -> Path:
-    return compiled_host(tmp_path, *FINDS_LIBPYTHON)
+    return host(tmp_path, "host", *FINDS_LIBPYTHON)
 
 
 @needs_libpython
@@ -93,16 +81,16 @@ def test_all_fmus_run_side_by_side_in_a_c_host(dist: Path, tmp_path: Path, with_
 @needs_libpython
 def test_logger_that_does_not_come_back_leaves_the_instance_to_all_threads(dist, tmp_path):
     """It leaves by longjmp, as an exception of C++ would, past PythonFMU and Python."""
-    host = compiled_host(tmp_path, *FINDS_LIBPYTHON, name="leaving")
-    process = run(host, *unpacked(dist, tmp_path)[:2])
+    program = host(tmp_path, "leaving", *FINDS_LIBPYTHON)
+    process = run(program, *unpacked(dist, tmp_path)[:2])
     assert (process.stdout, process.returncode) == ("left 52 times\n", 0), process.stderr
 
 
 @needs_libpython
 def test_host_that_ends_python_first_lets_its_instances_go_in_silence(dist, tmp_path):
     """All else is an error that says what has happened."""
-    host = compiled_host(tmp_path, name="ending")
-    process = run(host, str(LIBPYTHON), *unpacked(dist, tmp_path)[:2])
+    program = host(tmp_path, "ending")
+    process = run(program, str(LIBPYTHON), *unpacked(dist, tmp_path)[:2])
     assert process.returncode == 0, process.stderr
     assert process.stdout.splitlines() == [
         "with Python 0", "ended 0", "step 3", "free state 3", "another none", "terminate 0",
@@ -137,46 +125,26 @@ void *dlopen(const char *name, int flags) {
 
 def test_without_a_libpython_the_host_is_told_what_is_missing(dist: Path, tmp_path: Path):
     shim = preloaded(tmp_path, NO_LIBPYTHON)
-    process = run(compiled_host(tmp_path), *unpacked(dist, tmp_path), LD_PRELOAD=shim)
+    process = run(host(tmp_path, "host"), *unpacked(dist, tmp_path), LD_PRELOAD=shim)
     assert process.returncode == 4
     assert "[hosted] status 3, logStatusError: fmi2Instantiate: no Python" in process.stdout
     assert "libpython3.9 to libpython3.13" in process.stdout
 
 
-def libraries_of(program: Path) -> list[Path]:
-    """The shared libraries that a program is linked against."""
-    found = subprocess.run(["ldd", program], check=True, capture_output=True, text=True).stdout
-    return [Path(word) for word in found.split() if word.startswith("/")]
-
-
 def in_a_bare_root(folder: Path, dist: Path, *brought: Path) -> subprocess.CompletedProcess[str]:
     """Run the host where there is nothing but it, the FMUs, and what these are linked against."""
-    host, arguments = compiled_host(folder), unpacked(dist, folder)
-    for library in {
-        *brought,
-        *(found for path in (host, *brought) for found in libraries_of(path)),
-    }:
-        near = "lib" if library in brought else library.parent.relative_to("/")
-        target = folder / near / library.name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(library, target)
+    arguments = unpacked(dist, folder)
+    root = bare_root(folder, host(folder, "host"), *brought)
     inside = [argument.replace(str(folder), "") for argument in arguments]
-    return run(Path("/host"), *inside, under=(str(CHROOT), str(folder)), LD_LIBRARY_PATH="/lib")
+    return run(Path("/host"), *inside, under=root, LD_LIBRARY_PATH=str(LIBPYTHON.parent))
 
 
-needs_root = pytest.mark.skipif(
-    os.geteuid() != 0 or CHROOT is None, reason="only root may change the root folder"
-)
-
-
-@needs_root
 def test_machine_with_nothing_but_a_c_library_tells_what_is_missing(dist: Path, tmp_path: Path):
     process = in_a_bare_root(tmp_path, dist)
     assert process.returncode == 4
     assert "libpython3.9 to libpython3.13" in process.stdout
 
 
-@needs_root
 @needs_libpython
 def test_libpython_without_its_standard_library_does_not_end_the_host(dist, tmp_path):
     process = in_a_bare_root(tmp_path, dist, LIBPYTHON)
@@ -188,14 +156,14 @@ def test_libpython_without_its_standard_library_does_not_end_the_host(dist, tmp_
 @pytest.mark.parametrize("count", [2, *slow(16)])
 def test_threads_that_instantiate_at_the_same_moment(dist: Path, tmp_path: Path, count: int):
     """One interpreter starts, whoever comes first, and all go by the same sys.path."""
-    host = compiled_host(tmp_path, *FINDS_LIBPYTHON, name="threads")
+    program = host(tmp_path, "threads", *FINDS_LIBPYTHON)
     arguments = [word for k in range(3) for word in unpacked(dist, tmp_path / str(k))][: 2 * count]
     for resources in tmp_path.glob("*/*/resources"):
         script = resources / f"{(resources / 'slavemodule.txt').read_text()}.py"
         # Threads take turns as often as can be.
         script.write_text(f"import sys\nsys.setswitchinterval(1e-6)\n{script.read_text()}")
     for _ in range(REPETITIONS):
-        process = run(host, *arguments)
+        process = run(program, *arguments)
         assert (process.returncode, process.stdout) == (0, f"{count} threads\n"), process.stderr
 
 
@@ -204,10 +172,10 @@ def test_threads_that_instantiate_at_the_same_moment(dist: Path, tmp_path: Path,
 def test_threads_with_fmus_that_have_no_loader(tmp_path: Path):
     """What docs/hosts/c-program.md warns of."""
     bundle.build(tmp_path, "plain")
-    host = compiled_host(tmp_path, name="threads")
+    program = host(tmp_path, "threads")
     arguments = unpacked(tmp_path, tmp_path / "plain")[:4]
     for _ in range(REPETITIONS):
-        assert run(host, *arguments, LD_PRELOAD=str(LIBPYTHON)).returncode == 0
+        assert run(program, *arguments, LD_PRELOAD=str(LIBPYTHON)).returncode == 0
 
 
 @needs_libpython
@@ -261,9 +229,9 @@ int dl_iterate_phdr(int (*callback)(struct dl_phdr_info *, size_t, void *), void
 @needs_libpython
 def test_python_that_a_host_has_for_itself_is_used(dist: Path, tmp_path: Path):
     """And no library is loaded while the dynamic linker goes through them."""
-    host, shim = compiled_host(tmp_path), preloaded(tmp_path, PRIVATE_PYTHON)
+    program, shim = host(tmp_path, "host"), preloaded(tmp_path, PRIVATE_PYTHON)
     arguments = unpacked(dist, tmp_path)[:2]
-    process = run(host, *arguments, LD_PRELOAD=shim, LIBPYTHON=str(LIBPYTHON))
+    process = run(program, *arguments, LD_PRELOAD=shim, LIBPYTHON=str(LIBPYTHON))
     assert process.returncode == 0, process.stdout
 
 
@@ -282,9 +250,9 @@ class Talkative(Fmi2Slave):
 def test_what_a_slave_prints_is_there_when_the_host_ends(tmp_path: Path):
     (tmp_path / "talkative.py").write_text(TALKATIVE)
     fmpy.extract(build_own(tmp_path / "talkative.py", tmp_path), unzipdir=tmp_path / "fmu")
-    host = compiled_host(tmp_path, *FINDS_LIBPYTHON, name="threads")
+    program = host(tmp_path, "threads", *FINDS_LIBPYTHON)
     folder = tmp_path / "fmu"
-    process = run(host, str(folder / "binaries/linux64/Talkative.so"), str(folder / "resources"))
+    process = run(program, str(folder / "binaries/linux64/Talkative.so"), str(folder / "resources"))
     assert process.stdout.count("a step\n") == 20
     assert process.returncode == 0
 
@@ -313,7 +281,7 @@ def test_sanitizers_find_nothing_whatever_a_host_calls(dist: Path, tmp_path: Pat
     """Right and wrong calls in any order, the loader watched byte by byte."""
     sanitizers = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-Wall",
                   "-Wextra", "-Werror")  # fmt: skip
-    host = compiled_host(tmp_path, *FINDS_LIBPYTHON, *sanitizers, name="random_calls")
+    program = host(tmp_path, "random_calls", *FINDS_LIBPYTHON, *sanitizers)
     fmpy.extract(dist / f"{name}.fmu", unzipdir=tmp_path / "fmu")
     library = tmp_path / "fmu/binaries/linux64" / f"{name}.so"
     subprocess.run(
@@ -321,7 +289,7 @@ def test_sanitizers_find_nothing_whatever_a_host_calls(dist: Path, tmp_path: Pat
     )
     for seed in range(3):
         process = run(
-            host, str(library), (tmp_path / "fmu/resources").as_uri(), str(seed), "5000",
+            program, str(library), (tmp_path / "fmu/resources").as_uri(), str(seed), "5000",
             # Python keeps what it has until the process ends, and wants to know what is too much.
             ASAN_OPTIONS="detect_leaks=0:allocator_may_return_null=1",
         )  # fmt: skip

@@ -133,6 +133,7 @@ def test_reference_is_written_for_it(tree: Path, tmp_path: Path):
     np.testing.assert_allclose(x["x.x"][1:], expected, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_tests_of_any_component_hold_for_it(tree: Path):
     chosen = ("-q", "-p", "no:cacheprovider", "-k", f"{NAME} or {FOLDER}")
     said = python(tree, "-m", "pytest", *chosen, *TESTS)
@@ -140,11 +141,12 @@ def test_tests_of_any_component_hold_for_it(tree: Path):
     assert "failed" not in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [("--fmus", "dist/native"), ("--fmus", "dist/python", "--twin", "dist/native")],
     ids=["by itself", "twins"],
 )
 def test_fuzzer_attacks_it(tree: Path, options: tuple[str, ...]):
-    said = python(tree, "-m", "fuzz.sequences", *options, "--only", NAME, "--runs", "10")
-    assert f"{NAME}: 10 " in said
+    said = python(tree, "-m", "fuzz.sequences", *options, "--only", NAME, "--runs", "50")
+    assert f"{NAME}: 50 " in said

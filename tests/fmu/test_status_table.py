@@ -21,11 +21,12 @@ from support.status_table import (
     ERROR,
     WITHOUT_AN_INSTANCE,
     creations,
+    names_in_fmi3,
     rows,
     without_an_instance,
     without_the_loader,
 )
-from support.trials import Cell, trials
+from support.trials import CREATIONS, FMI3, Cell, trials
 from support.worker import Lost, Worker
 
 #: Longest time for a trial, on a slow machine [s].
@@ -36,6 +37,13 @@ CELLS: dict[str, Cell] = {
     **{f"{row} - {state}": (key, state) for key, row in rows().items() for state in row.cells},
     **{f"{CREATION}: {case}": ((CREATION, case), "") for case in creations()},
     **{f"on {what}": ((WITHOUT_AN_INSTANCE, what), "") for what in without_an_instance()},
+}
+
+#: Cells that hold in FMI 3.0 under other names; it has no resources to be found.
+OF_BOTH_VERSIONS = {
+    name: (key, state)
+    for name, (key, state) in CELLS.items()
+    if key[0] in names_in_fmi3() and (state or (key[1] in CREATIONS and "resource" not in key[1]))
 }
 
 #: Cells that PythonFMU's own library has a part in, and no guard of ours.
@@ -55,9 +63,7 @@ PLAIN = "ObserverController"
 
 
 def unpacked(fmus: Path, folder: Path, *names: str) -> list[Path]:
-    for name in names:
-        fmpy.extract(fmus / f"{name}.fmu", unzipdir=folder / name)
-    return [folder / name for name in names]
+    return [Path(fmpy.extract(fmus / f"{name}.fmu", folder / name)) for name in names]
 
 
 #: Kinds, components, and the cells that they have.
@@ -69,8 +75,8 @@ ALL = [
         id=f"{kind}-{name}-{cell}",
         marks=() if name in REPRESENTATIVES else pytest.mark.slow,
     )
-    for kind, name in product(FIXTURES, NAMES)
-    for cell, (key, state) in CELLS.items()
+    for kind, name in [*product(FIXTURES, NAMES), *product([FMI3], REPRESENTATIVES)]
+    for cell, (key, state) in (OF_BOTH_VERSIONS if kind == FMI3 else CELLS).items()
     if not state or has_call(name, key)
 ]
 
@@ -85,7 +91,7 @@ def workers(
         @cache
         def worker(kind: str, name: str) -> Worker[Cell, str]:
             another = NAMES[NAMES.index(name) - 1]
-            fmus = request.getfixturevalue(FIXTURES[kind])
+            fmus = request.getfixturevalue({**FIXTURES, FMI3: "dist3"}[kind])
             folders = unpacked(fmus, tmp_path_factory.mktemp("status"), name, another)
             return stack.enter_context(Worker(trials, *folders, kind))
 

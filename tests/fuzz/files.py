@@ -3,7 +3,6 @@
     python -m tests.fuzz.files --runs 1000                    all kinds of files, in turn
     python -m tests.fuzz.files --runs 10000 --only table      one kind
     python -m tests.fuzz.files --runs 1 --only ssd --seed 17  the one that a finding names
-    python -m tests.fuzz.files --guided --only scenario       by coverage; `pip install atheris`
 
 A valid file of each kind is mutated (:mod:`.files_mutators`) and handed to a command. Whatever it
 has become, the command ends with 0, or with 2 and one line; no exception leaves it; it writes into
@@ -15,7 +14,6 @@ its kind and seed alone.
 from __future__ import annotations
 
 import argparse
-import gc
 import io
 import os
 import resource
@@ -25,13 +23,13 @@ import tempfile
 import traceback
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout, suppress
+from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from random import Random
-from types import FrameType, FunctionType
+from types import FrameType
 from typing import Any, NamedTuple
 from unittest.mock import patch
 
@@ -351,7 +349,6 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=1000, help="of each kind; default: 1000")
     parser.add_argument("--seed", type=int, default=0, help="of the first run; default: 0")
     parser.add_argument("--only", metavar="KIND", help="one kind of file; default: all")
-    parser.add_argument("--guided", action="store_true", help="let coverage choose, by atheris")
     options = parser.parse_args()
     with prepared() as found:
         return _attacks(found, options)
@@ -359,8 +356,6 @@ def main() -> int:
 
 def _attacks(found: Mapping[str, Kind], options: argparse.Namespace) -> int:
     chosen = {options.only: found[options.only]} if options.only else found
-    if options.guided:
-        _guided(*chosen.values(), runs=options.runs)
     findings = 0
     for name, kind in chosen.items():
         statuses = {0: 0, 2: 0}
@@ -376,36 +371,6 @@ def _attacks(found: Mapping[str, Kind], options: argparse.Namespace) -> int:
                     print(f"{name} {seed}: {finding}", flush=True)
         print(f"{name}: {options.runs} files, {statuses[0]} taken, {statuses[2]} refused")
     return 1 if findings else 0
-
-
-#: Packages whose coverage guides.
-_INSTRUMENTED = ("orchestrator", "fmpy", "tomllib", "zipfile", "json", "csv")
-
-
-def _guided(kind: Kind, runs: int) -> None:
-    """Let atheris choose what to mutate further; ends the process."""
-    import atheris  # type: ignore[import-not-found]  # noqa: PLC0415
-
-    def mutate(content: bytes, most: int, seed: int) -> bytes:
-        random = Random(seed)
-        if random.random() < 0.5:
-            with suppress(Exception):
-                return kind.mutate(content, random)[:most]
-        return bytes(atheris.Mutate(content, most))
-
-    corpus = Path(tempfile.mkdtemp())
-    (corpus / "valid").write_bytes(kind.valid)
-    for function in gc.get_objects():
-        if isinstance(function, FunctionType):
-            package, _, _ = (function.__module__ or "").partition(".")
-            if package in _INSTRUMENTED:
-                atheris.instrument_func(function)
-    atheris.Setup(
-        [sys.argv[0], str(corpus), f"-runs={runs}", f"-max_len={4 * len(kind.valid)}"],
-        lambda content: attack(kind, content),
-        custom_mutator=mutate,
-    )
-    atheris.Fuzz()
 
 
 if __name__ == "__main__":

@@ -28,8 +28,8 @@ from fuzz.generator import generated
 from fuzz.mutants import Taken, Trials, reached
 from fuzz.player import Calls, Difference, Players, pairs, play
 from fuzz.twins import twins
+from support.hosts import sanitize, sanitizers
 from support.raw import Description, Host, Library
-from support.sanitizers import sanitize, sanitizers
 from support.worker import Lost, Worker
 
 KINDS = ("sequences", "states")

@@ -20,9 +20,9 @@ from fuzz.reachable import faults, without_checksum
 from fuzz.sequences import Finding, Fuzzer, unpacked
 from support import states
 from support.calls import CASES, Call, Draw, Item
+from support.hosts import GCC, compiled, sanitized, sanitizers
 from support.native_states import Unwritable
 from support.raw import Description, Library, Variable, instance
-from support.sanitizers import GCC, compiled, sanitize, sanitizers
 from support.settings import EACH, NAMES, REPRESENTATIVES
 from support.tiers import slow
 from support.worker import Lost, Worker
@@ -88,15 +88,13 @@ def test_kinds_answer_alike(kinds: dict[str, Folders], name: str):
 
 @pytest.mark.slow
 @pytest.mark.skipif(GCC is None, reason="gcc is not installed")
-def test_sanitizers_find_nothing(native: Path):
-    with unpacked([native / f"{name}.fmu" for name in NAMES]) as folders, sanitizers() as reports:
-        for folder in folders.values():
-            sanitize(folder)
-        for name in NAMES:
+def test_sanitizers_find_nothing(shared: Path, native: Path):
+    folders = {name: sanitized(shared, native, name) for name in NAMES}
+    with sanitizers() as reports:
+        for name, kind in product(REPRESENTATIVES, ("sequences", "states")):
             with Fuzzer(folders, name) as fuzzer:
-                for kind in ("sequences", "states"):
-                    findings = [f for _, found in fuzzer.attack(kind, SEQUENCES) for f in found]
-                    assert not findings, f"{explained(fuzzer, kind, findings)}\n{reports}"
+                findings = [f for _, found in fuzzer.attack(kind, SEQUENCES) for f in found]
+                assert not findings, f"{explained(fuzzer, kind, findings)}\n{reports}"
 
 
 # What it found

@@ -4,7 +4,7 @@ Folders full of files with names that the program itself uses go through every c
 each byte of the user's must be there afterwards, in its place or, with `--force`, moved aside. And
 what the program reads back is damaged, a bit at a time: it is refused or said, or nothing differs.
 
-    pytest tests/fuzz/test_keeping.py --hypothesis-profile=attack
+    pytest tests/fuzz/test_keeping.py --hypothesis-profile=attack -m ''
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from io import StringIO
 from math import modf
 from pathlib import Path
 from shutil import copytree, rmtree
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from unittest.mock import patch
 
 import pytest
@@ -42,6 +42,7 @@ from orchestrator.studies.engine import Engine, Outcome, Point
 from orchestrator.studies.store import Store
 from support.machine import contents, ended, forked
 from support.runs import InThisProcess
+from support.tiers import slow
 
 #: Examples of each command; with the profile `attack` some hundred times as many.
 EXAMPLES = max(settings.default.max_examples // 10, 8)
@@ -248,7 +249,16 @@ def is_kept(name: str, content: bytes | str, after: dict[str, bytes | str]) -> b
     return False
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+def representatives(names: Iterable[str], *fast: str) -> list[Any]:
+    """All of them, of which but a few are tried fast."""
+    return [*fast, *slow(*(name for name in names if name not in fast))]
+
+
+#: The others write through the same folder, or the same single file.
+WRITERS = representatives(COMMANDS, "run", "view", "build", "new")
+
+
+@pytest.mark.parametrize("name", WRITERS)
 def test_every_file_of_the_users_stays(here: Path, name: str):
     @settings(max_examples=EXAMPLES, suppress_health_check=list(HealthCheck))
     @given(what=folders, companion=st.sampled_from(COMPANIONS))
@@ -347,7 +357,7 @@ def made(folder: Path) -> dict[str, bytes]:
     return {name: found[name] for name in found if not name.startswith(".auv-fmu-")}
 
 
-@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("name", representatives(READERS, "checkpoint", "report"))
 def test_no_changed_bit_is_taken_in_silence(here: Path, tmp_path: Path, name: str):
     begin, prepare, read = READERS[name]
     left, whole = tmp_path / "left", tmp_path / "out"

@@ -162,6 +162,10 @@ class Trial:
         status = make(host, call, self.saved)
         assert status == self._status(), f"the status is {status.name}"
         logged = {f"fmi2{message.status.name}" for message in host.messages}
+        if host.library.answers:
+            for message in host.messages:
+                # PythonFMU tells what it does not support under a name of its own.
+                assert message.category in (f"logStatus{message.status.name}", "cppfmu"), message
         if self.state != ERROR or not answer.fails:
             assert not answer.message or answer.message in logged, f"messages: {logged or 'none'}"
         if self.cell.leads_to != ERROR:

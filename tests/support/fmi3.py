@@ -16,9 +16,7 @@ from xml.etree import ElementTree
 import fmpy
 
 from fmus.kinds import NATIVE
-from support.cells import check, company_of
-from support.raw import Description, Library, Variable, variable
-from support.raw_fmi import MODEL_EXCHANGE
+from support.raw import MODEL_EXCHANGE, Description, Library, Variable, variable
 from support.status_table import names_in_fmi3
 
 Logger = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
@@ -143,18 +141,3 @@ class _Functions:
                 component, references, n, values, n
             )
         return function  # type: ignore[no-any-return]
-
-
-def trials(folder: Path, other: Path) -> Any:
-    """Prepare a process for cells of the tables that both versions share."""
-    library = Fmi3Library(folder)
-    company = company_of(library, Fmi3Library(other))
-
-    def trial(cell: tuple[tuple[str, str], str]) -> str:
-        try:
-            check(library, *cell, company)
-        except AssertionError as error:
-            return str(error) or "an assertion fails"
-        return ""
-
-    return trial

@@ -5,10 +5,12 @@ fmpy turns a status into an exception and NULL into an error of its own; here bo
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from ctypes import (
     CDLL,
+    CFUNCTYPE,
+    Structure,
     byref,
     c_char_p,
     c_double,
@@ -28,7 +30,6 @@ from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 from fmus.kinds import NATIVE, PYTHON
-from support.raw_fmi import CO_SIMULATION, Callbacks, Logger
 
 
 class Status(IntEnum):
@@ -41,8 +42,67 @@ class Status(IntEnum):
     Fatal = 4
 
 
+MODEL_EXCHANGE, CO_SIMULATION = range(2)
 KINDS = ("Real", "Integer", "Boolean", "String")
 TERMINATED_KIND, LAST_SUCCESSFUL_TIME_KIND = 3, 2
+
+#: What the functions take after the component: a pointer, a number of things, an int or a double.
+SIGNATURES = {
+    "SetDebugLogging": "inp",
+    "SetupExperiment": "iddid",
+    "EnterInitializationMode": "",
+    "ExitInitializationMode": "",
+    "Terminate": "",
+    "Reset": "",
+    "CancelStep": "",
+    **{f"{verb}{kind}": "pnp" for kind in KINDS for verb in ("Get", "Set")},
+    **dict.fromkeys(("GetFMUstate", "SetFMUstate", "FreeFMUstate"), "p"),
+    "SerializedFMUstateSize": "pp",
+    "SerializeFMUstate": "ppn",
+    "DeSerializeFMUstate": "pnp",
+    "GetDirectionalDerivative": "pnpnpp",
+    "SetRealInputDerivatives": "pnpp",
+    "GetRealOutputDerivatives": "pnpp",
+    "DoStep": "ddi",
+    **{f"Get{kind}Status": "ip" for kind in ("", *KINDS)},
+}
+OF_MODEL_EXCHANGE = {
+    "EnterEventMode": "",
+    "NewDiscreteStates": "p",
+    "EnterContinuousTimeMode": "",
+    "CompletedIntegratorStep": "ipp",
+    "SetTime": "d",
+    "SetContinuousStates": "pn",
+    "GetDerivatives": "pn",
+    "GetEventIndicators": "pn",
+    "GetContinuousStates": "pn",
+    "GetNominalsOfContinuousStates": "pn",
+}
+
+
+def harmless() -> dict[str, list[Any]]:
+    """Arguments for each function that do no harm: zero, or room for what a pointer asks for."""
+    zeros = {"i": c_int, "d": c_double, "n": c_size_t, "p": c_double * 8}
+    return {
+        f"fmi2{name}": [zeros[kind]() for kind in signature]
+        for name, signature in {**SIGNATURES, **OF_MODEL_EXCHANGE}.items()
+    }
+
+
+Logger = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
+
+
+class Callbacks(Structure):
+    """fmi2CallbackFunctions."""
+
+    _fields_ = (
+        ("logger", Logger),
+        ("allocate", c_void_p),
+        ("release", c_void_p),
+        ("step_finished", c_void_p),
+        ("environment", c_void_p),
+    )
+
 
 #: What every process has: calloc and free.
 _LIBC = CDLL(None)
@@ -82,6 +142,10 @@ class Description:
         """By value reference and type."""
         return {(v.reference, v.kind): v.name for v in self.variables}
 
+    @cached_property
+    def fault(self) -> Variable:
+        return self.find("fault")
+
     def find(self, name: str) -> Variable:
         return next(v for v in self.variables if v.name == name)
 
@@ -117,8 +181,8 @@ def variable(
         element.attrib["name"],
         int(element.attrib["valueReference"]),
         kind,
-        element.attrib["causality"],
-        element.attrib["variability"],
+        element.get("causality", "local"),
+        element.get("variability", "continuous"),
         None if start is None else convert(start),
         *(None if limit is None else float(limit) for limit in map(limited.get, ("min", "max"))),
     )
@@ -175,6 +239,8 @@ class Host:
         self.library = library
         self.description = library.description
         self.messages: list[Message] = []
+        #: Called by the logger; what it does is the test's business.
+        self.when_told: Callable[[], object] = lambda: None
         self._logger = Logger(self._log)
         memory = (cast(_LIBC.calloc, c_void_p), cast(_LIBC.free, c_void_p))
         self.callbacks = Callbacks(self._logger, *memory, None, None)
@@ -183,12 +249,12 @@ class Host:
             kind: _Arrays(kind, [v for v in self.description.variables if v.kind == kind])
             for kind in KINDS
         }
-        self._fault = self.description.find("fault")
         self._outputs = _Arrays("Real", self.description.of("output", "Real"))
 
     def _log(self, _environment: int, _name: bytes, status: int, category: bytes, text: bytes):
         texts = (word.decode("utf-8", "replace") for word in (category or b"", text or b""))
         self.messages.append(Message(Status(status), *texts))
+        self.when_told()
 
     def instantiate(
         self,
@@ -282,7 +348,7 @@ class Host:
         return self._read(self._outputs)
 
     def fault(self) -> bool:
-        return bool(self.value(self._fault))
+        return bool(self.value(self.description.fault))
 
     def get_state(self) -> int:
         state = c_void_p()
@@ -328,3 +394,12 @@ def instance(library: Library, **arguments: Any) -> Iterator[Host]:
         yield host
     finally:
         host.free()
+
+
+@contextmanager
+def initialised(library: Library, **arguments: Any) -> Iterator[Host]:
+    """An instance that can step, and has said nothing yet."""
+    with instance(library, **arguments) as host:
+        assert host.setup() == host.enter() == host.exit() == Status.OK
+        host.messages.clear()
+        yield host

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from ctypes import addressof, c_double, c_int, c_size_t, c_void_p
+from ctypes import addressof, c_int, c_void_p
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -13,14 +13,17 @@ from typing import Any
 from fmus.kinds import PYTHON
 from support.calls import MANY
 from support.cells import check, company_of
-from support.raw import Host, Library, Status, instance
-from support.raw_fmi import MODEL_EXCHANGE, SIGNATURES
+from support.fmi3 import Fmi3Library
+from support.raw import MODEL_EXCHANGE, Host, Library, Status, harmless, instance
 from support.status_table import (
     CREATION,
     WITHOUT_AN_INSTANCE,
     creations,
     without_an_instance,
 )
+
+#: Beside the kinds: FMUs in C of FMI 3.0, behind the functions of FMI 2.0.
+FMI3 = "FMI 3.0"
 
 #: A row and a column.
 Cell = tuple[tuple[str, str], str]
@@ -54,14 +57,15 @@ def trials(folder: Path, other: Path, kind: str = PYTHON) -> Callable[[Cell], st
     Args:
         folder: of the unpacked FMU.
         other: of another one.
-        kind: of both.
+        kind: of both, or :data:`FMI3`.
 
     Returns:
         What tells what is wrong with a cell, empty: nothing.
 
     """
-    library = Library(folder)
-    company = company_of(library, Library(other))
+    load = Fmi3Library if kind == FMI3 else Library
+    library = load(folder)
+    company = company_of(library, load(other))
 
     def trial(cell: Cell) -> str:
         (function, case), state = cell
@@ -126,13 +130,6 @@ def _check_creation(library: Library, case: str, possible: bool) -> None:
         assert after.setup() == Status.OK, "no instance can be made any more"
 
 
-def _argument(kind: Any) -> Any:
-    """What does no harm on an instance: zero, no state, or room for what a pointer asks for."""
-    if kind in (c_int, c_double, c_size_t):
-        return kind()
-    return None if kind is c_void_p else (c_double * 8)()
-
-
 def _check_without_an_instance(library: Library, case: str) -> None:
     with instance(library) as witness:
         assert witness.setup() == Status.OK
@@ -146,9 +143,8 @@ def _check_without_an_instance(library: Library, case: str) -> None:
             gone.free()
         elif case == "a pointer to something else":
             target = addressof(memory)
-        for short, signature in SIGNATURES.items():
-            name = f"fmi2{short}"
-            status = witness.call_on(target, name, *map(_argument, signature))
+        for name, arguments in harmless().items():
+            status = witness.call_on(target, name, *arguments)
             assert f"fmi2{status.name}" == without_an_instance()[case], f"{name}: {status.name}"
         witness.library.functions.fmi2FreeInstance(c_void_p(target))
         assert list(memory) == [0] * 64
