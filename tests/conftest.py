@@ -7,6 +7,7 @@ import re
 import shutil
 import signal
 from collections import Counter
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from hypothesis import Phase, settings
 from platformdirs import user_cache_path
 
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
+from orchestrator.commands.main import main
 from orchestrator.machine.locks import claimed
 from orchestrator.runs import bundle
 
@@ -144,3 +146,20 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder as the current one."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """What `auv-fmu` says of arguments that it refuses: one line that can be read, and no more."""
+
+    def said(*arguments: str, status: int = 2) -> str:
+        capsys.readouterr()
+        assert main([*arguments]) == status
+        out, line = capsys.readouterr()
+        assert out == ""
+        assert line.startswith("auv-fmu: ") and line.endswith("\n")
+        assert line[:-1].isprintable()
+        assert len(line) < 600
+        return str(line)
+
+    return said

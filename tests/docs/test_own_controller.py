@@ -77,30 +77,6 @@ def test_both_bases_give_the_same_motion(followed: Path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        (["3x"], "not a name for a controller"),
-        (["a-b"], "not a name for a controller"),
-        (["größe"], "not a name for a controller"),
-        (["random"], "taken in Python"),
-        (["class"], "taken in Python"),
-        (["Law", "full"], "full: is not empty"),
-        (["Law", "full/file"], "cannot write into full/file"),
-    ],
-)
-def test_what_cannot_be_made_is_refused_in_one_line(
-    arguments, complaint, tmp_path, monkeypatch, capsys
-):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full/file").write_text("mine")
-    assert main(["new", "controller", *arguments]) == 2
-    [line] = capsys.readouterr().err.splitlines()
-    assert complaint in line
-    assert (tmp_path / "full/file").read_text() == "mine"
-
-
-@pytest.mark.parametrize(
     ("text", "complaint"),
     [
         ("x = = 1", "mine.py:1: SyntaxError"),

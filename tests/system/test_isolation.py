@@ -17,7 +17,6 @@ from uuid import uuid4
 import numpy as np
 import pytest
 
-from orchestrator.commands.main import main
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.formats.tables import read_rows
 from orchestrator.machine.errors import InputError, StartError
@@ -450,19 +449,6 @@ def test_nothing_that_an_isolated_fmu_writes_speaks_to_the_terminal(c_fmu, capfd
     first, second, *_ = capfd.readouterr().err.split("\n")
     assert first == r"\x1b]0;owned\x07 grün"
     assert second.startswith(r"\r\x9b")
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--step-timeout", "3"], "needs isolation"),
-        (["--isolate", "--step-timeout", "nan"], "must be a positive number"),
-        (["--isolate", "--step-timeout", "0"], "must be a positive number"),
-    ],
-)
-def test_a_timeout_that_means_nothing_is_bad_usage(options, words, capsys):
-    assert main(["run", "fig4", *options]) == 2
-    assert words in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.commands.main import main
-from orchestrator.machine.errors import InputError, StartError
+from orchestrator.machine.errors import StartError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.events import Alter, Event, Events
@@ -264,25 +264,6 @@ def test_rows_that_cannot_be_kept_end_a_run(folder, loop):
     )
     assert 1000 < len(full) < len(whole) < 2001
     assert np.array_equal(whole.time, np.arange(len(whole)) * H)
-
-
-def test_auto_takes_no_compiled_loop_for_isolated_fmus():
-    experiment = Experiment(100 * H, H)
-    assert chosen("compiled", experiment).name == "compiled"
-    assert chosen("auto", experiment).name == "compiled"
-    assert chosen("auto", experiment, Isolation()).name == "python"
-
-
-def test_the_compiled_loop_and_isolation_are_one_too_many(workplace, capsys):
-    assert main(["run", "fig4", "--stop-time", "0.1", "--isolate", "--loop", "compiled"]) == 2
-    [line] = capsys.readouterr().err.splitlines()
-    assert line == ("auv-fmu: the compiled loop steps no isolated FMUs: leave one of the two out")
-    assert list(workplace.iterdir()) == []
-
-
-def test_a_loop_that_there_is_not_is_refused():
-    with pytest.raises(InputError, match="loop 'fast': use one of auto, python, compiled"):
-        chosen("fast", Experiment(H, H))
 
 
 @pytest.mark.parametrize("loop", LOOPS)
