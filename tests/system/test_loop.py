@@ -14,17 +14,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
-from orchestrator.machine.errors import InputError, StartError
+from orchestrator.machine.errors import StartError
 from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.fmi.instance import Ended
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.events import Alter, Event, Events
+from orchestrator.master.hooks.hook import NEVER, Run
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
+from orchestrator.runs.loading import load
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.names import PortName
+from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 from orchestrator.system.units import Linear
 from support.machine import LOOPS
@@ -266,27 +270,46 @@ def test_rows_that_cannot_be_kept_end_a_run(folder, loop):
     assert np.array_equal(whole.time, np.arange(len(whole)) * H)
 
 
-def test_auto_takes_no_compiled_loop_for_isolated_fmus():
-    experiment = Experiment(100 * H, H)
-    assert chosen("compiled", experiment).name == "compiled"
-    assert chosen("auto", experiment).name == "compiled"
-    assert chosen("auto", experiment, Isolation()).name == "python"
-
-
-def test_the_compiled_loop_and_isolation_are_one_too_many(workplace, capsys):
-    assert main(["run", "fig4", "--stop-time", "0.1", "--isolate", "--loop", "compiled"]) == 2
-    [line] = capsys.readouterr().err.splitlines()
-    assert line == ("auv-fmu: the compiled loop steps no isolated FMUs: leave one of the two out")
-    assert list(workplace.iterdir()) == []
-
-
-def test_a_loop_that_there_is_not_is_refused():
-    with pytest.raises(InputError, match="loop 'fast': use one of auto, python, compiled"):
-        chosen("fast", Experiment(H, H))
-
-
 @pytest.mark.parametrize("loop", LOOPS)
 def test_the_record_says_which_loop_has_run(workplace, loop):
     options = ["--stop-time", "0.1", "--no-figures", "--out", "r", "--loop", loop]
     assert main(["run", "fig4", *options]) == 0
     assert json.loads(Path("r/run.json").read_text())["loop"] == loop
+
+
+class Pushes:
+    """Surge force of zero from one time to another, and the end of the run at a third [steps]."""
+
+    def __init__(self, begin: int, end: int, stop: int = NEVER) -> None:
+        self._acts = {begin: self._begin, end: self._end, stop: self._stop}
+        self.times: list[int] = []
+
+    def act(self, run: Run) -> int:
+        self.times.append(run.made)
+        if act := self._acts.pop(run.made, None):
+            act(run)
+        return min(self._acts, default=NEVER)
+
+    def _begin(self, run: Run) -> None:
+        run.overrides.override(port_name("plant.tau.u"), 0.0)
+
+    def _end(self, run: Run) -> None:
+        run.overrides.release(port_name("plant.tau.u"))
+
+    def _stop(self, run: Run) -> None:
+        raise Ended("enough")
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_hook_acts_on_the_steps_that_it_names(loop, order):
+    pushes = Pushes(10, 620, 650)
+    table = run_table(load("fig4", NATIVE), Experiment(14.0, 0.02, order), loop, hooks=[pushes])
+    assert pushes.times == [0, 10, 620, 650]
+    assert (table.failure, table.ending.remark) == (None, "ended at t = 13 s: enough")
+    assert len(table) == 651
+    # A row holds the inputs that the step before it was made with.
+    force, command = table["plant.tau.u"], table["controller.tau.u"]
+    free = np.r_[1:11, 621:651]
+    np.testing.assert_array_equal(force[11:621], 0.0)
+    np.testing.assert_array_equal(force[free], command[free - (order == "jacobi")])

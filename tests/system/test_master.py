@@ -32,6 +32,7 @@ from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from support.machine import LOOPS
 from support.runs import run, write
+from support.texts import mentions
 from support.tiers import slow
 
 
@@ -53,23 +54,21 @@ def test_gauss_seidel_order_follows_the_declared_feedthrough(system: System):
 @pytest.mark.parametrize(
     ("source", "target", "reason"),
     [
-        ("plant.y.w", "controller.y.x", "no port or parameter 'y.w'; did you mean"),
-        ("plante.y.x", "controller.y.x", "no component 'plante'; it has plant, controller"),
-        ("plant.y.x", "controller.yx", "no port or parameter 'yx'"),
-        ("plant.tau.u", "controller.y.x", "plant.tau.u is of causality input, not output"),
-        ("plant.y.x", "controller.e.x", "controller.e.x is of causality output, not input"),
-        ("plant.fault", "controller.y.x", "cannot feed Boolean into Real"),
-        ("plant.nu.u", "controller.y.x", "units differ, m/s and m"),
+        ("plant.y.w", "controller.y.x", "'y.w' y.x"),
+        ("plante.y.x", "controller.y.x", "'plante' plant, controller"),
+        ("plant.y.x", "controller.yx", "'yx'"),
+        ("plant.tau.u", "controller.y.x", "plant.tau.u input output"),
+        ("plant.y.x", "controller.e.x", "controller.e.x output input"),
+        ("plant.fault", "controller.y.x", "Boolean Real"),
+        ("plant.nu.u", "controller.y.x", "units m/s m"),
     ],
 )
 def test_connection_that_does_not_fit_is_refused(system, source, target, reason):
-    with pytest.raises(InputError, match=reason.replace("?", r"\?")):
+    with pytest.raises(InputError) as error:
         run(with_connection(system, source, target), 1.0, 0.02)
-
-
-def test_input_with_two_sources_is_refused(system: System):
+    assert mentions(str(error.value), reason)
     twice = replace(system, connections=(*system.connections, system.connections[0]))
-    with pytest.raises(InputError, match="one connection"):
+    with pytest.raises(InputError, match=str(system.connections[0].target)):
         run(twice, 1.0, 0.02)
 
 
@@ -107,12 +106,6 @@ def test_roll_that_is_held_cannot_start_otherwise(system, name):
         run(system.with_parameters(values), 1.0, 0.02)
 
 
-@pytest.mark.parametrize("experiment", [(0.0, 0.02), (-1.0, 0.02), (1.0, 0.0), (float("nan"), 1.0)])
-def test_impossible_experiment_is_refused(system, experiment):
-    with pytest.raises(InputError, match="must be positive"):
-        run(system, *experiment)
-
-
 @pytest.mark.parametrize("loop", LOOPS)
 def test_time_is_computed_and_the_last_step_ends_at_the_stop_time(system: System, loop: str):
     result = run(system, 1.0, 0.03, loop=loop)
@@ -128,18 +121,6 @@ def test_an_open_component_runs_with_inputs_that_were_set(system: System, loop: 
     result = run(alone.with_parameters({port("plant.tau.u"): 10.0}), 20.0, 0.02, loop=loop)
     assert result["plant.nu.u"][-1] == pytest.approx(1 / 3, rel=1e-9)
     assert (result["plant.tau.u"] == 10.0).all()
-
-
-@pytest.mark.parametrize("loop", LOOPS)
-def test_failure_keeps_the_rows_before_it_and_says_why(system: System, loop: str):
-    """h d11 / m11 = 8: Euler's scheme multiplies the surge velocity by -7 in every step."""
-    broken = system.with_parameters({port("plant.d11"): 1e4})
-    result = run(broken, 100.0, 0.02, loop=loop)
-    assert result.failure is not None
-    assert "stopped at t =" in result.failure
-    assert "refused" in result.failure
-    assert 10 < len(result) < 5001
-    assert np.isfinite(result.rows).all()
 
 
 class Impatient(Table):
@@ -161,6 +142,7 @@ def test_interrupt_keeps_the_rows_and_does_not_reach_the_fmus(system: System, lo
     assert np.isfinite(result.rows).all()
 
 
+#: A run, one that is refused, and one that fails.
 _RUNS_AND_FAILS = """
 import sys
 from pathlib import Path
@@ -183,7 +165,7 @@ def python(code: str, *arguments: object, folder: Path) -> subprocess.CompletedP
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("loop", LOOPS)
+@pytest.mark.parametrize("loop", ["python", *slow("compiled")])
 def test_runs_in_several_threads_share_what_is_loaded(dist: Path, tmp_path: Path, loop: str):
     """Six threads from a cold start; one folder for each FMU and the archive."""
     code = """
@@ -204,7 +186,7 @@ print(sum(path.is_dir() for path in folder.iterdir()))
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("loop", LOOPS)
+@pytest.mark.parametrize("loop", ["compiled", *slow("python")])
 def test_ctrl_c_ends_a_script_that_simulates(dist: Path, tmp_path: Path, loop: str):
     code = """
 import os, signal, sys, threading
@@ -219,19 +201,14 @@ for _ in range(1000):
     assert process.returncode != 0
 
 
-def test_nothing_is_left_in_the_temporary_folder(dist: Path, tmp_path: Path):
-    process = python(_RUNS_AND_FAILS, dist / "auv.ssp", folder=tmp_path)
-    assert process.returncode == 0, process.stderr
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize("name", ["a+b", *slow("größe", "100%", "a%2Bb", "(x) & 'y'", "#1?")])
-def test_fmus_run_from_a_temporary_folder_of_any_name(dist: Path, tmp_path: Path, name: str):
+def test_a_temporary_folder_of_any_name_is_left_empty(dist: Path, tmp_path: Path, name: str):
     """Our loader decodes what PythonFMU does not; without it such a folder is refused."""
     folder = tmp_path / name
     folder.mkdir()
     process = python(_RUNS_AND_FAILS, dist / "auv.ssp", folder=folder)
     assert process.returncode == 0, process.stderr
+    assert list(folder.iterdir()) == []
 
 
 def test_temporary_folder_that_would_crash_a_plain_fmu_is_refused(dist: Path, tmp_path: Path):

@@ -83,15 +83,6 @@ def test_strict_wants_rings_solved_unless_something_else_is_stated(folder):
     simulated(replace(system, steps={}), strict=True)
 
 
-def test_values_of_a_ring_are_its_solution_at_the_start(folder):
-    """g = A g + c, of which the iteration is a contraction."""
-    table = run(ring(folder), Experiment(H, H))
-    matrix = np.array([[0.0, 0.0, 0.5], [-1.0, 0.0, 0.0], [0.0, 0.25, 0.0]])
-    solution = np.linalg.solve(np.eye(3) - matrix, [1.0, 2.0, -1.0])
-    found = [table[f"{name}.g"][0] for name in "abc"]
-    np.testing.assert_allclose(found, solution, rtol=0.0, atol=1e-15)
-
-
 def test_a_ring_that_does_not_come_to_rest_is_refused_with_its_ports(folder):
     """Its gain is one, and something is added each time: there is no solution."""
     with pytest.raises(InputError, match=r"do not come to rest: b\.u in an algebraic loop"):
@@ -111,20 +102,6 @@ def test_an_order_of_names_is_the_derived_one_where_it_says_the_same(order):
     same = delayed(system, order) == []
     assert same == (order[-1] == "plant")
     assert (table.rows.tobytes() == derived.rows.tobytes()) == same
-
-
-@pytest.mark.parametrize(
-    ("order", "words"),
-    [
-        (["plant"], "names controller, disturbance, planner not at all; it takes every component"),
-        (["plant", "plant"], "order plant,plant: names plant twice; it takes every component once"),
-        (["plants"], "no component 'plants'; it has .*; did you mean plant"),
-        ("random", "order 'random': use one of gauss-seidel, jacobi, or name every component"),
-    ],
-)
-def test_orders_that_cannot_be_are_refused(order, words):
-    with pytest.raises(InputError, match=words):
-        simulated(load("fig4", NATIVE), order=order)
 
 
 @pytest.mark.parametrize("order", ORDERS)

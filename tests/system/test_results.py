@@ -46,6 +46,11 @@ def test_interval_and_columns_choose_from_the_same_numbers():
     assert np.array_equal(rows("some/result.csv"), whole[::25, places])
     # Indices are those of all steps, whatever is kept.
     assert Path("some/metrics.json").read_text() == Path("all/metrics.json").read_text()
+    outputs = ["--stop-time", "0.1", "--no-figures", "--columns", "outputs", "--out", "outputs"]
+    assert main(["run", "fig4", *outputs]) == 0
+    assert {"plant.y.x", "plant.tau.u"} & {*read_columns(Path("outputs/result.csv"))} == {
+        "plant.y.x"
+    }
 
 
 def test_a_companion_without_a_column_does_without_it():
@@ -62,14 +67,6 @@ def test_our_own_table_is_verified_with_the_step_of_its_scenario(capsys):
     assert main(["run", "fine.toml", "--no-figures"]) == 0
     assert main(["verify", "results/fine/result.csv", "--scenario", "fine.toml"]) == 0
     assert "to 0.5 s" in capsys.readouterr().out
-
-
-def test_outputs_alone():
-    arguments = ["--stop-time", "0.1", "--no-figures", "--columns", "outputs"]
-    assert main(["run", "fig4", *arguments]) == 0
-    columns = read_columns(Path("results/fig4/result.csv"))
-    assert "plant.y.x" in columns
-    assert "plant.tau.u" not in columns
 
 
 def test_parquet_holds_the_same_numbers():
@@ -235,11 +232,3 @@ def test_chatter_of_the_robust_term_is_told(capsys: pytest.CaptureFixture[str]):
     assert "warning" not in capsys.readouterr().err
     assert main([*quiet, "--set", "controller.eps_t=0.01"]) == 0
     assert "warning: fig4: the robust term chatters" in capsys.readouterr().err
-
-
-def test_a_run_that_passes_the_pole_is_told(capsys: pytest.CaptureFixture[str]):
-    upright = ["run", "fig5-pd", "--no-figures", "--stop-time", "10"]
-    assert main(upright) == 0
-    assert "warning" not in capsys.readouterr().err
-    assert main([*upright, "--set", "plant.roll=false"]) == 0
-    assert "warning: fig5-pd: the pitch passes 90 degrees by t = " in capsys.readouterr().err

@@ -101,8 +101,3 @@ def test_variant_is_run_with_a_warning_or_refused_by_the_strict(ssp: Path, capsy
     assert result["inner.b.u"][-1] == 2.0 * 3.0 + 5.0
     with pytest.raises(InputError, match="attribute 'own' is not allowed"):
         load(ssp, variant="Other", strict=True)
-
-
-def test_variants_are_for_archives(capsys):
-    assert main(["run", "fig4", "--variant", "B"]) == 2
-    assert "fig4: has no variants" in capsys.readouterr().err

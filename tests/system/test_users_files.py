@@ -91,18 +91,6 @@ def test_somebody_elses_result_is_read_and_no_more(capsys):
     assert "r/result.csv is not a file that auv-fmu wrote" in capsys.readouterr().err
 
 
-def test_names_that_look_like_ours_prove_nothing():
-    mine = put(
-        "r/.unfinished-novel/1.txt", "r/.partial-backup/a", "r/.whole-", ".partial-backup/a",
-        "r/.auv-fmu-mine/a", "r/.earlier.json", ".partial-1.png", "r/notes.md", "r/sub/a.txt",
-    )  # fmt: skip
-    assert main(RUN) == 0
-    assert main(RUN) == 0
-    assert main(["plot", "r", "--out", "plot.png"]) == 0
-    assert main(["export", "fig3a", "--out", "r"]) == 0
-    assert mine.items() <= contents(Path()).items()
-
-
 @pytest.mark.parametrize("name", ["result.csv", "result.parquet", "metrics.json", "run.json"])
 def test_a_file_that_no_run_wrote_is_refused_before_the_first_step(name, capsys):
     mine = put(f"r/{name}")
@@ -116,22 +104,6 @@ def test_a_file_that_no_run_wrote_is_refused_before_the_first_step(name, capsys)
     assert contents(Path()) == mine
     assert main([*RUN, "--force"]) == 0
     assert Path(f"r/{name}.~1~").read_bytes() == mine[f"r/{name}"]
-
-
-def test_another_programs_record_is_not_obeyed(capsys):
-    mine = put("r/notes.md", "r/sub/a.txt")
-    Path("r/run.json").write_text(json.dumps({"files": ["notes.md", "sub/a.txt"]}))
-    assert main(RUN) == 2
-    assert main([*RUN, "--force"]) == 0
-    assert mine.items() <= contents(Path()).items()
-
-
-def test_a_table_of_inputs_is_not_replaced_by_the_result(capsys):
-    mine = "time,plant.tau.u\n0.0,1.0\n1.0,2.0\n"
-    Path("r").mkdir()
-    Path("r/result.csv").write_text(mine)
-    assert main([*RUN, "--inputs", "r/result.csv"]) == 2
-    assert Path("r/result.csv").read_text() == mine
 
 
 def test_what_the_user_changed_is_the_users(capsys):

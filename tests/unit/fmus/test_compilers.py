@@ -15,6 +15,7 @@ from fmus.compilers import compiler_for, library, universal
 from fmus.kinds import platforms
 from fmus.python import packaging
 from orchestrator.machine.children import COMPILERS, machines_compiler
+from support.tiers import slow
 
 OWN = "/usr/bin/own-cc"
 
@@ -75,7 +76,7 @@ def test_apples_compiler_makes_what_a_mac_runs(machine: pytest.MonkeyPatch):
 
 
 @pytest.mark.skipif(packaging.loader_compiler() is None, reason="there is no C compiler")
-@pytest.mark.parametrize("name", COMPILERS)
+@pytest.mark.parametrize("name", [COMPILERS[0], *slow(*COMPILERS[1:])])
 def test_any_one_compiler_will_do(name, tmp_path, monkeypatch):
     """By the packaging and by the master, under whichever of its names there is."""
     real = compilers.machines_compiler()

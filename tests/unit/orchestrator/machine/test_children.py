@@ -44,6 +44,7 @@ def test_figures_are_the_same_whatever_a_matplotlibrc_says(workplace, plain, con
     assert figures(workplace / "results" / "fig4") == plain
 
 
+@pytest.mark.slow
 def test_figures_in_a_program_are_the_same_whatever_it_has_set(workplace, plain):
     import matplotlib as mpl  # noqa: PLC0415
 

@@ -17,6 +17,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master import loop, stepper
 from orchestrator.master.experiment import Experiment
 from support.machine import eventually, members
+from support.tiers import slow
 
 #: Warnings are errors, and C is that of the standard.
 STRICT = ["-Wall", "-Wextra", "-pedantic", "-Werror"]
@@ -86,7 +87,7 @@ def test_a_compiler_that_fails_is_quoted(tmp_path, cache, monkeypatch, said, hea
 
 
 @needs_compiler
-@pytest.mark.parametrize("length", [0, 100, 3000, -1])
+@pytest.mark.parametrize("length", [3000, *slow(0, 100, -1)])
 def test_a_library_that_was_cut_is_never_loaded_but_made_anew(cache, length, monkeypatch):
     # In another process: this one would hold on to the library.
     code = "from orchestrator.master import stepper; print(stepper.made()._name)"
@@ -123,7 +124,7 @@ def test_what_others_have_in_the_cache_stays(cache):
     assert [path.read_text() for path in own] == ["mine"] * 3
 
 
-@pytest.mark.parametrize("script", ["sleep 1000", "exec sleep 1000", "sleep 1000 >&- 2>&-"])
+@pytest.mark.parametrize("script", ["sleep 1000", *slow("exec sleep 1000", "sleep 1000 >&- 2>&-")])
 def test_a_compiler_that_hangs_is_ended_with_what_it_has_started(tmp_path, monkeypatch, script):
     compiler = tmp_path / "cc"
     compiler.write_text(f"#!/bin/sh\necho $$ > {tmp_path}/session\n{script}\necho\n")

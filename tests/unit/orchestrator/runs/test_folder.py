@@ -184,6 +184,7 @@ def test_everything_is_on_the_disk_before_it_counts(tmp_path: Path, monkeypatch)
     assert moved == ["a.csv", "b.csv", RECORD, LEDGER]
 
 
+@pytest.mark.slow
 def test_killed_at_any_moment_the_folder_holds_the_old_result_or_the_new_one(tmp_path: Path):
     old, new, folder = tmp_path / "old", tmp_path / "new", tmp_path / "r"
 

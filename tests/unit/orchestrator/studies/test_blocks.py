@@ -86,6 +86,7 @@ def test_interrupt_ends_processes_that_are_busy():
     assert active_children() == []
 
 
+@pytest.mark.slow
 def test_script_without_a_guard_is_told_what_it_needs(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(
