@@ -29,9 +29,8 @@ def quoted(cell: str) -> list[str]:
 
 @cache
 def names_in(module: str) -> set[str]:
-    [path] = TESTS.rglob(f"{module}.py")
-    tree = ast.parse(path.read_text())
-    return {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    trees = [ast.parse(path.read_text()) for path in TESTS.rglob(f"{module}.py")]
+    return {node.name for tree in trees for node in tree.body if isinstance(node, ast.FunctionDef)}
 
 
 def test_every_equation_from_1_to_59_is_listed_once():
