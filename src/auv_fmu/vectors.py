@@ -60,11 +60,6 @@ def minus_product(D: Vector3, a: Vector3) -> Vector3:
     return -D[0] * a[0], -D[1] * a[1], -D[2] * a[2]
 
 
-def is_zero(a: Vector3) -> bool:
-    """Whether all components are zero."""
-    return not (a[0] or a[1] or a[2])
-
-
 def distance(a: Vector3, b: Vector3) -> float:
     """The norm of a - b."""
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
