@@ -103,12 +103,12 @@ def scene(setting: Setting, vehicles: Vehicles, t: float, n: Vector3) -> Scene:
         n: three independent standard normal numbers, of the localisation system.
 
     """
-    state, rotation, planned, moving = vehicles
-    seen = plant.outputs(state, rotation, setting.plant.ell, setting.plant.roll.rolls)
+    _, rotation, planner, moving = vehicles
+    seen = plant.outputs(vehicles.plant, rotation, setting.plant.ell, setting.plant.roll.rolls)
     return Scene(
         seen,
         plant.measure(seen.y, n, setting.plant.noise.std),
-        motion_planner.reference(planned, moving, setting.planner.ell),
+        motion_planner.reference(planner, moving, setting.planner.ell),
         disturbance(setting.disturbance, seen.nu_r, t),
     )
 
@@ -127,12 +127,13 @@ def move(
         parts: that the step is split into.
 
     """
-    state, rotation, planned, moving = vehicles
-    n_p, _, n_d = parts
-    water = setting.plant.current
-    state, rotation = plant.steps(setting.plant, state, rotation, tau, tau_w, water, h / n_p, n_p)
-    planned, moving = motion_planner.steps(setting.planner, planned, moving, h / n_d, n_d)
-    return Vehicles(state, rotation, planned, moving)
+    _, rotation, planner, moving = vehicles
+    water, n, n_d = setting.plant.current, parts.plant, parts.planner
+    state, rotation = plant.steps(
+        setting.plant, vehicles.plant, rotation, tau, tau_w, water, h / n, n
+    )
+    planner, moving = motion_planner.steps(setting.planner, planner, moving, h / n_d, n_d)
+    return Vehicles(state, rotation, planner, moving)
 
 
 class Moment(NamedTuple):
@@ -261,12 +262,13 @@ def act(
         delayed: the command and the disturbance act one step late, as in Jacobi order (reading 5).
 
     """
-    t, vehicles, seen, state, before = moment
-    measured = law.measurement(seen)
-    state, signals = law.command(setting.controller, state, measured, h / parts.controller)
-    told, tau_w = before if delayed and t > 0.0 else (signals.tau, seen.tau_w)
+    t, vehicles, scene, controller_state, before = moment
+    h_c = h / parts.controller
+    measured = law.measurement(scene)
+    state, signals = law.command(setting.controller, controller_state, measured, h_c)
+    told, tau_w = before if delayed and t > 0.0 else (signals.tau, scene.tau_w)
     tau = plant.applied(setting.plant, told)
-    return Instant(t, vehicles, seen, measured, state, signals, told, tau, tau_w)
+    return Instant(t, vehicles, scene, measured, state, signals, told, tau, tau_w)
 
 
 def step(
@@ -284,11 +286,11 @@ def step(
         n: three independent standard normal numbers, for what is measured then.
 
     """
-    _, vehicles, seen, measured, state, signals, _, tau, tau_w = instant
+    _, vehicles, _, measured, controller_state, signals, _, tau, tau_w = instant
     n_c = parts.controller
-    state = law.steps(setting.controller, state, signals, measured, h / n_c, n_c)
+    state = law.steps(setting.controller, controller_state, signals, measured, h / n_c, n_c)
     vehicles = move(setting, vehicles, tau, tau_w, h, parts)
-    now = signals.tau, seen.tau_w
+    now = signals.tau, instant.scene.tau_w
     return Moment(end, vehicles, scene(setting, vehicles, end, n), state, now)
 
 

@@ -247,8 +247,8 @@ def moved(
 
     """
     position, (a, b, c, d), (u, v, w, p, q, r), _, water = state
-    velocity, (da, db, dc, dd), (du, dv, dw, dp, dq, dr) = rate
-    position = plus_scaled(position, h, velocity)
+    _, (da, db, dc, dd), (du, dv, dw, dp, dq, dr) = rate
+    position = plus_scaled(position, h, rate.position)
     nu = u + h * du, v + h * dv, w + h * dw, p + h * dp, q + h * dq, r + h * dr
     if roll.rolls:
         attitude = normalised((a + h * da, b + h * db, c + h * dc, d + h * dd))
