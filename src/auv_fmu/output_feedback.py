@@ -26,6 +26,7 @@ from auv_fmu.vectors import (
     minus_times,
     norm,
     plus_scaled,
+    plus_two_scaled,
     scaled,
     total,
 )
@@ -142,11 +143,11 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement, h: 
     dy_r = minus_scaled(dy_d, lambda_, s_ez)  # (16): dy_d - Lambda s(e - z)
     if form == INTEGRAL:
         dy_hat_o = total(dy_r, dy_hat_o)  # (24) as printed: dy_r + k_d Lambda int s(z)
-    dy_hat = plus_scaled(plus_scaled(dy_hat_o, lambda_, s_z), k_d, z)  # (23)
+    dy_hat = plus_two_scaled(dy_hat_o, lambda_, s_z, k_d, z)  # (23)
     dy_o = minus_scaled(dy_hat, lambda_, s_z)  # (18): dy_hat - Lambda s(z)
     de = difference(dy_hat, dy_d)
     ddy_r = minus_times(ddy_d, scaled(lambda_, slope(s, e_z, s_ez)), de)  # Remark 3
-    r_hat_sum = plus_scaled(plus_scaled(de, lambda_, s_ez), lambda_, s_z)  # below (21)
+    r_hat_sum = plus_two_scaled(de, lambda_, s_ez, lambda_, s_z)  # below (21)
     G = regressor(dy_r, ddy_r)  # below (20)
     rho_hat = bound(G, theta_hat)  # below (21)
     robust = robust_force(rho_hat, r_hat_sum, eps_t)  # last term of (21)

@@ -45,6 +45,11 @@ def plus_scaled(a: Vector3, k: float, b: Vector3) -> Vector3:
     return a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]
 
 
+def plus_two_scaled(a: Vector3, k: float, b: Vector3, m: float, c: Vector3) -> Vector3:
+    """The vector a + k b + m c."""
+    return a[0] + k * b[0] + m * c[0], a[1] + k * b[1] + m * c[1], a[2] + k * b[2] + m * c[2]
+
+
 def minus_scaled(a: Vector3, k: float, b: Vector3) -> Vector3:
     """The vector a - k b."""
     return a[0] - k * b[0], a[1] - k * b[1], a[2] - k * b[2]
