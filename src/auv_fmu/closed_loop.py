@@ -103,13 +103,12 @@ def scene(setting: Setting, vehicles: Vehicles, t: float, n: Vector3) -> Scene:
         n: three independent standard normal numbers, of the localisation system.
 
     """
-    seen = plant.outputs(
-        vehicles.plant, vehicles.rotation, setting.plant.ell, setting.plant.roll.rolls
-    )
+    _, rotation, planner, moving = vehicles
+    seen = plant.outputs(vehicles.plant, rotation, setting.plant.ell, setting.plant.roll.rolls)
     return Scene(
         seen,
         plant.measure(seen.y, n, setting.plant.noise.std),
-        motion_planner.reference(vehicles.planner, vehicles.moving, setting.planner.ell),
+        motion_planner.reference(planner, moving, setting.planner.ell),
         disturbance(setting.disturbance, seen.nu_r, t),
     )
 
@@ -128,20 +127,13 @@ def move(
         parts: that the step is split into.
 
     """
+    _, rotation, planner, moving = vehicles
+    water, n, n_d = setting.plant.current, parts.plant, parts.planner
     state, rotation = plant.steps(
-        setting.plant,
-        vehicles.plant,
-        vehicles.rotation,
-        tau,
-        tau_w,
-        setting.plant.current,
-        h / parts.plant,
-        parts.plant,
+        setting.plant, vehicles.plant, rotation, tau, tau_w, water, h / n, n
     )
-    planned, moving = motion_planner.steps(
-        setting.planner, vehicles.planner, vehicles.moving, h / parts.planner, parts.planner
-    )
-    return Vehicles(state, rotation, planned, moving)
+    planner, moving = motion_planner.steps(setting.planner, planner, moving, h / n_d, n_d)
+    return Vehicles(state, rotation, planner, moving)
 
 
 class Moment(NamedTuple):
@@ -270,13 +262,13 @@ def act(
         delayed: the command and the disturbance act one step late, as in Jacobi order (reading 5).
 
     """
-    seen, gains, h_c = moment.scene, setting.controller, h / parts.controller
-    measured = law.measurement(seen)
-    state, signals = law.command(gains, moment.controller_state, measured, h_c)
-    now = signals.tau, seen.tau_w
-    told, tau_w = moment.before if delayed and moment.t > 0.0 else now
+    t, vehicles, scene, controller_state, before = moment
+    h_c = h / parts.controller
+    measured = law.measurement(scene)
+    state, signals = law.command(setting.controller, controller_state, measured, h_c)
+    told, tau_w = before if delayed and t > 0.0 else (signals.tau, scene.tau_w)
     tau = plant.applied(setting.plant, told)
-    return Instant(moment.t, moment.vehicles, seen, measured, state, signals, told, tau, tau_w)
+    return Instant(t, vehicles, scene, measured, state, signals, told, tau, tau_w)
 
 
 def step(
@@ -294,9 +286,10 @@ def step(
         n: three independent standard normal numbers, for what is measured then.
 
     """
-    gains, signals, n_c = setting.controller, instant.signals, parts.controller
-    state = law.steps(gains, instant.controller_state, signals, instant.measured, h / n_c, n_c)
-    vehicles = move(setting, instant.vehicles, instant.tau, instant.tau_w, h, parts)
+    _, vehicles, _, measured, controller_state, signals, _, tau, tau_w = instant
+    n_c = parts.controller
+    state = law.steps(setting.controller, controller_state, signals, measured, h / n_c, n_c)
+    vehicles = move(setting, vehicles, tau, tau_w, h, parts)
     now = signals.tau, instant.scene.tau_w
     return Moment(end, vehicles, scene(setting, vehicles, end, n), state, now)
 

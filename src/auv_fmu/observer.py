@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import expm1
 
-from auv_fmu.vectors import Vector3, plus_scaled, scaled, total
+from auv_fmu.vectors import Vector3, plus_scaled, scaled
 
 #: A form of the observer as a value: which one of these.
 Form = int
@@ -20,23 +20,12 @@ EULER: Form = 0
 #: The same, with the term -k_d z of the error integrated exactly: :func:`exact_gain`.
 EXACT: Form = 1
 
-#: (24) as it is printed, with an integral that begins at zero.
+#: (24) as it is printed, dy_hat_o = dy_r + k_d Lambda int s(z), of which the state is the second
+#: term. It begins at zero, which contradicts the initial condition below (24), unless dy_r(0) = 0.
 INTEGRAL: Form = 2
 
 #: All by the names users select them with.
 FORMS: dict[str, Form] = {"euler": EULER, "exact": EXACT, "integral": INTEGRAL}
-
-
-def gain(form: Form, k_d: float, h: float) -> float:
-    """The observer gain of a step [1/s]: k_d, or :func:`exact_gain` where that is the form.
-
-    Args:
-        form: of the observer.
-        k_d: observer gain [1/s].
-        h: step [s]; 0: there is none, as at the start.
-
-    """
-    return exact_gain(k_d, h) if form == EXACT and h else k_d
 
 
 def exact_gain(k_d: float, h: float) -> float:
@@ -61,21 +50,6 @@ def initial_dy_hat_o(s_z: Vector3, z: Vector3, lambda_: float, k_d: float) -> Ve
     With it the first velocity estimate (23) is zero.
     """
     return scaled(-1.0, plus_scaled(scaled(lambda_, s_z), k_d, z))
-
-
-def dy_hat_o(form: Form, state: Vector3, dy_r: Vector3) -> Vector3:
-    """dy_hat_o [m/s] of (23): the state, whose rate is (51), or (24) as it is printed.
-
-    (24) is dy_hat_o = dy_r + k_d Lambda int s(z), and the state is its second term. This
-    contradicts the initial condition below it, unless dy_r(0) = 0.
-
-    Args:
-        form: of the observer.
-        state: of the observer [m/s].
-        dy_r: velocity of the virtual reference (16) [m/s].
-
-    """
-    return total(dy_r, state) if form == INTEGRAL else state
 
 
 def rate(form: Form, ddy_r: Vector3, s_z: Vector3, lambda_: float, k_d: float) -> Vector3:

@@ -14,7 +14,7 @@ from auv_fmu.adaptation import bound, regressor, robust_force, theta_hat_rate
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import ELL, actuator_command
 from auv_fmu.euler import advance_4
-from auv_fmu.observer import EULER, Form
+from auv_fmu.observer import EULER, EXACT, INTEGRAL, Form
 from auv_fmu.saturation import TANH, Saturation, saturation, slope
 from auv_fmu.vectors import (
     Vector3,
@@ -26,7 +26,9 @@ from auv_fmu.vectors import (
     minus_times,
     norm,
     plus_scaled,
+    plus_two_scaled,
     scaled,
+    total,
 )
 
 
@@ -127,23 +129,25 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement, h: 
         gains: of the controller.
         state: of observer and adaptive law.
         measurement: at the same instant.
-        h: step that begins there, which the gain of an `exact` observer follows from [s].
+        h: step that begins there, which the gain of an `exact` observer follows from [s]; 0: none.
 
     """
     K1, K2, lambda_, k_d, gamma, sigma, theta_0, eps_t, ell, s, printed_jacobian, _, form = gains
     y, (phi, theta, psi), y_d, dy_d, ddy_d = measurement
     y_hat, dy_hat_o, theta_hat = state
-    k_d = observer.gain(form, k_d, h)
+    if form == EXACT and h:
+        k_d = observer.exact_gain(k_d, h)
     e, z = difference(y, y_d), difference(y, y_hat)  # above (16)
     e_z = difference(y_hat, y_d)  # e - z
     s_z, s_ez = saturation(s, z), saturation(s, e_z)
     dy_r = minus_scaled(dy_d, lambda_, s_ez)  # (16): dy_d - Lambda s(e - z)
-    dy_hat_o = observer.dy_hat_o(form, dy_hat_o, dy_r)  # (24)
-    dy_hat = plus_scaled(plus_scaled(dy_hat_o, lambda_, s_z), k_d, z)  # (23)
+    if form == INTEGRAL:
+        dy_hat_o = total(dy_r, dy_hat_o)  # (24) as printed: dy_r + k_d Lambda int s(z)
+    dy_hat = plus_two_scaled(dy_hat_o, lambda_, s_z, k_d, z)  # (23)
     dy_o = minus_scaled(dy_hat, lambda_, s_z)  # (18): dy_hat - Lambda s(z)
     de = difference(dy_hat, dy_d)
     ddy_r = minus_times(ddy_d, scaled(lambda_, slope(s, e_z, s_ez)), de)  # Remark 3
-    r_hat_sum = plus_scaled(plus_scaled(de, lambda_, s_ez), lambda_, s_z)  # below (21)
+    r_hat_sum = plus_two_scaled(de, lambda_, s_ez, lambda_, s_z)  # below (21)
     G = regressor(dy_r, ddy_r)  # below (20)
     rho_hat = bound(G, theta_hat)  # below (21)
     robust = robust_force(rho_hat, r_hat_sum, eps_t)  # last term of (21)
@@ -168,10 +172,11 @@ def step(state: ControllerState, signals: Signals, h: float) -> ControllerState:
 
     """
     y_hat, dy_hat_o, theta_hat = state
+    _, dy_hat, _, _, ddy_hat_o, dtheta_hat = signals
     return ControllerState(
-        plus_scaled(y_hat, h, signals.dy_hat),
-        plus_scaled(dy_hat_o, h, signals.ddy_hat_o),
-        advance_4(theta_hat, signals.dtheta_hat, h),
+        plus_scaled(y_hat, h, dy_hat),
+        plus_scaled(dy_hat_o, h, ddy_hat_o),
+        advance_4(theta_hat, dtheta_hat, h),
     )
 
 

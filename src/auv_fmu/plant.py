@@ -30,7 +30,6 @@ from auv_fmu.vectors import (
     Vector4,
     Vector6,
     difference,
-    is_zero,
     plus_scaled,
     total,
 )
@@ -129,7 +128,8 @@ def over_ground(nu_r: Vector6, rotation: Rotation, water: Vector3) -> Vector6:
         water: velocity of the water [m/s], earth frame.
 
     """
-    if is_zero(water):
+    c_x, c_y, c_z = water
+    if not (c_x or c_y or c_z):
         return nu_r
     u, v, w, p, q, r = nu_r
     u_c, v_c, w_c = rotate_back(rotation, water)
@@ -149,7 +149,8 @@ def immersed(state: PlantState, rotation: Rotation, water: Vector3) -> PlantStat
 
     """
     change = difference(state.water, water)
-    if is_zero(change):
+    c_x, c_y, c_z = change
+    if not (c_x or c_y or c_z):
         return state
     nu_r = over_ground(state.nu_r, rotation, change)
     return PlantState(state.position, state.quaternion, nu_r, state.tau, water)
@@ -175,7 +176,7 @@ def accelerations_6dof(
     u, v, w, p, q, r = nu
     tau_wu, tau_wv, tau_ww, tau_wp, tau_wq, tau_wr = tau_w
     sin_theta, cos_theta_sin_phi = -rotation[0][2], rotation[1][2]
-    m22, m33, m55, m66 = vehicle.m22, vehicle.m33, vehicle.m55, vehicle.m66
+    _, m22, m33, m55, m66, _, _, _, _, _, _ = vehicle
     du, dv, dw, dq, dr = accelerations(
         vehicle,
         (u, v, w, q, r),
@@ -220,7 +221,8 @@ def rates(
     _, quaternion, nu_r, _, water = state
     u, v, w, p, q, r = nu_r
     velocity = rotate(rotation, (u, v, w))
-    if not is_zero(water):
+    c_x, c_y, c_z = water
+    if c_x or c_y or c_z:
         velocity = total(velocity, water)
     dnu = accelerations_6dof(vehicle, roll, nu_r, rotation, tau, tau_w)
     if roll.rolls:
@@ -244,9 +246,9 @@ def moved(
         h: time [s].
 
     """
-    _, (a, b, c, d), (u, v, w, p, q, r), _, water = state
+    position, (a, b, c, d), (u, v, w, p, q, r), _, water = state
     _, (da, db, dc, dd), (du, dv, dw, dp, dq, dr) = rate
-    position = plus_scaled(state.position, h, rate.position)
+    position = plus_scaled(position, h, rate.position)
     nu = u + h * du, v + h * dv, w + h * dw, p + h * dp, q + h * dq, r + h * dr
     if roll.rolls:
         attitude = normalised((a + h * da, b + h * db, c + h * dc, d + h * dd))
@@ -383,11 +385,11 @@ def steps(
         n: how many.
 
     """
-    lags = not is_zero(parameters.T)
+    T_u, T_q, T_r = parameters.T
     acting = Drive(tau, tau, tau, tau)
     state = immersed(state, rotation, water)
     while n > 0:
-        if lags:
+        if T_u or T_q or T_r:
             acting = drive(state.tau, tau, parameters.T, h)
         if parameters.integrator == RK4:
             state = step_rk4(parameters, state, rotation, acting, tau_w, h)

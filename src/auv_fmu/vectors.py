@@ -45,6 +45,11 @@ def plus_scaled(a: Vector3, k: float, b: Vector3) -> Vector3:
     return a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]
 
 
+def plus_two_scaled(a: Vector3, k: float, b: Vector3, m: float, c: Vector3) -> Vector3:
+    """The vector a + k b + m c."""
+    return a[0] + k * b[0] + m * c[0], a[1] + k * b[1] + m * c[1], a[2] + k * b[2] + m * c[2]
+
+
 def minus_scaled(a: Vector3, k: float, b: Vector3) -> Vector3:
     """The vector a - k b."""
     return a[0] - k * b[0], a[1] - k * b[1], a[2] - k * b[2]
@@ -58,11 +63,6 @@ def minus_times(a: Vector3, D: Vector3, b: Vector3) -> Vector3:
 def minus_product(D: Vector3, a: Vector3) -> Vector3:
     """The vector -D a, with a diagonal matrix D."""
     return -D[0] * a[0], -D[1] * a[1], -D[2] * a[2]
-
-
-def is_zero(a: Vector3) -> bool:
-    """Whether all components are zero."""
-    return not (a[0] or a[1] or a[2])
 
 
 def distance(a: Vector3, b: Vector3) -> float:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from auv_fmu import output_feedback
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import jacobian
-from auv_fmu.observer import EULER, EXACT, INTEGRAL, gain
+from auv_fmu.observer import EULER, EXACT, INTEGRAL
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement
 from auv_fmu.saturation import SATURATIONS
 from support.strategies import angles, speeds, vectors
@@ -164,8 +164,3 @@ def test_exact_observer_follows_with_any_gain_in_steps_of_20_ms(k_d):
     late = slice(100, None)
     true = np.cos(np.arange(251) * 0.02)[late]
     assert np.abs(estimates(gains, 0.02, 5.0)[late] - true).max() < 0.02
-
-
-def test_other_forms_take_the_gain_as_it_is():
-    assert gain(EULER, 50.0, 0.02) == gain(INTEGRAL, 50.0, 0.02) == 50.0
-    assert gain(EXACT, 50.0, 0.02) < 50.0

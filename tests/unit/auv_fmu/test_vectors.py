@@ -12,6 +12,7 @@ from auv_fmu.vectors import (
     minus_times,
     norm,
     plus_scaled,
+    plus_two_scaled,
     scaled,
     total,
 )
@@ -34,6 +35,7 @@ def test_sums_and_products(a, b, D, k):
     assert total(a, b) == tuple(a_ + b_)
     assert scaled(k, a) == tuple(k * a_)
     assert plus_scaled(a, k, b) == tuple(a_ + k * b_)
+    assert plus_two_scaled(a, k, b, D[0], D) == tuple(a_ + k * b_ + D[0] * D_)
     assert minus_scaled(a, k, b) == tuple(a_ - k * b_)
     assert minus_times(a, D, b) == tuple(a_ - np.diag(D) @ b_)
     assert minus_product(D, a) == tuple(-np.diag(D) @ a_)

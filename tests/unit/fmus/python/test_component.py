@@ -124,14 +124,13 @@ def test_wrong_input_is_discarded_before_the_run(driven, initialising):
     assert answers_of(slave)[1:] == [Fmi2Status.error], "a parameter has not been taken with it"
 
 
-@pytest.mark.parametrize(("name", "parameter", "value"), [("AuvPlant", "m11", 0.0)])
-def test_without_a_loader_no_step_is_made_with_another_value(name, parameter, value):
+def test_without_a_loader_no_step_is_made_with_another_value():
     """The host has been answered fmi2OK, and shall not find out by its results."""
-    driver = ClassInstance(name, plain=True, **{parameter: value})
+    driver = ClassInstance("AuvPlant", plain=True, m11=0.0)
     assert driver.answers() == []
     for _ in range(2):
         assert not driver.step()
-    driver.set(**{parameter: 30.0})
+    driver.set(m11=30.0)
     assert not driver.step(), "a good value is no answer"
 
 
@@ -148,16 +147,6 @@ def test_outputs_and_fixed_parameters_cannot_be_set_during_the_run(driver):
             refusals += 1
             assert driver.get(port.name) == port.start
     assert driver.answers() == [Fmi2Status.discard] * refusals
-    assert driver.step()
-
-
-def test_fixed_parameters_can_be_set_to_what_they_are_during_the_run(driver):
-    """As a host does that sets all start values when it takes over a run."""
-    for port in driver.ports:
-        if port.causality == "parameter":
-            driver.set(**{port.name.replace(".", "__"): port.start})
-    assert driver.slave.log_queue == []
-    assert driver.get("fault") is False
     assert driver.step()
 
 
@@ -292,6 +281,7 @@ def test_discarded_step_has_no_consequence_but_the_fault(driver, plain):
     for _ in range(2):
         assert not driver.slave.do_step(0.0, -1.0)
     assert driver.answers() == ([] if plain else [Fmi2Status.discard] * 2)
+    assert len(driver.messages()) == 1
     assert driver.get("fault") is True
     assert driver.step()
 
@@ -321,23 +311,10 @@ def test_library_beside_the_loader_tells_a_slave_of_it(tmp_path, libraries, plai
     assert slave.do_step(0.0, 0.02) is not plain
 
 
-def test_values_of_unknown_references_are_zero(driver):
-    assert driver.slave.get_real([10_000, -1]) == [0.0, 0.0]
-
-
 def test_reference_beyond_two_to_the_31_is_named_as_the_host_knows_it(driver):
     """PythonFMU hands references over as signed numbers."""
-    driver.slave.get_real([-1])
-    assert "4294967295" in driver.messages()[0]
-
-
-@pytest.mark.parametrize("start", [nan, inf, -inf])
-def test_bad_start_time_is_refused(start):
-    slave = component("DisturbanceGenerator")(instance_name="under_test")
-    slave.setup_experiment(start)
-    assert messages_of(slave) == [f"start time {start}: must be finite"]
-    assert slave._get_fmu_state()["start_time"] == 0.0
-    assert slave._store.fault is False
+    assert driver.slave.get_real([10_000, -1]) == [0.0, 0.0]
+    assert "4294967295" in driver.messages()[1]
 
 
 @pytest.mark.parametrize("stop", [nan, -1.0, -inf])
@@ -484,18 +461,15 @@ def test_messages_are_bounded():
     assert driver.answers() == [Fmi2Status.error] * 1000
 
 
-@pytest.mark.parametrize("h", [-0.02, nan, inf, -inf])
-def test_impossible_step_is_refused(driver, h):
+@pytest.mark.parametrize(
+    ("t", "h"), [(0.02, -0.02), (0.02, nan), (0.02, inf), (0.02, -inf), (nan, 0.02)]
+)
+def test_impossible_step_is_refused(driver, t, h):
     driver.excite(1)
     driver.step()
     before = driver.outputs()
-    assert not driver.slave.do_step(0.02, h)
+    assert not driver.slave.do_step(t, h)
     assert driver.outputs() == before
-    assert driver.get("fault") is True
-
-
-def test_impossible_time_is_refused(driver):
-    assert not driver.slave.do_step(nan, 0.02)
     assert driver.get("fault") is True
 
 
@@ -552,13 +526,6 @@ def test_step_of_half_an_eternity_is_refused():
 def test_message_with_a_percent_sign_is_no_format_for_the_host():
     driver = ClassInstance("ObserverController", saturation="%s%n")
     assert "%%s%%n" in driver.messages()[0]
-
-
-def test_same_refusal_again_and_again_is_logged_once():
-    driver = ClassInstance("MotionPlanner")
-    for _ in range(10):
-        driver.slave.do_step(0.0, -1.0)
-    assert len(driver.messages()) == 1
 
 
 def test_numbers_that_overflow_are_refused_and_the_state_is_kept():
