@@ -13,7 +13,6 @@ from typing import Any
 #: Ctrl-C, what a batch system sends, and the end of the terminal.
 _STOPS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
 
-
 #: What ends a process that has not asked for it, such as the alarm that an FMU has set.
 _ENDS = [
     getattr(signal, n)
@@ -108,7 +107,9 @@ class Interrupts:
                     with suppress(Exception):
                         self.hand_over()
                     give_up()
-            os.close(numbers)
+            # Unless an FMU has closed it: by now it may be another file.
+            if leaving.locked():
+                os.close(numbers)
 
     def take(self, number: int, _frame: Any) -> None:
         """Collect a signal: a handler for :func:`signal.signal`."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from math import inf
 
 import numpy as np
@@ -40,65 +41,58 @@ _CHANGE = 1e-7
 _MOST_INPUTS = 4000
 
 
+@dataclass(frozen=True)
 class _Part:
     """One component of a ring.
 
     Attributes:
+        instance, row: of the component, and that it is tied to.
         gather: what others of the ring, or it itself, feed it.
-        unknowns: its inputs that they feed, as places among the ring's inputs.
-        feeds: the inputs that it feeds with Reals, as places among those of the ring.
-        block: of these and the unknowns in a matrix.
+        block: of what it feeds and its unknowns in a matrix of the ring's inputs.
+        unknowns, inputs: the Reals that they feed, as columns of the row and as variables.
+        sources, outputs: what it feeds the ring's inputs that are Reals with, likewise.
 
     """
 
-    def __init__(
-        self,
-        instance: Instance,
-        row: Row,
-        gather: Gathering,
-        unknowns: list[int],
-        feeds: list[int],
-        outputs: list[ModelVariable],
-        inputs: list[ModelVariable],
-    ) -> None:
-        self.instance, self.gather = instance, gather
-        self._row = row
-        self.unknowns, self.feeds = unknowns, feeds
-        self.block = np.ix_(feeds, unknowns)
-        self._outputs, self._inputs = outputs, inputs
+    instance: Instance
+    row: Row
+    gather: Gathering
+    block: tuple[np.ndarray, ...]
+    unknowns: np.ndarray
+    inputs: list[ModelVariable]
+    sources: np.ndarray
+    outputs: list[ModelVariable]
 
     def exchange(self) -> None:
         """Set its inputs and read its outputs, also those that are shown later in a step."""
         self.instance.exchange()
-        self._row.show(self.instance.name)
+        self.row.show(self.instance.name)
 
-    def changes(self, values: np.ndarray, targets: np.ndarray, sources: np.ndarray) -> np.ndarray:
-        """How its outputs change with its inputs, by differences: (feeds, unknowns)."""
-        places = sources[self.feeds]
-        found = np.zeros((len(self.feeds), len(self.unknowns)))
-        here = values[places]
-        for column, target in enumerate(targets[self.unknowns]):
-            held = values[target]
-            values[target] = _near(held, self._inputs[column])
+    def changes(self) -> np.ndarray:
+        """How its outputs change with its inputs, by differences: (sources, unknowns)."""
+        values = self.row.values
+        found = np.zeros((len(self.sources), len(self.unknowns)))
+        here = values[self.sources]
+        for i, (column, variable) in enumerate(zip(self.unknowns, self.inputs, strict=True)):
+            held = values[column]
+            values[column] = _near(held, variable)
             self.exchange()
-            found[:, column] = (values[places] - here) / (values[target] - held)
-            values[target] = held
+            found[:, i] = (values[self.sources] - here) / (values[column] - held)
+            values[column] = held
         self.exchange()
         return found
 
-    def derivatives(
-        self, values: np.ndarray, targets: np.ndarray, sources: np.ndarray
-    ) -> np.ndarray:
+    def derivatives(self) -> np.ndarray:
         """How its outputs change with its inputs, as the FMU says it, or by differences."""
-        if self.feeds and self.instance.gives_derivatives:
+        if self.outputs and self.instance.gives_derivatives:
             with suppress(ComponentFailed):
-                outputs = [variable.valueReference for variable in self._outputs]
+                outputs = [variable.valueReference for variable in self.outputs]
                 columns = [
                     self.instance.derivatives(outputs, variable.valueReference)
-                    for variable in self._inputs
+                    for variable in self.inputs
                 ]
-                return np.array(columns).reshape(len(self.unknowns), len(self.feeds)).T
-        return self.changes(values, targets, sources)
+                return np.array(columns).reshape(len(self.inputs), len(outputs)).T
+        return self.changes()
 
 
 class Ring:
@@ -129,29 +123,28 @@ class Ring:
         feeding = [connection for name in names for connection in system.feeding[name]]
         connections = [c for c in feeding if c.source.component in own]
         self.outer = Gathering.along(row, [c for c in feeding if c.source.component not in own])
-        self._targets, self._sources = row.places(connections)
+        self._targets, sources = row.places(connections)
         self._ports = [connection.target for connection in connections]
         self._real = np.array([_is_real(system, c) for c in connections], dtype=bool)
-        inner: dict[str, list[int]] = {name: [] for name in names}
-        feeds: dict[str, list[int]] = {name: [] for name in names}
-        for i, connection in enumerate(connections):
-            inner[connection.target.component].append(i)
-            if self._real[i]:
-                feeds[connection.source.component].append(i)
         self._reals = np.ix_(self._real, self._real)
         self._parts: list[_Part] = []
         for name in names:
             variables = system.components[name].variables
-            unknowns = [i for i in inner[name] if self._real[i]]
+            inner = [i for i, c in enumerate(connections) if c.target.component == name]
+            unknowns = [i for i in inner if self._real[i]]
+            feeds = [
+                i for i, c in enumerate(connections) if c.source.component == name and self._real[i]
+            ]
             self._parts.append(
                 _Part(
                     instances[name],
                     row,
-                    Gathering.along(row, [connections[i] for i in inner[name]]),
-                    unknowns,
-                    feeds[name],
-                    [variables[connections[i].source.port] for i in feeds[name]],
+                    Gathering.along(row, [connections[i] for i in inner]),
+                    np.ix_(feeds, unknowns),
+                    self._targets[unknowns],
                     [variables[connections[i].target.port] for i in unknowns],
+                    sources[feeds],
+                    [variables[connections[i].source.port] for i in feeds],
                 )
             )
 
@@ -292,7 +285,7 @@ class Ring:
         found = np.zeros((n, n))
         factors = np.concatenate([gather.factors for gather in self._inner])
         for part in self._parts:
-            found[part.block] = part.derivatives(self._values, self._targets, self._sources)
+            found[part.block] = part.derivatives()
         real = self._reals
         return np.asarray((np.eye(n) - factors[:, np.newaxis] * found)[real])
 

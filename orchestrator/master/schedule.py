@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from ctypes import CFUNCTYPE, c_double, c_int, c_void_p, cast
 from functools import partial
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
 
@@ -34,36 +34,17 @@ from orchestrator.system.structure import Connection
 _CALLBACK = CFUNCTYPE(c_int, c_void_p, c_double, c_double, c_int)
 
 
-class Steppable(Protocol):
-    """What a loop asks of a member besides its calls.
-
-    Attributes:
-        name: of the component; empty: it is none.
-        is_here: whether its calls are functions of this process.
-
-    """
-
-    name: str
-    is_here: bool
-
-    def pointers(self) -> CMember:
-        """The same calls as pointers."""
-
-    def failed(self, status: int, function: str) -> Exception:
-        """What to raise after a call that has ended with a status."""
-
-
 class Member(NamedTuple):
     """The calls that step one component."""
 
     set_inputs: list[Callable[[], int]]
     do_step: Callable[[c_double, c_double, int], int]
     get_outputs: list[Callable[[], int]]
-    instance: Steppable
+    instance: Instance | StageCall
 
 
 class StageCall:
-    """A member of a stage that acts in the place of a step, and is no component."""
+    """What is in the place of an instance where a stage acts, and steps no component."""
 
     name, is_here = "", True
 

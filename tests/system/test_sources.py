@@ -10,10 +10,10 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.machine import children as compiler
+from orchestrator.machine import children
 from orchestrator.machine import user_files as unpacking
 from orchestrator.machine.errors import InputError
-from orchestrator.master.fmi import binary as sources
+from orchestrator.master.fmi import binary
 from support.relay import relay
 
 SUPPORT = Path(__file__).parents[1] / "support"
@@ -46,7 +46,7 @@ WAYS = {
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A cache folder of its own; it is skipped where there is no compiler."""
-    if compiler.machines_compiler() is None:
+    if children.machines_compiler() is None:
         pytest.skip("there is no C compiler")
     folder = tmp_path_factory.mktemp("cache")
     folder.chmod(0o700)
@@ -140,7 +140,7 @@ def test_sources_that_cannot_be_compiled_are_said_in_one_line(tmp_path, files, l
 
 
 def test_without_a_compiler_it_is_said_what_to_install(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(sources, "compiler", lambda: None)
+    monkeypatch.setattr(binary, "compiler", lambda: None)
     fmu = with_sources(tmp_path, *WAYS["all"])
     for command in ("run", "check"):
         arguments = ["--stop-time", "1", "--out", str(tmp_path / "o")] if command == "run" else []

@@ -89,11 +89,8 @@ class LoadedInstance:
         self._variables = component.variables
         self._gives_state = component.gives_state
         self.gives_derivatives = component.gives_derivatives
-        self._logged = [
-            category.name
-            for category in component.description.logCategories
-            if category.name in _LOGGED
-        ]
+        categories = component.description.logCategories
+        self._logged = [one.name for one in categories if one.name in _LOGGED]
         self._kept = fmi2FMUstate()
         self._library = library
         self._listener = listener
@@ -104,8 +101,10 @@ class LoadedInstance:
         # The functions of the library serve all instances; only what differs is theirs.
         self._fmu = copy(library.fmu)
         self._fmu.instanceName = component.name
+        callbacks = fmi2CallbackFunctions.from_buffer_copy(_SHARED)
+        callbacks.componentEnvironment = self._environment
         try:
-            self._fmu.instantiate(callbacks=_callbacks(self._environment), loggingOn=True)
+            self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
         except Exception as error:
             del _instances[self._environment]
             heard = [text.removeprefix(f"{self.name}: ") for text in self._complaints]
@@ -165,21 +164,17 @@ class LoadedInstance:
     def pointers(self) -> CMember:
         """The same calls for the compiled loop."""
         inputs, outputs = (
-            [block.move(self._address(block.function)) for block in blocks]
+            [block.move(_address(self._fmu.dll[f"fmi2{block.function}"])) for block in blocks]
             for blocks in (self._inputs, self._outputs)
         )
         return CMember(
             self._fmu.component,
-            _address(self._called_back) if self._called_back else self._address("DoStep"),
+            _address(self._called_back or self._fmu.dll["fmi2DoStep"]),
             (CMove * len(inputs))(*inputs),
             (CMove * len(outputs))(*outputs),
             len(inputs),
             len(outputs),
         )
-
-    def _address(self, name: str) -> int | None:
-        """Of one of the FMU's functions, without fmi2."""
-        return _address(self._fmu.dll[f"fmi2{name}"])
 
     def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
@@ -402,9 +397,3 @@ def _shared_callbacks() -> fmi2CallbackFunctions:
 
 
 _SHARED = _shared_callbacks()
-
-
-def _callbacks(environment: int) -> fmi2CallbackFunctions:
-    callbacks = fmi2CallbackFunctions.from_buffer_copy(_SHARED)
-    callbacks.componentEnvironment = environment
-    return callbacks

@@ -79,11 +79,10 @@ class RowLog:
 
         """
         self._path, self._width, self._kept = path, width, kept
-        self._digest = sha256()
+        self._digest, self._after = sha256(), 0
         if not kept:
             self._file = path.open("x+b")
             self._file.write(_head(identity))
-            self._after = 0
             return
         row = width * _NUMBER.itemsize
         if is_whole := begins(path, identity):

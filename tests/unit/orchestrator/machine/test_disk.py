@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.machine import disk as locks
+from orchestrator.machine import disk
 from orchestrator.machine.disk import claimed, process_folder, sealed
 from support.machine import contents, ended, eventually, forked
 
@@ -45,20 +45,20 @@ def test_folders_that_no_process_has_made_stay(tmp_path: Path, monkeypatch):
     (tmp_path / "auvfmu-planted").symlink_to(precious)
     (precious / ".auv-fmu.json").write_text(marker("auvfmu-planted"))
     before = contents(tmp_path)
-    locks._remove_left()
+    disk._remove_left()
     assert contents(tmp_path) == before
     (tmp_path / "auvfmu-copied" / ".auv-fmu.json").write_text(marker("auvfmu-copied"))
-    locks._remove_left()
+    disk._remove_left()
     assert not (tmp_path / "auvfmu-copied").exists()
 
 
 def test_temporary_folders_of_killed_processes_go_with_the_next(tmp_path: Path, monkeypatch):
     # Held, or a fork that forgets it would remove that of this process.
-    own = locks._process_folder()
+    own = disk._process_folder()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
     def work() -> None:
-        locks._process_folder.cache_clear()
+        disk._process_folder.cache_clear()
         (process_folder() / "unpacked").touch()
         os.kill(os.getpid(), signal.SIGKILL)
 

@@ -77,17 +77,6 @@ def test_the_compiled_loop_is_taken_where_it_pays(library: object):
     assert chosen("auto", LONG, Isolation()) == PYTHON_LOOP
 
 
-def test_a_loop_that_cannot_be_had_is_done_without_unless_it_is_asked_for(monkeypatch):
-    def made(in_no_time: bool = False) -> object:
-        raise InputError("no compiler")
-
-    monkeypatch.setattr(loop, "kept", lambda: None)
-    monkeypatch.setattr(loop, "made", made)
-    assert chosen("auto", LONG) == PYTHON_LOOP
-    with pytest.raises(InputError, match="no compiler"):
-        chosen("compiled", LONG)
-
-
 @pytest.mark.parametrize(
     ("name", "isolation", "word"), [("fast", None, "'fast'"), ("compiled", Isolation(), "isolated")]
 )

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.machine import cache as user_cache
-from orchestrator.machine import children as compiler
+from orchestrator.machine import children
 from orchestrator.machine.errors import InputError
 from orchestrator.master import loop, stepper
 from orchestrator.master.experiment import Experiment
@@ -34,8 +34,8 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiler.shutil, "which", lambda _: None)
-    monkeypatch.setattr(compiler, "find_spec", lambda _: None)
+    monkeypatch.setattr(children.shutil, "which", lambda _: None)
+    monkeypatch.setattr(children, "find_spec", lambda _: None)
 
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
@@ -164,7 +164,7 @@ def test_compilers_have_nothing_to_say(tmp_path, command):
 @pytest.mark.slow
 def test_zig_compiles_it_where_there_is_no_other(tmp_path, cache, monkeypatch):
     pytest.importorskip("ziglang")
-    monkeypatch.setattr(compiler.shutil, "which", lambda _: None)
+    monkeypatch.setattr(children.shutil, "which", lambda _: None)
     with pytest.raises(InputError):
         stepper.made(in_no_time=True)
     assert stepper.made().advance

@@ -12,8 +12,7 @@ import pytest
 from orchestrator.machine.interrupts import held_interrupts
 from orchestrator.master.fmi.instance import ComponentFailed, Instance, Log
 from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.fmi.loaded import all_loaded
-from orchestrator.master.fmi.placement import isolated
+from orchestrator.master.fmi.placement import placed
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import member, step
 from orchestrator.runs.wiring import closed_loop
@@ -31,13 +30,8 @@ PLACES = pytest.mark.parametrize("place", ["here", "isolated"])
 def ready(system: System, place: str) -> Iterator[tuple[Instance, Row]]:
     """The instance of a system of one component, ready for its first step, and the row."""
     with held_interrupts() as interrupts:
-        log = Log()
-        manager = (
-            all_loaded(system.components, log)
-            if place == "here"
-            else isolated(system.components, log, Isolation(), interrupts)
-        )
-        with manager as instances:
+        isolation = Isolation() if place == "isolated" else None
+        with placed(system.components, Log(), isolation, interrupts) as instances:
             row = Row(system, instances)
             ((name, instance),) = instances.items()
             instance.enter_initialization(system.parameters_of(name))
