@@ -44,8 +44,16 @@ def examine(fmu: Path, findings: Findings) -> Component | None:
         for text in list(_dangling(fmu)) or _flaws(fmu):
             findings.note(text)
         component = read_component(fmu.stem, fmu)
-        for text in (*_bad_starts(component), *_aliases(component)):
-            findings.note(text)
+        for name in component.variables:
+            try:
+                component.start(name)
+            except InputError as error:
+                findings.note(f"start value of {error}")
+        seen: dict[tuple[str, int], str] = {}
+        for variable in (*component.having("input"), *component.having("parameter")):
+            other = seen.setdefault((variable.type, variable.valueReference), variable.name)
+            if other != variable.name:
+                findings.note(f"{other} and {variable.name} are one: to set one sets both")
         return component
     return None
 
@@ -127,21 +135,3 @@ def _dangling(fmu: Path) -> Iterator[str]:
         for index in (unknown.get("index", ""), *unknown.get("dependencies", "").split()):
             if not (index.isascii() and index.isdecimal()) or int(index) not in known:
                 yield f"its model structure names variable {index!r}; there are {len(known)}"
-
-
-def _bad_starts(component: Component) -> Iterator[str]:
-    """Start values that are not of the types of their variables, or out of their ranges."""
-    for name in component.variables:
-        try:
-            component.start(name)
-        except InputError as error:
-            yield f"start value of {error}"
-
-
-def _aliases(component: Component) -> Iterator[str]:
-    """Inputs and parameters that are one variable under several names."""
-    seen: dict[tuple[str, int], str] = {}
-    for variable in (*component.having("input"), *component.having("parameter")):
-        other = seen.setdefault((variable.type, variable.valueReference), variable.name)
-        if other != variable.name:
-            yield f"{other} and {variable.name} are one: to set one sets both"
