@@ -25,12 +25,6 @@ class Definitions:
     units: Units = field(default_factory=dict)
     enumerations: Mapping[str, Items] = field(default_factory=dict)
 
-    def with_inner(self, inner: Definitions) -> Definitions:
-        """These definitions and another file's, which win."""
-        return Definitions(
-            {**self.units, **inner.units}, {**self.enumerations, **inner.enumerations}
-        )
-
     def unit(self, element: Element) -> Unit | None:
         """The unit that a type or a value is stated in; None: it states none."""
         name = element.get("unit")
@@ -41,9 +35,9 @@ class Definitions:
         return self.enumerations.get(element.get("name", ""), {})
 
 
-def definitions_of(archive: Archive, root: Element) -> Definitions:
-    """What a file defines."""
-    units = {}
+def definitions_of(archive: Archive, root: Element, outer: Definitions) -> Definitions:
+    """What a file defines, and what is defined around it, over which it wins."""
+    units = dict(outer.units)
     for unit in root.findall("Units/Unit"):
         name, base = unit.get("name", ""), unit.find("BaseUnit")
         if base is not None:
@@ -60,7 +54,7 @@ def definitions_of(archive: Archive, root: Element) -> Definitions:
         }
         for enumeration in root.findall("Enumerations/Enumeration")
     }
-    return Definitions(units, enumerations)
+    return Definitions(units, {**outer.enumerations, **enumerations})
 
 
 #: The names of a system and of the systems around it, except the outermost.
@@ -270,21 +264,19 @@ class Builder:
         source, kind = content.get("source"), content.get("type", _FMU)
         implementation = content.get("implementation", "any")
         if kind != _FMU:
-            self._archive.problem(
-                f"{name}: a component of type {kind!r} is not supported; an FMU is"
-            )
+            why = f"a component of type {kind!r} is not supported; an FMU is"
         elif source is None:
-            self._archive.problem(f"{name}: a component without a source, which cannot be run")
+            why = "a component without a source, which cannot be run"
         elif implementation not in ("any", "CoSimulation"):
-            self._archive.problem(
-                f"{name}: asks for {implementation}, which is not supported; CoSimulation is"
-            )
-        elif (fmu := self._archive.file(source, name)) is not None:
+            why = f"asks for {implementation}, which is not supported; CoSimulation is"
+        else:
+            fmu = self._archive.file(source, name)
             try:
-                return read_component(name, fmu, findings=self._archive.findings)
+                findings = self._archive.findings
+                return None if fmu is None else read_component(name, fmu, findings=findings)
             except InputError as error:
-                said = str(error).removeprefix(f"{self._archive.folder}/")
-                self._archive.problem(f"{name}: {said}")
+                why = str(error).removeprefix(f"{self._archive.folder}/")
+        self._archive.problem(f"{name}: {why}")
         return None
 
     def _compare(self, leaf: Leaf) -> None:

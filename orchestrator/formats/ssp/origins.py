@@ -329,7 +329,7 @@ class Bindings:
 
     def _parameters(self, values: Element, where: str) -> dict[str, Given]:
         """The values of a parameter set by their names."""
-        known = self._definitions.with_inner(definitions_of(self._archive, values))
+        known = definitions_of(self._archive, values, self._definitions)
         found: dict[str, Given] = {}
         for parameter in values.findall("Parameters/Parameter"):
             name = self._archive.required(parameter, "name", where)
