@@ -30,6 +30,9 @@ _REALS = {"factor", "offset", "min", "max"}
 #: Elements in which the same words may stand for something else.
 _OTHERS = {"VendorAnnotations", "Annotations", "Start"}
 
+#: The versions of FMI that a system can be written with, and those that the master can step.
+WRITABLE, RUNNABLE = ("2.0", "3.0"), ("2.0",)
+
 
 class Described(NamedTuple):
     """A description, and what is wrong with it; None: it is valid."""
@@ -131,10 +134,6 @@ def _elements(parent: ElementTree.Element) -> Iterator[ElementTree.Element]:
         if element.tag not in _OTHERS:
             yield element
             yield from _elements(element)
-
-
-#: The versions of FMI that a system can be written with, and those that the master can step.
-WRITABLE, RUNNABLE = ("2.0", "3.0"), ("2.0",)
 
 
 @dataclass(frozen=True)

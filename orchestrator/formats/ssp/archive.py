@@ -31,6 +31,27 @@ from orchestrator.system.values import finite, integer
 #: Elements in which others than the standard's are at home.
 _OPEN = ("Annotations", "MetaData", "Signature")
 
+#: Schemas by the root elements of the files that they are for.
+_SCHEMAS = {
+    "SystemStructureDescription": "SystemStructureDescription.xsd",
+    "ParameterSet": "SystemStructureParameterValues.xsd",
+    "ParameterMapping": "SystemStructureParameterMapping.xsd",
+}
+
+_SUFFIX = Path(STRUCTURE).suffix
+
+#: Endings of descriptions that are read where they are, with the files beside them.
+_LOOSE = (_SUFFIX, ".xml")
+
+#: The version whose words are read; later ones have more of them, of which each is refused.
+_VERSION = "1.0"
+
+#: A number, or that there may be none.
+_Float = TypeVar("_Float", float, None)
+
+#: Of many names, this many are said.
+_MOST_SAID = 5
+
 
 def read_document(text: bytes, note: Callable[[str], None]) -> Element:
     """The root element of an XML file; tags and attributes are local names, text is left out.
@@ -100,14 +121,6 @@ class _Reader:
         raise ValueError("it has a document type, which no file of an SSP has")
 
 
-#: Schemas by the root elements of the files that they are for.
-_SCHEMAS = {
-    "SystemStructureDescription": "SystemStructureDescription.xsd",
-    "ParameterSet": "SystemStructureParameterValues.xsd",
-    "ParameterMapping": "SystemStructureParameterMapping.xsd",
-}
-
-
 def violations(root: str, text: bytes) -> list[str]:
     """What is not as the schema has it, with the number of its line.
 
@@ -131,21 +144,6 @@ def _schema(name: str) -> etree.XMLSchema:
     return etree.XMLSchema(etree.parse(Path(*fmpy.ssp.__path__, "schema", name)))
 
 
-_SUFFIX = Path(STRUCTURE).suffix
-
-#: Endings of descriptions that are read where they are, with the files beside them.
-LOOSE = (_SUFFIX, ".xml")
-
-#: The version whose words are read; later ones have more of them, of which each is refused.
-_VERSION = "1.0"
-
-#: A number, or that there may be none.
-_Float = TypeVar("_Float", float, None)
-
-#: Of many names, this many are said.
-_MOST_SAID = 5
-
-
 class Archive:
     """An archive, unpacked, or a description in a folder, and the findings about it.
 
@@ -165,7 +163,7 @@ class Archive:
         """
         self.path, self.findings = path, findings
         is_whole = is_folder(path)
-        self._is_packed = not is_whole and path.suffix not in LOOSE
+        self._is_packed = not is_whole and path.suffix not in _LOOSE
         if self._is_packed:
             self.folder = unpacked(path).folder
         else:

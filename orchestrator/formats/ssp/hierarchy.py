@@ -17,6 +17,18 @@ from orchestrator.system.values import FMI2_NAMES, items_of, type_of
 #: An enumeration's values by the names of its items.
 Items: TypeAlias = Mapping[str, int]
 
+#: The names of a system and of the systems around it, except the outermost.
+Way: TypeAlias = tuple[str, ...]
+
+#: Which way a value goes, by the kind of an element's connector, seen from the system around it.
+GIVES = ("output", "calculatedParameter", "constant", "local", "independent")
+TAKES = ("input", "parameter", "structuralParameter")
+
+_FMU = "application/x-fmu-sharedlibrary"
+
+#: What a connector may have besides its type.
+_NO_TYPES = ("Dimension", "Clock", "ConnectorGeometry", "Annotations")
+
 
 @dataclass(frozen=True)
 class Definitions:
@@ -55,14 +67,6 @@ def definitions_of(archive: Archive, root: Element, outer: Definitions) -> Defin
         for enumeration in root.findall("Enumerations/Enumeration")
     }
     return Definitions(units, {**outer.enumerations, **enumerations})
-
-
-#: The names of a system and of the systems around it, except the outermost.
-Way: TypeAlias = tuple[str, ...]
-
-#: Which way a value goes, by the kind of an element's connector, seen from the system around it.
-GIVES = ("output", "calculatedParameter", "constant", "local", "independent")
-TAKES = ("input", "parameter", "structuralParameter")
 
 
 @dataclass(frozen=True)
@@ -200,12 +204,6 @@ class Group:
                 yield from element.elements()
             else:
                 yield element
-
-
-_FMU = "application/x-fmu-sharedlibrary"
-
-#: What a connector may have besides its type.
-_NO_TYPES = ("Dimension", "Clock", "ConnectorGeometry", "Annotations")
 
 
 class Builder:
