@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import TypeVar
@@ -25,6 +25,7 @@ from orchestrator.formats.ssp import NAMESPACES, STRUCTURE
 from orchestrator.machine.archives import unpacked
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason
 from orchestrator.machine.user_files import check_file, is_folder
+from orchestrator.system.names import listed
 from orchestrator.system.units import Linear, UndefinedUnit, Unit, conversion
 from orchestrator.system.values import finite, integer
 
@@ -48,9 +49,6 @@ _VERSION = "1.0"
 
 #: A number, or that there may be none.
 _Float = TypeVar("_Float", float, None)
-
-#: Of many names, this many are said.
-_MOST_SAID = 5
 
 
 def read_document(text: bytes, note: Callable[[str], None]) -> Element:
@@ -306,9 +304,3 @@ class Archive:
         except ValueError as error:
             self.problem(error)
             return otherwise
-
-
-def listed(names: Sequence[str], between: str = ", ") -> str:
-    """Names, of many the first, with something between them."""
-    more = len(names) - _MOST_SAID
-    return between.join(names[:_MOST_SAID]) + (f" and {more} more" if more > 0 else "")

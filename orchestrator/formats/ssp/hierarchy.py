@@ -8,9 +8,10 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 from xml.etree.ElementTree import Element
 
-from orchestrator.formats.ssp.archive import Archive, listed
+from orchestrator.formats.ssp.archive import Archive
 from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component, read_component
+from orchestrator.system.names import listed
 from orchestrator.system.units import BASES, Unit, Units, unit_of_port
 from orchestrator.system.values import FMI2_NAMES, items_of, type_of
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 from xml.etree.ElementTree import Element
 
-from orchestrator.formats.ssp.archive import Archive, listed
+from orchestrator.formats.ssp.archive import Archive
 from orchestrator.formats.ssp.hierarchy import (
     GIVES,
     TAKES,
@@ -21,6 +21,7 @@ from orchestrator.formats.ssp.hierarchy import (
     definitions_of,
 )
 from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.system.names import listed
 from orchestrator.system.units import Linear, Mapped, Transformation, Unit, chained
 from orchestrator.system.values import BOOLEANS, finite
 

@@ -5,7 +5,7 @@ from zipfile import ZipFile
 
 import pytest
 
-from orchestrator.formats.examination import examine, surprises
+from orchestrator.commands.check import examine, surprises
 from orchestrator.machine.errors import Findings
 from support.texts import mentions
 
