@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
+from xml.etree import ElementTree
+
+from fmpy.validation import validate_fmu
 
 from orchestrator.commands.options import add_variant
 from orchestrator.commands.streams import BAD_INPUT, OK, show
-from orchestrator.formats.examination import examine, surprises
-from orchestrator.machine.errors import Findings
+from orchestrator.machine.errors import Findings, InputError, reason
+from orchestrator.machine.user_files import unpacked
 from orchestrator.master.fmi.binary import binary_of, check_binary
 from orchestrator.runs.loading import loaded
 from orchestrator.runs.preparation import SOME_TIME, prepare
@@ -16,8 +20,19 @@ from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import impossible_paths
 from orchestrator.studies.study import is_study
 from orchestrator.studies.study_file import read_study
-from orchestrator.system.component import Component
+from orchestrator.system.component import Component, read_component
 from orchestrator.system.graph import rings
+
+#: What surprises the user of an FMU, by the flag of its description and what that is then.
+_SURPRISES = {
+    ("canBeInstantiatedOnlyOncePerProcess", True): "one instance a process: a further one gets a "
+    "process of its own",
+    ("needsExecutionTool", True): "needs the program that it was made with",
+    ("canHandleVariableCommunicationStepSize", False): "takes steps of one length only: the stop "
+    "time must be a multiple of the step",
+    ("canRunAsynchronuously", True): "may compute a step while its host goes on",
+    ("canGetAndSetFMUstate", False): "gives no state: a run of it cannot be resumed",
+}
 
 
 def add_check(parser: argparse.ArgumentParser) -> None:
@@ -92,3 +107,68 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
         ]
         to_know += prepared.doubts()
     return to_know
+
+
+def examine(fmu: Path, findings: Findings) -> Component | None:
+    """Take note of all that is wrong with an FMU.
+
+    Args:
+        fmu: the file.
+        findings: take it.
+
+    Returns:
+        The FMU; None: it is none that can be run.
+
+    """
+    with findings.collecting():
+        # What is read of a description with references to nothing depends on the reader.
+        for text in list(_dangling(fmu)) or _flaws(fmu):
+            findings.note(text)
+        component = read_component(fmu.stem, fmu)
+        for name in component.variables:
+            try:
+                component.start(name)
+            except InputError as error:
+                findings.note(f"start value of {error}")
+        seen: dict[tuple[str, int], str] = {}
+        for variable in (*component.having("input"), *component.having("parameter")):
+            other = seen.setdefault((variable.type, variable.valueReference), variable.name)
+            if other != variable.name:
+                findings.note(f"{other} and {variable.name} are one: to set one sets both")
+        return component
+    return None
+
+
+def surprises(component: Component) -> Iterator[str]:
+    """What an FMU cannot do, or does in another way than most."""
+    for (flag, value), text in _SURPRISES.items():
+        if getattr(component.description.coSimulation, flag) is value:
+            yield text
+    if component.having("input") and all(
+        unknown.dependencies is None for unknown in component.description.outputs
+    ):
+        yield "does not say what its outputs depend on: each is taken to depend on all inputs"
+
+
+def _flaws(fmu: Path) -> list[str]:
+    """What the standard's schema and rules have against the description."""
+    if not (unpacked(fmu).folder / "modelDescription.xml").is_file():
+        # What reads the FMU says so.
+        return []
+    try:
+        return [str(problem) for problem in validate_fmu(str(fmu))]
+    except Exception as error:
+        return [reason(error)]
+
+
+def _dangling(fmu: Path) -> Iterator[str]:
+    """References in the structure of the model to variables that do not exist."""
+    try:
+        root = ElementTree.parse(unpacked(fmu).folder / "modelDescription.xml").getroot()
+    except (OSError, ElementTree.ParseError):
+        return
+    known = range(1, 1 + len(root.findall("ModelVariables/ScalarVariable")))
+    for unknown in root.iterfind("ModelStructure//Unknown"):
+        for index in (unknown.get("index", ""), *unknown.get("dependencies", "").split()):
+            if not (index.isascii() and index.isdecimal()) or int(index) not in known:
+                yield f"its model structure names variable {index!r}; there are {len(known)}"

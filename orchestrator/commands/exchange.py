@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from fmus.kinds import PYTHON
 from orchestrator.commands.options import (
     add_fmi,
     add_options,
@@ -141,34 +139,20 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _verify(options: argparse.Namespace) -> int:
-    system = _system(options.scenario)
+    system = load(options.scenario).with_parameters(assignments(options))
+    at_start, verbose = options.initial == _INITIAL[0], options.verbose
     certificate = verify(
-        options.table,
-        system.with_parameters(assignments(options)),
-        options.tolerance,
-        options.order,
-        at_start=options.initial == _INITIAL[0],
-        verbose=options.verbose,
+        options.table, system, options.tolerance, options.order, at_start=at_start, verbose=verbose
     )
     show(*certificate.splitlines())
     return OK
-
-
-def _system(name: str, kind: str = PYTHON) -> System:
-    """What another tool runs; its warnings are told as the command's own."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        system = load(name, kind)
-    for warning in caught:
-        say(f"warning: {warning.message}")
-    return system
 
 
 def _hosts(options: argparse.Namespace) -> int:
     unknown = set(options.host) - HOSTS.keys()
     if unknown:
         raise InputError(f"no host {', '.join(sorted(unknown))}; there are {', '.join(HOSTS)}")
-    system = _system(options.scenario, options.kind)
+    system = load(options.scenario, options.kind)
     step = system.step or DEFAULT_STEP
     verdicts = compare(system, options.host or list(HOSTS), options.steps, step)
     show(f"{'host':13} {'package':34} {'max deviation':>14} {'steps/s':>8}  worst port")

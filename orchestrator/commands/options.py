@@ -115,11 +115,10 @@ def status(name: str, ending: Ending) -> int:
 
 def assignments(options: argparse.Namespace) -> dict[PortName, object]:
     """The values of --set."""
-    return dict(map(_assignment, options.set))
-
-
-def _assignment(text: str) -> tuple[PortName, str]:
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise InputError(f"--set {text}: write COMPONENT.PARAMETER=VALUE")
-    return port_name(name.strip()), value.strip()
+    values: dict[PortName, object] = {}
+    for text in options.set:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise InputError(f"--set {text}: write COMPONENT.PARAMETER=VALUE")
+        values[port_name(name.strip())] = value.strip()
+    return values

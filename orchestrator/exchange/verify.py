@@ -35,6 +35,12 @@ from orchestrator.system.values import BOOLEANS, finite
 #: How many names of a list are said where not all are.
 _FIRST = 5
 
+#: Columns that name the time, in lower case.
+_TIME = ("time", "t")
+
+#: What ecos puts after a name.
+_TYPE = re.compile(r"\[[A-Z]+\]$")
+
 
 class Algorithm(NamedTuple):
     """A way to run a system, as some tool may.
@@ -234,13 +240,6 @@ def _listed(names: Sequence[str], verbose: bool) -> str:
     if verbose or len(names) <= _FIRST:
         return ", ".join(names)
     return f"{len(names)}, such as {', '.join(names[:_FIRST])} (--verbose names all)"
-
-
-#: Columns that name the time, in lower case.
-_TIME = ("time", "t")
-
-#: What ecos puts after a name.
-_TYPE = re.compile(r"\[[A-Z]+\]$")
 
 
 @dataclass(frozen=True)

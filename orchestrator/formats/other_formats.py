@@ -36,6 +36,11 @@ _ROUNDING = 1e-9
 
 _OSP = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
 
+_TOOLBOX = "fmu_manipulation_toolbox"
+
+#: The file that says what is in a container.
+_CONTENT = "system.json"
+
 
 def write_osp(system: System, folder: Path) -> list[Path]:
     """Write `OspSystemStructure.xml` and the FMUs beside it, for libcosim and its command line.
@@ -270,12 +275,6 @@ def _parameters(
                 )
             parameters[port] = value
     return parameters
-
-
-_TOOLBOX = "fmu_manipulation_toolbox"
-
-#: The file that says what is in a container.
-_CONTENT = "system.json"
 
 
 def write_container(system: System, folder: Path) -> list[Path]:

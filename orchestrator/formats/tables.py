@@ -70,7 +70,7 @@ def read_rows(path: Path, strings: Collection[str] = ()) -> Iterator[np.ndarray]
             for first in filled:
                 rows = np.loadtxt(
                     chain([first], filled), delimiter=",", comments=None, quotechar='"', ndmin=2,
-                    max_rows=ROWS, converters=dict.fromkeys(texts, _no_number) or None,
+                    max_rows=ROWS, converters=dict.fromkeys(texts, lambda _: 0.0) or None,
                 )  # fmt: skip
                 if rows.shape[1] != len(header):
                     raise ValueError(f"rows of {rows.shape[1]} values below {len(header)} names")
@@ -145,8 +145,3 @@ def _after_time(names: Sequence[str]) -> tuple[str, ...]:
     if first != "time":
         raise ValueError(f"its first column is {first!r}, not 'time'")
     return tuple(others)
-
-
-def _no_number(text: str) -> float:
-    """Stand in for a text among numbers."""
-    return 0.0

@@ -12,7 +12,6 @@ from typing import TypeVar
 
 from fmus.kinds import FMI_VERSIONS, PYTHON
 from orchestrator.figures.run_figures import check_figure
-from orchestrator.formats.examination import open_inputs
 from orchestrator.formats.other_formats import STRUCTURE as OSP
 from orchestrator.formats.other_formats import read_osp
 from orchestrator.formats.ssp import STRUCTURE as SSD
@@ -25,7 +24,7 @@ from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import RUNNABLE, WRITABLE, read_component
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
+from orchestrator.system.structure import System, unfed_inputs
 from orchestrator.vehicle.cautions import differing_vehicle
 
 T = TypeVar("T")
@@ -172,7 +171,7 @@ def doubts_of(system: System, given: Collection[PortName] = ()) -> list[str]:
     if len(system.components) == 1:
         # No other one could feed it.
         return []
-    found = open_inputs(system, given), differing_vehicle(system)
+    found = unfed_inputs(system, given), differing_vehicle(system)
     return [text for text in found if text is not None]
 
 

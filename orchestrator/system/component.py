@@ -30,6 +30,9 @@ _REALS = {"factor", "offset", "min", "max"}
 #: Elements in which the same words may stand for something else.
 _OTHERS = {"VendorAnnotations", "Annotations", "Start"}
 
+#: The versions of FMI that a system can be written with, and those that the master can step.
+WRITABLE, RUNNABLE = ("2.0", "3.0"), ("2.0",)
+
 
 class Described(NamedTuple):
     """A description, and what is wrong with it; None: it is valid."""
@@ -75,10 +78,14 @@ def described(fmu: Path, folder: Path, versions: Sequence[str]) -> Described:
         InputError: it is no such FMU.
 
     """
-    if not (folder / "modelDescription.xml").is_file():
-        raise InputError(f"{fmu}: not a readable FMU: it holds no modelDescription.xml")
+    file = folder / "modelDescription.xml"
+    if not file.is_file():
+        raise InputError(f"{fmu}: not a readable FMU: it holds no {file.name}")
     try:
-        version = _version(folder / "modelDescription.xml")
+        root: ElementTree.Element
+        # The version comes first: all else differs between them.
+        _, root = next(ElementTree.iterparse(file, ["start"]))
+        version = root.get("fmiVersion")
         if version not in versions:
             wanted = " or ".join(versions)
             raise InputError(f"{fmu}: is of FMI {version}; only FMUs of FMI {wanted} are supported")
@@ -92,49 +99,33 @@ def described(fmu: Path, folder: Path, versions: Sequence[str]) -> Described:
         raise InputError(f"{fmu}: is for model exchange only; only co-simulation is supported")
     if found.description.guid is None:
         raise InputError(f"{fmu}: not a readable FMU: its description has no guid")
-    if not re.fullmatch(r"[^/\\]+", implementation.modelIdentifier or ""):
-        raise InputError(
-            f"{fmu}: its model identifier {implementation.modelIdentifier!r} names no library"
-        )
+    identifier = implementation.modelIdentifier
+    if not re.fullmatch(r"[^/\\]+", identifier or ""):
+        raise InputError(f"{fmu}: its model identifier {identifier!r} names no library")
     if found.flaw is not None:
-        if any(_contradictions(found.description)):
+        variables = found.description.modelVariables
+        is_clear = len({variable.name for variable in variables}) == len(variables)
+        if not is_clear or any(v.causality not in _CAUSALITIES for v in variables):
             raise InputError(f"{fmu}: not a readable FMU: {reason(found.flaw)}")
-        for text in _misread(folder / "modelDescription.xml"):
+        for text in _misread(file):
             raise InputError(f"{fmu}: not a readable FMU: {text}")
     return found
-
-
-def _version(file: Path) -> str | None:
-    """The version of FMI that a description says it is of: all else differs between them."""
-    root: ElementTree.Element
-    _, root = next(ElementTree.iterparse(file, ["start"]))
-    return root.get("fmiVersion")
-
-
-def _contradictions(description: ModelDescription) -> Iterator[str]:
-    """Variables of which is left open which one is meant, or what it is for."""
-    names = set()
-    for variable in description.modelVariables:
-        if variable.causality not in _CAUSALITIES or variable.name in names:
-            yield variable.name
-        names.add(variable.name)
 
 
 def _misread(file: Path) -> Iterator[str]:
     """Numbers of a description that Python takes for others, or that are none."""
     for element in _elements(ElementTree.parse(file).getroot()):
-        for name in ("name", "value") if element.tag == "Item" else ():
-            if name not in element.attrib:
+        if element.tag == "Item":
+            for name in sorted({"name", "value"} - element.attrib.keys()):
                 yield f"an <Item> of an enumeration has no {name}"
-        for kind, names in ((integer, _INTEGERS), (real, _REALS)):
-            for name in names.intersection(element.attrib):
-                text = element.attrib[name]
-                try:
-                    for one in text.split() if name == "dependencies" else [text]:
-                        kind(one)
-                except ValueError:
-                    shown = shortened(repr(text))
-                    yield f"{name} of <{element.tag}> is {shown}, which is no number"
+        for name in sorted(element.attrib.keys() & (_INTEGERS | _REALS)):
+            text = element.attrib[name]
+            try:
+                for one in text.split() if name == "dependencies" else [text]:
+                    (integer if name in _INTEGERS else real)(one)
+            except ValueError:
+                shown = shortened(repr(text))
+                yield f"{name} of <{element.tag}> is {shown}, which is no number"
 
 
 def _elements(parent: ElementTree.Element) -> Iterator[ElementTree.Element]:
@@ -143,10 +134,6 @@ def _elements(parent: ElementTree.Element) -> Iterator[ElementTree.Element]:
         if element.tag not in _OTHERS:
             yield element
             yield from _elements(element)
-
-
-#: The versions of FMI that a system can be written with, and those that the master can step.
-WRITABLE, RUNNABLE = ("2.0", "3.0"), ("2.0",)
 
 
 @dataclass(frozen=True)

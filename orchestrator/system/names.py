@@ -1,9 +1,9 @@
-"""Names in a system: of ports, and of files."""
+"""Names in a system: of ports, and of files; several of them in a message."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
@@ -17,6 +17,9 @@ _ODD, _KEPT = (
     re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.I),
 )
 _LONGEST = 120
+
+#: Of many names, this many are said.
+_MOST_SAID = 5
 
 
 @dataclass(frozen=True)
@@ -114,3 +117,9 @@ def plain(names: Iterable[str], *taken: str) -> list[str]:
         found.append(free)
         used.add(free.lower())
     return found
+
+
+def listed(names: Sequence[str], between: str = ", ") -> str:
+    """Names, of many the first, with something between them."""
+    more = len(names) - _MOST_SAID
+    return between.join(names[:_MOST_SAID]) + (f" and {more} more" if more > 0 else "")

@@ -8,9 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from sys import float_info
 
+from fmpy.model_description import ModelVariable
+
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
-from orchestrator.system.names import PortName, plain, splits
+from orchestrator.system.names import PortName, listed, plain, splits
 from orchestrator.system.units import Linear, Mapped, Transformation, conversion, unit_of_port
 from orchestrator.system.values import INTEGERS, Value, type_of, typed, unit_of
 
@@ -253,3 +255,47 @@ def _check_transformed(connection: Connection, fmi_type: str) -> None:
                     f"{connection.source} -> {connection.target}: is mapped to {value:.16g}, which "
                     f"no {fmi_type} of FMI can be"
                 )
+
+
+def unfed_inputs(system: System, settled: Collection[PortName] = ()) -> str | None:
+    """The inputs that nothing feeds or sets, in words, with wires that could feed them.
+
+    Args:
+        system: that is looked at.
+        settled: inputs that are set during a run.
+
+    Returns:
+        One line; None: there is no such input.
+
+    """
+    fed = {connection.target for connection in system.connections}
+    taken = {*fed, *system.parameters, *system.left_open, *settled}
+    labels: list[str] = []
+    wires: list[str] = []
+    for name, component in system.components.items():
+        groups: dict[str, list[ModelVariable]] = {}
+        for variable in component.having("input"):
+            groups.setdefault(variable.name.rpartition(".")[0], []).append(variable)
+        for group, members in groups.items():
+            found = [v for v in members if PortName(name, v.name) not in taken]
+            if not group or len(found) < len(members):
+                labels += [f"{name}.{variable.name}" for variable in found]
+                continue
+            labels.append(f"{name}.{group}.*")
+            sources = [
+                other
+                for other, source in system.components.items()
+                if other != name and all(_could_feed(source, variable) for variable in members)
+            ]
+            if len(sources) == 1:
+                wires.append(f'"{name}.{group}" = "{sources[0]}.{group}"')
+    if not labels:
+        return None
+    wanted = f"; wire {listed(wires)}" if wires else ""
+    return f"nothing feeds or sets {listed(labels)}{wanted}"
+
+
+def _could_feed(source: Component, variable: ModelVariable) -> bool:
+    """Whether a component has an output of the name and type of an input."""
+    output = source.variables.get(variable.name)
+    return output is not None and (output.causality, output.type) == ("output", variable.type)

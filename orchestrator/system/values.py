@@ -121,15 +121,13 @@ def _transferable(text: str) -> str:
 
 
 def _range(variable: ModelVariable) -> tuple[float | None, float | None]:
-    lower = None if variable.min is None else real(variable.min)
-    upper = None if variable.max is None else real(variable.max)
+    lower, upper = (None if end is None else real(end) for end in (variable.min, variable.max))
     if type_of(variable) == "Real":
         return lower, upper
     least, most = INTEGERS
     # What a description says beyond them no FMU can be given.
-    return max(least, least if lower is None else lower), min(
-        most, most if upper is None else upper
-    )
+    lower, upper = least if lower is None else lower, most if upper is None else upper
+    return max(least, lower), min(most, upper)
 
 
 def type_of(variable: ModelVariable) -> str:

@@ -10,7 +10,6 @@ from zipfile import ZipFile
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.formats.examination import open_inputs
 from orchestrator.formats.ssp import STRUCTURE
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
@@ -20,7 +19,7 @@ from orchestrator.runs.request import Request
 from orchestrator.runs.result import simulate
 from orchestrator.runs.scenario import names
 from orchestrator.system.component import read_component
-from orchestrator.system.structure import System
+from orchestrator.system.structure import System, unfed_inputs
 from support.others import build
 
 SCENARIO = """
@@ -158,9 +157,9 @@ def test_who_could_feed_a_group_is_named_if_it_is_one(tmp_path):
     )
     system = System("open", {"a": a, "b": b}, ())
     ours = "nothing feeds or sets a.y.*, a.mode, a.on, a.said, b.u and 3 more"
-    assert open_inputs(system) == f'{ours}; wire "a.y" = "b.y"'
+    assert unfed_inputs(system) == f'{ours}; wire "a.y" = "b.y"'
     twice = replace(system, components={"a": a, "b": b, "c": replace(b, name="c")})
-    assert "wire" not in str(open_inputs(twice))
+    assert "wire" not in str(unfed_inputs(twice))
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import TypeVar
@@ -24,11 +24,30 @@ from lxml import etree
 from orchestrator.formats.ssp import NAMESPACES, STRUCTURE
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason
 from orchestrator.machine.user_files import check_file, is_folder, unpacked
+from orchestrator.system.names import listed
 from orchestrator.system.units import Linear, UndefinedUnit, Unit, conversion
 from orchestrator.system.values import finite, integer
 
 #: Elements in which others than the standard's are at home.
 _OPEN = ("Annotations", "MetaData", "Signature")
+
+#: Schemas by the root elements of the files that they are for.
+_SCHEMAS = {
+    "SystemStructureDescription": "SystemStructureDescription.xsd",
+    "ParameterSet": "SystemStructureParameterValues.xsd",
+    "ParameterMapping": "SystemStructureParameterMapping.xsd",
+}
+
+_SUFFIX = Path(STRUCTURE).suffix
+
+#: Endings of descriptions that are read where they are, with the files beside them.
+_LOOSE = (_SUFFIX, ".xml")
+
+#: The version whose words are read; later ones have more of them, of which each is refused.
+_VERSION = "1.0"
+
+#: A number, or that there may be none.
+_Float = TypeVar("_Float", float, None)
 
 
 def read_document(text: bytes, note: Callable[[str], None]) -> Element:
@@ -99,14 +118,6 @@ class _Reader:
         raise ValueError("it has a document type, which no file of an SSP has")
 
 
-#: Schemas by the root elements of the files that they are for.
-_SCHEMAS = {
-    "SystemStructureDescription": "SystemStructureDescription.xsd",
-    "ParameterSet": "SystemStructureParameterValues.xsd",
-    "ParameterMapping": "SystemStructureParameterMapping.xsd",
-}
-
-
 def violations(root: str, text: bytes) -> list[str]:
     """What is not as the schema has it, with the number of its line.
 
@@ -130,21 +141,6 @@ def _schema(name: str) -> etree.XMLSchema:
     return etree.XMLSchema(etree.parse(Path(*fmpy.ssp.__path__, "schema", name)))
 
 
-_SUFFIX = Path(STRUCTURE).suffix
-
-#: Endings of descriptions that are read where they are, with the files beside them.
-LOOSE = (_SUFFIX, ".xml")
-
-#: The version whose words are read; later ones have more of them, of which each is refused.
-_VERSION = "1.0"
-
-#: A number, or that there may be none.
-_Float = TypeVar("_Float", float, None)
-
-#: Of many names, this many are said.
-_MOST_SAID = 5
-
-
 class Archive:
     """An archive, unpacked, or a description in a folder, and the findings about it.
 
@@ -164,7 +160,7 @@ class Archive:
         """
         self.path, self.findings = path, findings
         is_whole = is_folder(path)
-        self._is_packed = not is_whole and path.suffix not in LOOSE
+        self._is_packed = not is_whole and path.suffix not in _LOOSE
         if self._is_packed:
             self.folder = unpacked(path).folder
         else:
@@ -307,9 +303,3 @@ class Archive:
         except ValueError as error:
             self.problem(error)
             return otherwise
-
-
-def listed(names: Sequence[str], between: str = ", ") -> str:
-    """Names, of many the first, with something between them."""
-    more = len(names) - _MOST_SAID
-    return between.join(names[:_MOST_SAID]) + (f" and {more} more" if more > 0 else "")

@@ -8,14 +8,27 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 from xml.etree.ElementTree import Element
 
-from orchestrator.formats.ssp.archive import Archive, listed
+from orchestrator.formats.ssp.archive import Archive
 from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component, read_component
+from orchestrator.system.names import listed
 from orchestrator.system.units import BASES, Unit, Units, unit_of_port
 from orchestrator.system.values import FMI2_NAMES, items_of, type_of
 
 #: An enumeration's values by the names of its items.
 Items: TypeAlias = Mapping[str, int]
+
+#: The names of a system and of the systems around it, except the outermost.
+Way: TypeAlias = tuple[str, ...]
+
+#: Which way a value goes, by the kind of an element's connector, seen from the system around it.
+GIVES = ("output", "calculatedParameter", "constant", "local", "independent")
+TAKES = ("input", "parameter", "structuralParameter")
+
+_FMU = "application/x-fmu-sharedlibrary"
+
+#: What a connector may have besides its type.
+_NO_TYPES = ("Dimension", "Clock", "ConnectorGeometry", "Annotations")
 
 
 @dataclass(frozen=True)
@@ -24,12 +37,6 @@ class Definitions:
 
     units: Units = field(default_factory=dict)
     enumerations: Mapping[str, Items] = field(default_factory=dict)
-
-    def with_inner(self, inner: Definitions) -> Definitions:
-        """These definitions and another file's, which win."""
-        return Definitions(
-            {**self.units, **inner.units}, {**self.enumerations, **inner.enumerations}
-        )
 
     def unit(self, element: Element) -> Unit | None:
         """The unit that a type or a value is stated in; None: it states none."""
@@ -41,9 +48,9 @@ class Definitions:
         return self.enumerations.get(element.get("name", ""), {})
 
 
-def definitions_of(archive: Archive, root: Element) -> Definitions:
-    """What a file defines."""
-    units = {}
+def definitions_of(archive: Archive, root: Element, outer: Definitions) -> Definitions:
+    """What a file defines, and what is defined around it, over which it wins."""
+    units = dict(outer.units)
     for unit in root.findall("Units/Unit"):
         name, base = unit.get("name", ""), unit.find("BaseUnit")
         if base is not None:
@@ -60,15 +67,7 @@ def definitions_of(archive: Archive, root: Element) -> Definitions:
         }
         for enumeration in root.findall("Enumerations/Enumeration")
     }
-    return Definitions(units, enumerations)
-
-
-#: The names of a system and of the systems around it, except the outermost.
-Way: TypeAlias = tuple[str, ...]
-
-#: Which way a value goes, by the kind of an element's connector, seen from the system around it.
-GIVES = ("output", "calculatedParameter", "constant", "local", "independent")
-TAKES = ("input", "parameter", "structuralParameter")
+    return Definitions(units, {**outer.enumerations, **enumerations})
 
 
 @dataclass(frozen=True)
@@ -208,12 +207,6 @@ class Group:
                 yield element
 
 
-_FMU = "application/x-fmu-sharedlibrary"
-
-#: What a connector may have besides its type.
-_NO_TYPES = ("Dimension", "Clock", "ConnectorGeometry", "Annotations")
-
-
 class Builder:
     """Reads the systems of a description."""
 
@@ -270,21 +263,19 @@ class Builder:
         source, kind = content.get("source"), content.get("type", _FMU)
         implementation = content.get("implementation", "any")
         if kind != _FMU:
-            self._archive.problem(
-                f"{name}: a component of type {kind!r} is not supported; an FMU is"
-            )
+            why = f"a component of type {kind!r} is not supported; an FMU is"
         elif source is None:
-            self._archive.problem(f"{name}: a component without a source, which cannot be run")
+            why = "a component without a source, which cannot be run"
         elif implementation not in ("any", "CoSimulation"):
-            self._archive.problem(
-                f"{name}: asks for {implementation}, which is not supported; CoSimulation is"
-            )
-        elif (fmu := self._archive.file(source, name)) is not None:
+            why = f"asks for {implementation}, which is not supported; CoSimulation is"
+        else:
+            fmu = self._archive.file(source, name)
             try:
-                return read_component(name, fmu, findings=self._archive.findings)
+                findings = self._archive.findings
+                return None if fmu is None else read_component(name, fmu, findings=findings)
             except InputError as error:
-                said = str(error).removeprefix(f"{self._archive.folder}/")
-                self._archive.problem(f"{name}: {said}")
+                why = str(error).removeprefix(f"{self._archive.folder}/")
+        self._archive.problem(f"{name}: {why}")
         return None
 
     def _compare(self, leaf: Leaf) -> None:

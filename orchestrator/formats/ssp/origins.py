@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 from xml.etree.ElementTree import Element
 
-from orchestrator.formats.ssp.archive import Archive, listed
+from orchestrator.formats.ssp.archive import Archive
 from orchestrator.formats.ssp.hierarchy import (
     GIVES,
     TAKES,
@@ -21,6 +21,7 @@ from orchestrator.formats.ssp.hierarchy import (
     definitions_of,
 )
 from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.system.names import listed
 from orchestrator.system.units import Linear, Mapped, Transformation, Unit, chained
 from orchestrator.system.values import BOOLEANS, finite
 
@@ -329,7 +330,7 @@ class Bindings:
 
     def _parameters(self, values: Element, where: str) -> dict[str, Given]:
         """The values of a parameter set by their names."""
-        known = self._definitions.with_inner(definitions_of(self._archive, values))
+        known = definitions_of(self._archive, values, self._definitions)
         found: dict[str, Given] = {}
         for parameter in values.findall("Parameters/Parameter"):
             name = self._archive.required(parameter, "name", where)

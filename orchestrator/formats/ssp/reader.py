@@ -9,12 +9,12 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from orchestrator.formats.ssp import LEFT_OPEN
-from orchestrator.formats.ssp.archive import Archive, listed
-from orchestrator.formats.ssp.hierarchy import Builder, Leaf, Node, Way, definitions_of
+from orchestrator.formats.ssp.archive import Archive
+from orchestrator.formats.ssp.hierarchy import Builder, Definitions, Leaf, Node, Way, definitions_of
 from orchestrator.formats.ssp.origins import Bindings, Segment, Values, segments_of
 from orchestrator.machine.errors import Findings, InputError, shortened
 from orchestrator.system.component import Component
-from orchestrator.system.names import PortName
+from orchestrator.system.names import PortName, listed
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import Transformation, Unit, chained
 from orchestrator.system.values import BOOLEANS, Value, real, typed
@@ -61,7 +61,8 @@ def read_ssp(path: Path, variant: str | None = None, findings: Findings | None =
 
 
 def _read(archive: Archive, root: Element, content: Element) -> System:
-    definitions, experiment = definitions_of(archive, root), root.find("DefaultExperiment")
+    definitions = definitions_of(archive, root, Definitions())
+    experiment = root.find("DefaultExperiment")
     top = Builder(archive, definitions).group(content)
     leaves = {leaf.way: leaf for leaf in top.elements() if isinstance(leaf, Leaf)}
     segments = segments_of(archive, top)

@@ -106,6 +106,14 @@ def test_line_and_table_do_not_follow_each_other():
         chained(Linear(2.0), Mapped(((1.0, 2.0),)))
 
 
+def test_what_tables_come_to_is_bounded():
+    one, other = (
+        Mapped(tuple((float(i), 0.5) for i in range(first, first + 501))) for first in (0, 501)
+    )
+    with pytest.raises(InputError, match="1,000"):
+        chained(one, other)
+
+
 @pytest.mark.parametrize("size", [1e200, 1e-200])
 def test_transformations_that_no_number_holds_do_not_follow_each_other(size):
     with pytest.raises(InputError, match="linear transformations follow each other that come to"):

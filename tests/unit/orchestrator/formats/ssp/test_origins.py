@@ -172,26 +172,3 @@ def test_long_way_to_many_ports_is_gone_once(tmp_path: Path):
     assert found.connections == tuple(
         Connection(PortName("a", "y"), PortName("a", f"u{i}")) for i in range(n)
     )
-
-
-def test_mapping_that_many_make_is_bounded(tmp_path: Path):
-    chain = [f"c{i}" for i in range(30)]
-
-    tag = "IntegerMappingTransformation"
-
-    def table(i: int) -> str:
-        pairs = ((100 * i + k, k) for k in range(100))
-        entries = "".join(f'<ssc:MapEntry source="{a}" target="{b}"/>' for a, b in pairs)
-        return f"<ssc:{tag}>{entries}</ssc:{tag}>"
-
-    routes = [connection("a.y", "c0"), connection(chain[-1], "a.u")]
-    routes += [connection(*pair, table(i)) for i, pair in enumerate(pairwise(chain))]
-    one = fmu(
-        tmp_path / "a.fmu", variable("y", "output", "Integer"), variable("u", "input", "Integer")
-    )
-    connectors = "".join(connector(c, "inout", of="Integer") for c in chain)
-    text = described(system(component("a"), "".join(routes), connectors))
-    findings = Findings()
-    with findings.collecting():
-        reading.read_ssp(archive(tmp_path / "x.ssp", text, {"a.fmu": one}), findings=findings)
-    assert any("mappings of more than 1,000 values" in text for text in findings.problems)

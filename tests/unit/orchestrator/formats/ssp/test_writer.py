@@ -10,7 +10,6 @@ from zipfile import ZipFile
 import pytest
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
-from orchestrator.formats.examination import open_inputs
 from orchestrator.formats.other_formats import write_container, write_osp
 from orchestrator.formats.ssp import OMS
 from orchestrator.formats.ssp.reader import read_ssp
@@ -18,7 +17,7 @@ from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName, plain
-from orchestrator.system.structure import System
+from orchestrator.system.structure import System, unfed_inputs
 from support.archives import (
     archive,
     binding,
@@ -111,8 +110,8 @@ def test_inputs_that_are_open_on_purpose_have_no_connector_and_stay_so(
     again = read_ssp(path)
     assert again.left_open == left_open
     assert again.steps == found.steps
-    assert "inner.a b.c" in str(open_inputs(found))
-    assert "inner.a b.c" not in str(open_inputs(again))
+    assert "inner.a b.c" in str(unfed_inputs(found))
+    assert "inner.a b.c" not in str(unfed_inputs(again))
 
 
 @pytest.mark.parametrize("step", [0.02, 0.0125])
