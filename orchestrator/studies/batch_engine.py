@@ -47,6 +47,17 @@ _OTHER = "use --engine fmu"
 
 _NO_ROWS = np.empty((0, 0))
 
+#: What there is only with an observer.
+_ESTIMATES = frozenset(STANDARD.dy_hat)
+
+#: The indices that the kernel accumulates, their columns, and whether they need an observer. Each
+#: run asks for them.
+_ACCUMULATED = [
+    (index, index.columns, not _ESTIMATES.isdisjoint(index.needs(STANDARD)[0]))
+    for index in INDICES
+    if index.accumulated
+]
+
 
 class BatchEngine:
     """Makes runs of the standard closed loop, with either controller, one after the other.
@@ -123,7 +134,7 @@ class BatchEngine:
         job = _job(self._systems[run.scenario], run)
         rows = np.empty((job.experiment.rows, 1 + len(COLUMNS)))
         made, failure = _made(job, np.empty(0, END), new_accumulators(0), rows)
-        there = [job.has((name,)) for name in COLUMNS]
+        there = [job.is_observed or name not in _ESTIMATES for name in COLUMNS]
         parameters = {
             name: job.system.value(name)
             for component in job.system.components.values()
@@ -141,10 +152,10 @@ class _Job(NamedTuple):
     setting: Setting
     plan: RunSteps
 
-    def has(self, columns: Iterable[str]) -> bool:
-        """Whether it has some columns: without an observer there are no estimates of velocity."""
-        is_observed = isinstance(self.setting.controller, Gains)
-        return is_observed or not set(columns) & {*STANDARD.dy_hat}
+    @property
+    def is_observed(self) -> bool:
+        """Whether there are estimates of velocity."""
+        return isinstance(self.setting.controller, Gains)
 
 
 def _job(system: System, run: Point) -> _Job:
@@ -196,7 +207,7 @@ def _end(job: _Job, stop_time: float) -> tuple[int, float, float]:
         InputError: the run has no row there.
 
     """
-    whole, steps = job.experiment, job.experiment.rows - 1
+    whole, steps = job.experiment, job.plan.steps
     if stop_time != whole.stop_time:
         shorter = Experiment(stop_time, whole.step, whole.order)
         steps = shorter.full_steps
@@ -299,11 +310,10 @@ def _indices(job: _Job, end: np.void, found: np.void) -> dict[str, float]:
     """The indices of an accumulator by their columns."""
     steps, t = int(end["steps"]), job.experiment.time(int(end["steps"]))
     values: dict[str, float] = {}
-    for index in INDICES:
+    for index, columns, needs_observer in _ACCUMULATED:
         n = int(found["instants"]) if index.accumulated == "miss" else steps
-        if not index.accumulated or not n or not job.has(index.needs(STANDARD)[0]):
-            continue
-        members = index.members_of(found[index.accumulated], n, t)
-        values |= dict(zip(index.columns, members, strict=True))
+        if n and (job.is_observed or not needs_observer):
+            members = index.members_of(found[index.accumulated], n, t)
+            values.update(zip(columns, members, strict=True))
     # What was never reached is not a number.
     return {name: value for name, value in values.items() if not isnan(value)}

@@ -280,8 +280,9 @@ def _sample(where: str, content: Mapping[str, Any]) -> Sample:
         with findings.collecting():
             if _is_range(value):
                 RangeTable.check(f"{where}: {key}", value)
-            ranges[key] = _range(f"{where}: {key}", value)
-            if key.startswith("|") and not _is_norm(key, ranges[key]):
+            ranges[key] = limits = _range(f"{where}: {key}", value)
+            is_norm = key.endswith("|") and len(members(key)) in (2, 3)
+            if key.startswith("|") and not (is_norm and min(limits.low, limits.high) >= 0.0):
                 raise InputError(
                     f"{where}: {key}: a norm is of two or three numbers, and not negative"
                 )
@@ -289,10 +290,6 @@ def _sample(where: str, content: Mapping[str, Any]) -> Sample:
     if not ranges:
         raise InputError(f"{where}: draws nothing; name values under [sample.range]")
     return Sample(content["n"], ranges, content.get("method", METHODS[0]), content.get("seed", 0))
-
-
-def _is_norm(key: str, limits: Range) -> bool:
-    return len(members(key)) in (2, 3) and key.endswith("|") and min(limits[:2]) >= 0.0
 
 
 def _check_names(where: str, study: Study) -> None:

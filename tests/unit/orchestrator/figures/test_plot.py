@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.figures.plot import group_of, plot
+from orchestrator.figures.plot import plot
 from orchestrator.figures.style import save
 from orchestrator.machine.errors import InputError
 from support.tables import loop_table, table_of
@@ -84,18 +84,6 @@ def test_values_that_no_axis_can_show_are_refused(tmp_path):
     with pytest.raises(InputError, match="too far apart to be drawn"):
         save(figure, tmp_path / "plot.png")
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("column", "group"),
-    [
-        ("plant.y.x", "plant.y"),
-        ("controller.theta_hat[2]", "controller.theta_hat"),
-        ("plant.fault", "plant.fault"),
-    ],
-)
-def test_groups(column, group):
-    assert group_of(column) == group
 
 
 def test_units_are_those_of_the_fmus():

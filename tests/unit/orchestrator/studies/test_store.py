@@ -6,6 +6,9 @@ import json
 import signal
 import subprocess
 import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,6 +41,11 @@ class Toys:
 
 def outcome(number: int) -> Outcome:
     return Outcome(number, {name: 0.3 * number + i for i, name in enumerate(index_columns())})
+
+
+def check_refused(words: str, folder: Path, record: Mapping[str, Any] = RECORD):
+    with pytest.raises(InputError, match=words), store(folder, record, index_columns()):
+        raise AssertionError
 
 
 def test_what_is_kept_is_found_again_and_the_rest_is_missing(tmp_path):
@@ -111,37 +119,28 @@ def test_other_study_is_refused(tmp_path):
     with store(tmp_path, RECORD, index_columns()):
         pass
     other = {"made_of": {"points": "5678", "scenario": ["fig4"], "step": 0.01}}
-    with (
-        pytest.raises(InputError, match="another study, which differs in points, step; choose"),
-        store(tmp_path, other, index_columns()),
-    ):
-        raise AssertionError
+    check_refused("another study, which differs in points, step; choose", tmp_path, other)
     assert read_record(tmp_path) == json.loads(json.dumps(RECORD))
 
 
 def test_folder_is_for_one_process(tmp_path):
-    with (
-        store(tmp_path, RECORD, index_columns()),
-        pytest.raises(InputError, match="another run is writing into"),
-        store(tmp_path, RECORD, index_columns()),
-    ):
-        raise AssertionError
+    with store(tmp_path, RECORD, index_columns()):
+        check_refused("another run is writing into", tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("file", "content", "words"),
+    ("file", "content"),
     [
-        ("study.json", "[", "is not a file that auv-fmu wrote"),
-        ("study.json", "{}", "is not a file that auv-fmu wrote"),
-        ("runs.parquet", "", "is not a file that auv-fmu wrote"),
-        ("unfinished.sqlite", "no database" * 100, "is not a file that auv-fmu wrote"),
-        ("unfinished.sqlite-wal", "mine", "is not a file that auv-fmu wrote"),
+        ("study.json", "["),
+        ("study.json", "{}"),
+        ("runs.parquet", ""),
+        ("unfinished.sqlite", "no database" * 100),
+        ("unfinished.sqlite-wal", "mine"),
     ],
 )
-def test_what_is_not_ours_is_refused(tmp_path, file, content, words):
+def test_what_is_not_ours_is_refused(tmp_path, file, content):
     (tmp_path / file).write_text(content)
-    with pytest.raises(InputError, match=words), store(tmp_path, RECORD, index_columns()):
-        raise AssertionError
+    check_refused("is not a file that auv-fmu wrote", tmp_path)
     assert (tmp_path / file).read_text() == content
 
 
@@ -149,17 +148,9 @@ def test_damaged_database_and_place_that_is_no_folder_are_one_line(tmp_path):
     with store(tmp_path / "study", RECORD, index_columns()):
         pass
     (tmp_path / "study" / "unfinished.sqlite").write_bytes(b"no database" * 1000)
-    with (
-        pytest.raises(InputError, match=r"unfinished\.sqlite is not a file that auv-fmu wrote"),
-        store(tmp_path / "study", RECORD, index_columns()),
-    ):
-        raise AssertionError
+    check_refused(r"unfinished\.sqlite is not a file that auv-fmu wrote", tmp_path / "study")
     (tmp_path / "file").touch()
-    with (
-        pytest.raises(InputError, match=r"cannot write into .*choose another folder"),
-        store(tmp_path / "file", RECORD, index_columns()),
-    ):
-        raise AssertionError
+    check_refused("cannot write into .*choose another folder", tmp_path / "file")
 
 
 BLOCK = 50

@@ -191,11 +191,6 @@ def test_unknown_name_and_missing_file_are_one_line():
         read_study("nothing.toml")
 
 
-@pytest.mark.parametrize("name", ready_studies())
-def test_ready_studies_can_be_read(name):
-    assert read_study(name).title
-
-
 VARIED = {"plant.eta0.z": float, "controller.k_d": float, "controller.observer": str}
 
 
@@ -226,9 +221,6 @@ def test_a_file_that_says_nothing_has_a_figure_of_all_numbers_that_vary():
     assert read_figures("mine.toml", {}, {}, False) == ()
 
 
-BANDS = {"kind": "bands", "x": "plant.eta0.z", "show": "late_error"}
-
-
 @pytest.mark.parametrize(
     ("figure", "complaint"),
     [
@@ -253,8 +245,6 @@ def test_a_figure_is_named_as_a_file_can_be():
         plans(**{"../mine": BANDS})
 
 
-pytest.importorskip("scipy", reason="needs scipy: the extra `studies`")
-
 #: As the command line and the pages name them.
 NAMES = {"attraction", "robustness", "noise", "gains", "distance", "sampling"}
 
@@ -266,12 +256,14 @@ def test_there_are_six():
 @pytest.mark.parametrize("name", ready_studies())
 def test_study_holds_the_proposed_controller_against_pd_ten_thousand_times(name):
     study = read_study(name)
-    space = Space(study, {scenario: loaded(scenario) for scenario in study.scenario})
+    assert study.title
     assert study.engine == BATCH
+    assert study.remark.count("\n\n") == 1, "two paragraphs"
+    pytest.importorskip("scipy", reason="needs scipy: the extra `studies`")
+    space = Space(study, {scenario: loaded(scenario) for scenario in study.scenario})
     assert len(space) >= 10_000
     first, second = space[0], space[1]
     assert (first.scenario, second.scenario) == ("fig5", "fig5-pd")
     # Whatever both controllers have is the same in both runs.
     assert dict(second.parameters).items() <= dict(first.parameters).items()
     assert read_figures(name, study.figures, space.columns, space.has_scenarios)
-    assert study.remark.count("\n\n") == 1, "two paragraphs"

@@ -23,9 +23,9 @@ from orchestrator.studies.store import StudyResult, store
 from orchestrator.studies.study_file import study_of
 from orchestrator.system.names import PortName, port_name
 from orchestrator.vehicle import indices as table_of_indices
-from orchestrator.vehicle.indices import Index, Indices, Metrics, index_columns, metrics_of
+from orchestrator.vehicle.indices import Index, Indices, index_columns, metrics_of
 from orchestrator.vehicle.reducers import Fold, largest
-from orchestrator.vehicle.signals import AXES, EULER, Loop
+from orchestrator.vehicle.signals import AXES, EULER, STANDARD, Loop
 
 T, H, ELL = 10.0, 0.02, 0.35
 
@@ -53,7 +53,9 @@ TIME = H * np.arange(round(T / H) + 1)
 
 
 def indices(signals=SIGNALS, blocks=1):
-    header = Header(tuple(signals), Experiment(T, H), {port_name("plant.ell"): ELL})
+    ends = dict.fromkeys(STANDARD.lower_limits, -2.0) | dict.fromkeys(STANDARD.upper_limits, 2.0)
+    parameters = {port_name(name): value for name, value in {STANDARD.ell: ELL, **ends}.items()}
+    header = Header(tuple(signals), Experiment(T, H), parameters)
     rows = np.column_stack([TIME, *(signal(TIME) for signal in signals.values())])
     observer = Indices()
     observer.begin(header)
@@ -84,7 +86,15 @@ def test_indices_of_signals_that_are_known():
 
 @pytest.mark.parametrize("blocks", [2, 7, 251, len(TIME)])
 def test_blocks_in_which_rows_come_change_nothing(blocks):
-    assert indices(blocks=blocks) == indices()
+    """To the last bit, on numbers that round."""
+    random = np.random.default_rng(1)
+    values = {
+        name: random.normal(scale=3.0, size=len(TIME))
+        for name in (*SIGNALS, *STANDARD.commanded, *STANDARD.applied)
+    }
+    signals = {name: lambda t, of=of: of for name, of in values.items()}
+    assert indices(signals).keys() >= set(index_columns()) - {"time_to_reach"}
+    assert indices(signals, blocks) == indices(signals)
 
 
 @pytest.mark.parametrize(
@@ -195,23 +205,3 @@ def test_final_error_is_the_largest_of_the_last_5_seconds():
         )
     ).found()  # fmt: skip
     assert found["final_error"] == pytest.approx([0.0, 1.0, 16.0])
-
-
-def test_indices_do_not_depend_on_the_blocks_in_which_rows_come():
-    """To the last bit, on numbers that round."""
-    random = np.random.default_rng(1)
-    columns = {
-        f"plant__{signal}__{k}": random.normal(scale=3.0, size=7001)
-        for signal in ("tau", "tau_applied")
-        for k in "uqr"
-    }
-    columns |= {f"plant__eta__{k}": random.normal(size=7001)
-                for k in ("x", "y", "z", "phi", "theta", "psi")}  # fmt: skip
-    columns |= {f"planner__y_d__{k}": random.normal(size=7001) for k in "xyz"}
-    table = table_of(**columns)
-    found = Metrics()
-    found.begin(table.header)
-    for start, end in ((0, 1), (1, 2), (2, 700), (700, 6000), (6000, 7001)):
-        found.take(table.rows[start:end])
-    found.end(Ending())
-    assert found.found() == metrics_of(table).found()
