@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,14 +16,12 @@ from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.ledger import Ledger
 from orchestrator.machine.workers import Workers
-from orchestrator.master.experiment import Experiment
 from orchestrator.master.identity import code_of, digest_of
-from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.master.observers.table import Table
 from orchestrator.runs.folder import opened
 from orchestrator.runs.preparation import Prepared, prepared_of
+from orchestrator.runs.record import content_of, ending_in, header_in, loops_in
 from orchestrator.runs.request import Request
-from orchestrator.system.names import port_name
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
 
@@ -160,29 +158,18 @@ def _make(run: Request, key: str) -> KeptRun:
 
 
 def _write(file: Path, kept_run: KeptRun) -> None:
-    header = kept_run.table.header
+    table = kept_run.table
     text = {
         "metrics": kept_run.metrics,
-        "columns": header.columns,
-        "experiment": asdict(header.experiment),
-        "parameters": {str(name): value for name, value in header.parameters.items()},
-        "messages": kept_run.table.ending.messages,
-        "events": kept_run.table.ending.events,
-        "loops": [asdict(loop) for loop in kept_run.loops],
+        "columns": table.columns,
+        **content_of(table.header, table.ending, kept_run.loops),
     }
     # A column together: one that is constant then takes no room.
-    np.savez_compressed(file, text=json.dumps(text), columns=kept_run.table.rows.T)
+    np.savez_compressed(file, text=json.dumps(text), columns=table.rows.T)
 
 
 def _read(file: Path) -> KeptRun:
     with np.load(file) as content:
         text, rows = json.loads(str(content["text"])), content["columns"].T
-    header = Header(
-        tuple(text["columns"]),
-        Experiment(**text["experiment"]),
-        {port_name(name): value for name, value in text["parameters"].items()},
-    )
-    events = tuple(Occurrence(*event) for event in text["events"])
-    ending = Ending(messages=tuple(text["messages"]), events=events)
-    loops = tuple(Loop(**names) for names in text["loops"])
-    return KeptRun(text["metrics"], Table.of(header, rows, ending), loops)
+    table = Table.of(header_in(text, tuple(text["columns"])), rows, ending_in(text))
+    return KeptRun(text["metrics"], table, loops_in(text))

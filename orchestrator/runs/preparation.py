@@ -50,7 +50,7 @@ class Prepared:
     """A run that is ready to be made, and the scenario that it comes from.
 
     Attributes:
-        scenario: as its file has it, with the events that the request has in their place.
+        scenario: as its file has it, but for events and inputs of the request.
         plan: the system, and its steps.
         isolation: of the FMUs in processes of their own; None: they run in this one.
         loop: that makes the steps.
@@ -133,14 +133,13 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     """
     findings, values = Findings(request.strict), request.values
     system = system.with_parameters(values)
-    if request.inputs is None:
-        inputs, given = scenario.inputs, {*values, *scenario.parameters}
-    else:
-        inputs, given = Inputs(Path(request.inputs)), {*values}
-    input_table = None
-    if inputs is not None:
+    given, input_table = {*values, *scenario.parameters}, None
+    if request.inputs is not None:
+        # On the command line a table wins over the scenario's parameters.
+        scenario, given = replace(scenario, inputs=Inputs(Path(request.inputs))), {*values}
+    if scenario.inputs is not None:
         with findings.collecting():
-            system, input_table = read_inputs(inputs, system, given)
+            system, input_table = read_inputs(scenario.inputs, system, given)
     system.check()
     if isinstance(request.events, str):
         scenario = replace(scenario, events=read_scenario(request.events).events)
@@ -207,8 +206,9 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         coupling=scenario.coupling,
         events=shared_events(own or scenario.events, system),
         inputs=scenario.inputs or companion.inputs,
+        parameters=companion.parameters if request.inputs is None else {},
     )
-    wanted = replace(request, parameters=shared, steps=steps, events=None)
+    wanted = replace(request, parameters=shared, steps=steps, events=None, inputs=None)
     return [prepared, prepare(same, system, wanted)]
 
 
