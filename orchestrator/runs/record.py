@@ -1,4 +1,4 @@
-"""What a run leaves, written and read again: `run.json` says of what it was made; checkpoints."""
+"""What a run leaves, and how it is read again: `run.json`, its table, its checkpoints."""
 
 from __future__ import annotations
 
