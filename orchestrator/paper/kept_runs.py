@@ -23,7 +23,7 @@ from orchestrator.runs.preparation import Prepared, prepared_of
 from orchestrator.runs.record import content_of, ending_in, header_in, loops_in
 from orchestrator.runs.request import Request
 from orchestrator.vehicle.indices import Metrics
-from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
+from orchestrator.vehicle.signals import STANDARD, Loop
 
 
 @dataclass(frozen=True)
@@ -147,14 +147,13 @@ def _make(run: Request, key: str) -> KeptRun:
         prepared = prepared_of(run)
         if key_of(prepared) != key:
             raise InputError("FMUs have changed while the report was made; make it anew")
-        loops = loops_of(prepared.system)
-        metrics = Metrics(loops)
-        seen = VisibleRows({name for loop in loops for name in loop.drawn()})
+        metrics = Metrics(prepared.loops)
+        seen = VisibleRows({name for loop in prepared.loops for name in loop.drawn()})
         prepared.run([metrics, seen])
     except InputError as error:
         return KeptRun({"failure": str(error)}, Table())
     values = metrics.content(prepared.scenario.name, prepared.system)
-    return KeptRun(values, Table.of(seen.header, seen.rows, seen.ending), loops)
+    return KeptRun(values, Table.of(seen.header, seen.rows, seen.ending), prepared.loops)
 
 
 def _write(file: Path, kept_run: KeptRun) -> None:

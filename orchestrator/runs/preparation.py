@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 from auv_fmu.euler import STEP
@@ -33,7 +34,7 @@ from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.runs.wiring import closed_loop, read_wiring
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.signals import STANDARD
+from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
 
 #: The components that a comparison exchanges, and keeps.
 CONTROLLER, PLANNER = STANDARD.controller, STANDARD.planner
@@ -77,6 +78,11 @@ class Prepared:
     def experiment(self) -> Experiment:
         """Until when it is run, in which steps and which order."""
         return self.plan.experiment
+
+    @cached_property
+    def loops(self) -> tuple[Loop, ...]:
+        """The loops of its vehicles."""
+        return loops_of(self.system)
 
     def run(self, observers: Sequence[Observer], hooks: Sequence[Hook] = ()) -> Ending:
         """Make the run.

@@ -35,7 +35,7 @@ from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.runs.preparation import Prepared
 from orchestrator.system.names import port_name
-from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
+from orchestrator.vehicle.signals import STANDARD, Loop
 
 #: The indices of a run.
 METRICS = "metrics.json"
@@ -104,7 +104,7 @@ def write_record(
         "identity": identity.digest_of(prepared.identity),
         "command": list(command),
         **clock.times(),
-        **content_of(header, ending, loops_of(prepared.system)),
+        **content_of(header, ending, prepared.loops),
         "experiment": {**vars(header.experiment), "steps": dict(prepared.system.steps)},
         **(remarks or {}),
         "fmus": {
