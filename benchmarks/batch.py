@@ -16,16 +16,14 @@ end in the same state as the straight line, to the last bit.
 
 from __future__ import annotations
 
-import argparse
-import os
-import platform
 from collections import deque
 from collections.abc import Callable, Iterable
 from functools import partial
-from pathlib import Path
 from random import Random
 from statistics import median
 from time import process_time
+
+from measuring import options, python, resident, timed
 
 from auv_fmu.closed_loop import Setting, closed_loop
 from orchestrator.master.experiment import Experiment
@@ -45,17 +43,9 @@ _STEP = 0.02
 _MANY = (100, 1_000, 10_000, 100_000)
 
 
-def timed(function: Callable[[], object]) -> float:
+def processor(function: Callable[[], object]) -> float:
     """Processor's seconds of one call."""
-    start = process_time()
-    function()
-    return process_time() - start
-
-
-def resident() -> float:
-    """Resident memory of this process [MB]."""
-    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+    return timed(function, process_time)
 
 
 def make(engine: BatchEngine, runs: Iterable[Point]) -> None:
@@ -76,7 +66,7 @@ def compare(engine: BatchEngine, steps: int, repetitions: int) -> None:
         setting = engine.setting(run)
         make(engine, [run])
         rows = [
-            (timed(partial(straight, setting, steps)), timed(partial(make, engine, [run])))
+            (processor(partial(straight, setting, steps)), processor(partial(make, engine, [run])))
             for _ in range(repetitions)
         ]
         a, b = (1e6 * median(times) / steps for times in zip(*rows, strict=True))
@@ -92,7 +82,7 @@ def grow(engine: BatchEngine) -> None:
     print(f"{'runs':>8} {'us a run':>9} {'resident [MB]':>14}")
     for n in _MANY:
         runs = (Point(i, "fig5", {"plant.eta0.y": float(i % 7)}, 1.0, _STEP) for i in range(n))
-        seconds = timed(partial(make, engine, runs))
+        seconds = processor(partial(make, engine, runs))
         print(f"{n:8} {1e6 * seconds / n:9.1f} {resident():14.1f}")
 
 
@@ -123,17 +113,15 @@ def is_straight(engine: BatchEngine, run: Point) -> bool:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=5000)
-    parser.add_argument("--repetitions", type=int, default=9)
+    parser = options(__doc__)
     parser.add_argument("--check", type=int, metavar="N", help="compare N runs of every study")
-    options = parser.parse_args()
-    print(f"CPython {platform.python_version()}, {platform.machine()}")
-    if options.check:
-        check(options.check)
+    given = parser.parse_args()
+    print(python())
+    if given.check:
+        check(given.check)
         return
     engine = BatchEngine({name: load(name) for name in _SCENARIOS})
-    compare(engine, options.steps, options.repetitions)
+    compare(engine, given.steps, given.repetitions)
     grow(engine)
 
 

@@ -14,53 +14,29 @@ Printed are medians of the repetitions, ratios being taken within each repetitio
 
 from __future__ import annotations
 
-import argparse
 import ctypes
-import platform
 import sys
 from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack
-from pathlib import Path
 from statistics import median
-from tempfile import TemporaryDirectory
-from time import perf_counter
 from unittest.mock import patch
+
+from measuring import options, python, steps_time, timed
 
 from auv_fmu.closed_loop import closed_loop
 from auv_fmu.euler import STEP
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.instance import Instance
 from orchestrator.master.fmi.loaded import LoadedInstance
-from orchestrator.master.loop import PYTHON_LOOP, Stepping, chosen
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
+from orchestrator.master.loop import Stepping, chosen
 from orchestrator.master.schedule import Member
-from orchestrator.master.simulation import simulate
-from orchestrator.runs import bundle
+from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop as wired
 from orchestrator.system.structure import System
 
 #: So many times the steps, so that what they cost is not lost in the set-up that is subtracted.
 _TIMES = 30
-
-
-def timed(function: Callable[[], object]) -> float:
-    """Wall-clock seconds of one call."""
-    start = perf_counter()
-    function()
-    return perf_counter() - start
-
-
-def loop_time(system: System, steps: int, loop: Stepping = PYTHON_LOOP) -> float:
-    """Seconds of the steps of a run whose rows are kept in memory, without its set-up."""
-
-    def run(n: int) -> float:
-        return timed(
-            lambda: simulate(planned(system, Experiment(n * STEP, STEP)), [Table()], loop=loop)
-        )
-
-    return run(steps) - run(1)
 
 
 def slave_classes() -> list[type]:
@@ -77,7 +53,7 @@ def with_empty_steps(system: System, steps: int) -> float:
     with ExitStack() as stack:
         for slave in slave_classes():
             stack.enter_context(patch.object(slave, "do_step", lambda *_: True))
-        return loop_time(system, steps)
+        return steps_time(system, steps)
 
 
 def master_alone(system: System, steps: int) -> float:
@@ -90,7 +66,7 @@ def master_alone(system: System, steps: int) -> float:
         return Member([nothing], nothing, [nothing], instance)
 
     with patch("orchestrator.master.schedule.member", calls):
-        return loop_time(system, steps)
+        return steps_time(system, steps)
 
 
 def compiled_alone(system: System, steps: int, loop: Stepping) -> float:
@@ -98,38 +74,33 @@ def compiled_alone(system: System, steps: int, loop: Stepping) -> float:
     # One, which is FMI's warning, is all that this one has to say.
     nothing = ctypes.cast(ctypes.pythonapi.Py_IsInitialized, ctypes.c_void_p).value
     with patch.object(LoadedInstance, "_address", lambda *_: nothing):
-        return loop_time(system, _TIMES * steps, loop) / _TIMES
+        return steps_time(system, _TIMES * steps, loop=loop) / _TIMES
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=5000)
-    parser.add_argument("--repetitions", type=int, default=9)
-    options = parser.parse_args()
+    given = options(__doc__).parse_args()
     rows = []
-    with TemporaryDirectory(prefix="auvfmu") as folder:
-        bundle.build(Path(folder))
-        system = wired(Path(folder))
-        loop_time(system, 10)
-        fast = chosen("compiled", Experiment(STEP, STEP))
-        for _ in range(options.repetitions):
-            straight = timed(lambda: deque(closed_loop(options.steps), maxlen=0))
-            fmus = loop_time(system, options.steps)
-            empty = with_empty_steps(system, options.steps)
-            master = master_alone(system, options.steps)
-            compiled = loop_time(system, options.steps, fast)
-            stepper = compiled_alone(system, options.steps, fast)
-            rows.append((straight, fmus, empty, master, compiled, stepper))
+    system = wired(current_fmus())
+    steps_time(system, 10)
+    fast = chosen("compiled", Experiment(STEP, STEP))
+    for _ in range(given.repetitions):
+        straight = timed(lambda: deque(closed_loop(given.steps), maxlen=0))
+        fmus = steps_time(system, given.steps)
+        empty = with_empty_steps(system, given.steps)
+        master = master_alone(system, given.steps)
+        compiled = steps_time(system, given.steps, loop=fast)
+        stepper = compiled_alone(system, given.steps, fast)
+        rows.append((straight, fmus, empty, master, compiled, stepper))
 
     def per_step(index: int) -> float:
-        return 1e6 * median(row[index] for row in rows) / options.steps
+        return 1e6 * median(row[index] for row in rows) / given.steps
 
     def share(part: Callable[[float, float, float], float]) -> float:
         return 100 * median(part(*row[1:4]) / row[1] for row in rows)
 
-    print(f"{platform.python_implementation()} {platform.python_version()}, {platform.machine()}")
-    print(f"medians of {options.repetitions} repetitions of {options.steps} steps")
+    print(python())
+    print(f"medians of {given.repetitions} repetitions of {given.steps} steps")
     print(f"straight-line Python loop         {per_step(0):7.1f} us a step")
     print(f"FMU loop                          {per_step(1):7.1f} us a step")
     print(f"FMU loop, empty do_step           {per_step(2):7.1f} us a step")

@@ -12,12 +12,7 @@ Without files: the FMUs and the system of this project, of the native kind.
 from __future__ import annotations
 
 import argparse
-import ctypes
-import importlib
-import json
-import platform
 import resource
-import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -25,9 +20,9 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import Any
 
 import fmpy
+import measuring
 
 from fmus.kinds import NATIVE
 from orchestrator.formats.other_formats import write_osp
@@ -37,7 +32,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.loop import chosen
 from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
-from orchestrator.runs import bundle
+from orchestrator.runs.bundle import build
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
@@ -53,9 +48,6 @@ FIRST, SET_UPS = 500, 5
 
 #: How long a pair may take [s].
 PATIENCE = 60
-
-#: First argument of this script where it times one pair.
-_PAIR = "--pair"
 
 #: Makes a number of steps, and says how long they took [s].
 Run = Callable[[int], float]
@@ -103,14 +95,11 @@ def in_fmpy(system: System, step: float, _: Path) -> Run:
 
 def in_libcosim(system: System, step: float, folder: Path) -> Run:
     """libcosim on a system in its own format: archives of others end its process."""
-    from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
-    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level  # noqa: PLC0415
-
-    log_output_level(CosimLogLevel.ERROR)
+    tool = measuring.libcosim()
     write_osp(replace(system, step=step), folder)
 
     def run(steps: int) -> float:
-        execution = CosimExecution.from_osp_config_file(osp_path=str(folder))
+        execution = tool.from_osp_config_file(osp_path=str(folder))
         start = perf_counter()
         if not execution.step(steps):
             raise InputError("libcosim ended the run")
@@ -121,13 +110,11 @@ def in_libcosim(system: System, step: float, folder: Path) -> Run:
 
 def in_ecos(system: System, step: float, folder: Path) -> Run:
     """ecos on a system as we write it."""
-    for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
-        ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
-    ecospy: Any = importlib.import_module("ecospy")
+    tool = measuring.ecos()
     [ssp] = write_ssp(replace(system, step=step), folder)
 
     def run(steps: int) -> float:
-        with ecospy.EcosSimulation(step_size=step, ssp_path=str(ssp)) as simulation:
+        with tool.EcosSimulation(step_size=step, ssp_path=str(ssp)) as simulation:
             simulation.init()
             start = perf_counter()
             simulation.step(steps)
@@ -158,25 +145,7 @@ def pair(path: Path, host: str, folder: Path) -> None:
         "there": median(b for _, b in rounds) / steps,
         "ratio": median(a / b for a, b in rounds),
     }
-    print(f"\n{_PAIR}{json.dumps(found)}", flush=True)
-
-
-def measured(path: Path, host: str) -> dict[str, float] | None:
-    """What a process finds that times a pair; None: one of the two cannot run it."""
-    try:
-        process = subprocess.run(
-            [sys.executable, __file__, _PAIR, str(path), host],
-            capture_output=True,
-            timeout=PATIENCE,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return None
-    for line in process.stdout.decode(errors="replace").splitlines():
-        if line.startswith(_PAIR):
-            found: dict[str, float] = json.loads(line.removeprefix(_PAIR))
-            return found
-    return None
+    measuring.tell(found)
 
 
 def main() -> None:
@@ -185,26 +154,28 @@ def main() -> None:
     parser.add_argument("file", nargs="*", type=Path, metavar="FILE", help=".fmu or .ssp")
     files = parser.parse_args().file
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    print(f"{platform.python_implementation()} {platform.python_version()}, {platform.machine()}")
+    print(measuring.python())
     print(f"medians of {ROUNDS} rounds of at most {STEPS} steps")
     with TemporaryDirectory(prefix="auvfmu") as folder:
         if not files:
-            bundle.build(Path(folder), kind=NATIVE)
+            build(Path(folder), kind=NATIVE)
             files = [*sorted(Path(folder).glob("*.fmu")), Path(folder, "auv.ssp")]
         left_out = 0
         for path in files:
             for host in HOSTS[path.suffix]:
-                if found := measured(path, host):
-                    here, there = (1e6 * found[key] for key in ("here", "there"))
-                    text = f"{path.name:44} {here:9.2f} us here {there:9.2f} us in {host:9}"
-                    print(f"{text} {found['ratio']:6.3f}", flush=True)
-                else:
+                try:
+                    found = measuring.found_apart(__file__, path, host, limit=PATIENCE)
+                except RuntimeError:
                     left_out += 1
+                    continue
+                here, there = (1e6 * found[key] for key in ("here", "there"))
+                text = f"{path.name:44} {here:9.2f} us here {there:9.2f} us in {host:9}"
+                print(f"{text} {found['ratio']:6.3f}", flush=True)
     print(f"{left_out} pairs of a file and a host of which one does not run")
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == [_PAIR]:
+    if sys.argv[1:2] == [measuring.ONE]:
         with TemporaryDirectory(prefix="auvfmu") as work:
             pair(Path(sys.argv[2]), sys.argv[3], Path(work))
     else:

@@ -8,7 +8,6 @@ memory over many instances that came and went, and over as many resets of one.
 from __future__ import annotations
 
 import gc
-import resource
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -18,8 +17,9 @@ from time import perf_counter
 
 import fmpy
 from fmpy.fmi2 import FMU2Slave
+from measuring import resident
 
-from orchestrator.runs import bundle
+from orchestrator.runs.bundle import current_fmus
 
 REPETITIONS = 200
 
@@ -31,17 +31,12 @@ def growth(function: Callable[[], object]) -> float:
     """Bytes that one call leaves behind."""
     for _ in range(WARM_UP):
         function()
+    gc.collect()
     before = resident()
     for _ in range(MANY):
         function()
-    return (resident() - before) / MANY
-
-
-def resident() -> int:
-    """Resident memory of this process [bytes]."""
     gc.collect()
-    pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[1]
-    return int(pages) * resource.getpagesize()
+    return 1e6 * (resident() - before) / MANY
 
 
 def main() -> None:
@@ -51,8 +46,7 @@ def main() -> None:
         f"{'stays of an instance':>21} {'of a reset':>11}"
     )
     with TemporaryDirectory(prefix="auvfmu") as folder:
-        bundle.build(Path(folder))
-        for path in sorted(Path(folder).glob("*.fmu")):
+        for path in sorted(current_fmus().glob("*.fmu")):
             unpacked = fmpy.extract(path, unzipdir=Path(folder, path.stem))
             guid = fmpy.read_model_description(path).guid
 

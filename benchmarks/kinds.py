@@ -11,8 +11,6 @@ of the FMUs, and the time of an instance after the first.
 
 from __future__ import annotations
 
-import argparse
-import platform
 from collections import deque
 from collections.abc import Callable
 from ctypes import byref, c_char_p, c_int, c_void_p
@@ -27,6 +25,7 @@ from zipfile import ZipFile
 
 import fmpy
 from fmpy.fmi2 import FMU2Slave
+from measuring import options, python, steps_time, timed
 
 from auv_fmu.closed_loop import closed_loop
 from auv_fmu.euler import STEP
@@ -34,10 +33,7 @@ from orchestrator.exchange import c_host
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.loop import chosen
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
-from orchestrator.runs import bundle
+from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop as wired
 from orchestrator.system.structure import System
 
@@ -74,13 +70,6 @@ PAIRS = [
 OTHERS = {"libcosim": "libcosim-ssp", "ecos": "ecos"}
 
 
-def timed(function: Callable[[], object]) -> float:
-    """Wall-clock seconds of one call."""
-    start = perf_counter()
-    function()
-    return perf_counter() - start
-
-
 def straight_line(steps: int) -> float:
     """The equations without FMI or master."""
     return timed(lambda: deque(closed_loop(steps), maxlen=0))
@@ -88,15 +77,10 @@ def straight_line(steps: int) -> float:
 
 def in_our_master(system: System, loop: str, order: str, steps: int) -> float:
     """Steps of a run whose rows are kept in memory, without its set-up."""
-
-    def run(n: int) -> float:
-        experiment = Experiment(n * STEP, STEP, order)
-        steps_of = chosen(loop, experiment)
-        return timed(lambda: simulate(planned(system, experiment), [Table()], loop=steps_of))
-
+    stepping = chosen(loop, Experiment(STEP, STEP, order))
     # A set-up takes as long as thousands of compiled steps, and a larger table has other costs.
     times = MORE_COMPILED if loop == "compiled" else 1
-    return sum(run(steps) - run(1) for _ in range(times)) / times
+    return sum(steps_time(system, steps, order, stepping) for _ in range(times)) / times
 
 
 def in_c(program: Path, steps: int) -> float:
@@ -163,22 +147,17 @@ def libraries_size(fmu: Path) -> float:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=5000)
-    parser.add_argument("--repetitions", type=int, default=9)
-    options = parser.parse_args()
-    print(f"{platform.python_implementation()} {platform.python_version()}, {platform.machine()}")
-    print(f"medians of {options.repetitions} repetitions of {options.steps} steps")
+    given = options(__doc__).parse_args()
+    print(python())
+    print(f"medians of {given.repetitions} repetitions of {given.steps} steps")
     with TemporaryDirectory(prefix="auvfmu") as temporary:
-        folders = {kind: Path(temporary, kind) for kind in ("python", "native")}
-        for kind, folder in folders.items():
-            bundle.build(folder, kind=kind)
+        folders = {kind: current_fmus(kind) for kind in ("python", "native")}
         runs = engines(*(wired(folder) for folder in folders.values()), Path(temporary))
         for run in runs.values():
             run(10)
         times = [
-            {name: 1e6 * run(options.steps) / options.steps for name, run in runs.items()}
-            for _ in range(options.repetitions)
+            {name: 1e6 * run(given.steps) / given.steps for name, run in runs.items()}
+            for _ in range(given.repetitions)
         ]
         for name in runs:
             print(f"{name:36} {median(row[name] for row in times):8.2f} us a step")

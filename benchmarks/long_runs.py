@@ -9,7 +9,6 @@ checkpoint is written meanwhile, of which sizes and times are printed as well.
 from __future__ import annotations
 
 import argparse
-import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +17,7 @@ from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
 from typing import Any
 
-from memory import resident
+from measuring import python, resident
 
 from auv_fmu.euler import STEP
 from fmus.kinds import KINDS, NATIVE
@@ -85,7 +84,7 @@ def main() -> None:
     experiment = Experiment(options.steps * STEP, STEP)
     parts, durations = Parts(options.steps), list[float]()
     hooks: list[Hook] = [parts]
-    print(f"CPython {platform.python_version()}, {platform.machine()}, kind {options.kind}")
+    print(f"{python()}, kind {options.kind}")
     print(f"{'steps':>9} {'us a step':>14} {'resident [MB]':>14}")
     with TemporaryDirectory(prefix="auvfmu") as temporary, timed(durations):
         folder = Path(temporary)

@@ -7,20 +7,13 @@ memory of the process after 1,000 runs and after every further thousand.
 from __future__ import annotations
 
 import argparse
-import os
 import time
-from pathlib import Path
+
+from measuring import resident
 
 from orchestrator import simulate
 
 _EVERY = 1000
-_STATUS = Path("/proc/self/statm")
-
-
-def resident() -> float:
-    """Resident memory of this process [MB]."""
-    pages = int(_STATUS.read_text(encoding="ascii").split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def main() -> None:

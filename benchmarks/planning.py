@@ -13,9 +13,6 @@ at once. Every run is a process of its own, which is ended after a stated time. 
 from __future__ import annotations
 
 import argparse
-import ctypes
-import importlib
-import json
 import resource
 import shutil
 import subprocess
@@ -25,8 +22,9 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import Any
 from zipfile import ZipFile
+
+import measuring
 
 from orchestrator.formats.other_formats import write_osp
 from orchestrator.formats.ssp.writer import write_ssp
@@ -44,9 +42,6 @@ STEP, STEPS = 0.01, 10
 
 #: Instances, and how long a process may take [s].
 SIZES, LIMIT = (100, 1_000, 10_000), 60.0
-
-#: First argument of this script where it times one run.
-_ONE = "--one"
 
 _SUPPORT = Path(__file__).parents[1] / "tests" / "support"
 
@@ -185,12 +180,9 @@ def ours(folder: Path) -> tuple[float, float, float]:
 
 def in_libcosim(folder: Path) -> tuple[float, float, float]:
     """libcosim."""
-    from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
-    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level  # noqa: PLC0415
-
-    log_output_level(CosimLogLevel.ERROR)
+    tool = measuring.libcosim()
     begun = perf_counter()
-    execution = CosimExecution.from_osp_config_file(osp_path=str(folder))
+    execution = tool.from_osp_config_file(osp_path=str(folder))
     read = perf_counter()
     if not execution.step(1):
         raise SystemExit("libcosim ended the run")
@@ -203,11 +195,9 @@ def in_libcosim(folder: Path) -> tuple[float, float, float]:
 
 def in_ecos(folder: Path) -> tuple[float, float, float]:
     """ecos."""
-    for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
-        ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
-    ecospy: Any = importlib.import_module("ecospy")
+    tool = measuring.ecos()
     begun = perf_counter()
-    with ecospy.EcosSimulation(step_size=STEP, ssp_path=str(folder / "large.ssp")) as simulation:
+    with tool.EcosSimulation(step_size=STEP, ssp_path=str(folder / "large.ssp")) as simulation:
         read = perf_counter()
         simulation.init()
         first = perf_counter()
@@ -225,20 +215,10 @@ HOSTS: dict[str, Callable[[Path], tuple[float, float, float]]] = {
 def measured(host: str, folder: Path, limit: float) -> str:
     """What a process finds that makes one run, as the end of a line of the table."""
     try:
-        process = subprocess.run(
-            [sys.executable, __file__, _ONE, host, str(folder)],
-            capture_output=True,
-            timeout=limit,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return f"not at its end after {limit:g} s"
-    for line in process.stdout.decode(errors="replace").splitlines():
-        if line.startswith(_ONE):
-            *times, memory = json.loads(line.removeprefix(_ONE))
-            return "".join(f"{seconds:10.3f} s" for seconds in times) + f"{memory:9.0f} MB"
-    said = process.stderr.decode(errors="replace").strip().splitlines()
-    return f"failed ({process.returncode}): {said[-1][:80] if said else 'without a word'}"
+        *times, memory = measuring.found_apart(__file__, host, folder, limit=limit)
+    except RuntimeError as error:
+        return str(error)
+    return "".join(f"{seconds:10.3f} s" for seconds in times) + f"{memory:9.0f} MB"
 
 
 def main() -> None:
@@ -271,9 +251,9 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == [_ONE]:
+    if sys.argv[1:2] == [measuring.ONE]:
         taken = HOSTS[sys.argv[2]](Path(sys.argv[3]))
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-        print(f"\n{_ONE}{json.dumps([*taken, peak])}", flush=True)
+        measuring.tell([*taken, peak])
     else:
         main()

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import platform
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -22,6 +21,8 @@ from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
 from typing import NamedTuple
 from unittest.mock import patch
+
+from measuring import python
 
 from orchestrator.runs.loading import loaded
 from orchestrator.runs.preparation import Prepared, prepare
@@ -141,10 +142,7 @@ def main() -> None:
     parser.add_argument("--nodes", type=int, default=100, help="of the large cluster")
     parser.add_argument("--cores", type=int, default=16, help="of each of its nodes")
     options = parser.parse_args()
-    print(
-        f"{platform.python_implementation()} {platform.python_version()}, {platform.machine()}, "
-        f"{os.cpu_count()} cores, runs of {options.stop_time:g} s"
-    )
+    print(f"{python()}, {os.cpu_count()} cores, runs of {options.stop_time:g} s")
     engines: dict[str, Callable[[], Engine]] = {
         "FMUs in Python": lambda: FmuEngine({SCENARIO: prepared("python")}),
         "FMUs in C": lambda: FmuEngine({SCENARIO: prepared("native")}),

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
+from numpy.typing import ArrayLike
 
 from auv_fmu.euler import STEP
 from auv_fmu.output_feedback import Gains
@@ -119,22 +120,16 @@ _SIGNALS = tuple(rf"$\tau_{k}$" for k in ACTUATORS)
 
 
 def _draw_lines(
-    axes: Axes,
-    x: Sequence[float] | np.ndarray,
-    rows: Sequence[Sequence[float]] | np.ndarray,
-    names: Sequence[str] = _SIGNALS,
-    marker: str = "o",
+    axes: Axes, x: ArrayLike, rows: ArrayLike, names: Sequence[str] = _SIGNALS, marker: str = "o"
 ) -> None:
     """Draw a line for each of three numbers, of which a row has one value each."""
-    for name, values, colour, style in zip(
-        names, np.transpose(rows), COLOURS, STYLES, strict=False
-    ):
-        axes.plot(x, values, label=name, color=colour, linestyle=style, marker=marker)
+    columns = zip(names, np.transpose(rows), COLOURS, STYLES, strict=False)
+    for name, column, colour, style in columns:
+        axes.plot(x, column, label=name, color=colour, linestyle=style, marker=marker)
 
 
 def _draw_limit(axes: Axes, run: KeptRun) -> None:
-    _, upper = limits(run.table)
-    axes.axhline(upper[0], color="black", linewidth=1, label="limit of (3)")
+    axes.axhline(limits(run.table)[1][0], color="black", linewidth=1, label="limit of (3)")
 
 
 @effect("effect-disturbance", "Fig. 7 in one figure", *SEVEN)

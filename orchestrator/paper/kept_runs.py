@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,16 +16,14 @@ from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.ledger import Ledger
 from orchestrator.machine.workers import Workers
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import code_of, digest_of
 from orchestrator.runs.folder import opened
 from orchestrator.runs.preparation import Prepared, prepared_of
+from orchestrator.runs.record import content_of, ending_in, header_in, loops_in
 from orchestrator.runs.request import Request
-from orchestrator.system.names import port_name
 from orchestrator.vehicle.indices import Metrics
-from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
+from orchestrator.vehicle.signals import STANDARD, Loop
 
 
 @dataclass(frozen=True)
@@ -149,40 +147,28 @@ def _make(run: Request, key: str) -> KeptRun:
         prepared = prepared_of(run)
         if key_of(prepared) != key:
             raise InputError("FMUs have changed while the report was made; make it anew")
-        loops = loops_of(prepared.system)
-        metrics = Metrics(loops)
-        seen = VisibleRows({name for loop in loops for name in loop.drawn()})
+        metrics = Metrics(prepared.loops)
+        seen = VisibleRows({name for loop in prepared.loops for name in loop.drawn()})
         prepared.run([metrics, seen])
     except InputError as error:
         return KeptRun({"failure": str(error)}, Table())
     values = metrics.content(prepared.scenario.name, prepared.system)
-    return KeptRun(values, Table.of(seen.header, seen.rows, seen.ending), loops)
+    return KeptRun(values, Table.of(seen.header, seen.rows, seen.ending), prepared.loops)
 
 
 def _write(file: Path, kept_run: KeptRun) -> None:
-    header = kept_run.table.header
+    table = kept_run.table
     text = {
         "metrics": kept_run.metrics,
-        "columns": header.columns,
-        "experiment": asdict(header.experiment),
-        "parameters": {str(name): value for name, value in header.parameters.items()},
-        "messages": kept_run.table.ending.messages,
-        "events": kept_run.table.ending.events,
-        "loops": [asdict(loop) for loop in kept_run.loops],
+        "columns": table.columns,
+        **content_of(table.header, table.ending, kept_run.loops),
     }
     # A column together: one that is constant then takes no room.
-    np.savez_compressed(file, text=json.dumps(text), columns=kept_run.table.rows.T)
+    np.savez_compressed(file, text=json.dumps(text), columns=table.rows.T)
 
 
 def _read(file: Path) -> KeptRun:
     with np.load(file) as content:
         text, rows = json.loads(str(content["text"])), content["columns"].T
-    header = Header(
-        tuple(text["columns"]),
-        Experiment(**text["experiment"]),
-        {port_name(name): value for name, value in text["parameters"].items()},
-    )
-    events = tuple(Occurrence(*event) for event in text["events"])
-    ending = Ending(messages=tuple(text["messages"]), events=events)
-    loops = tuple(Loop(**names) for names in text["loops"])
-    return KeptRun(text["metrics"], Table.of(header, rows, ending), loops)
+    table = Table.of(header_in(text, tuple(text["columns"])), rows, ending_in(text))
+    return KeptRun(text["metrics"], table, loops_in(text))

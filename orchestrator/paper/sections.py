@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, count
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -69,17 +70,11 @@ def sections(references: Sequence[str], kind: str = PYTHON) -> list[Section]:
     for reference in references:
         scenario = read_scenario(reference)
         taken = {section.name for section in found}
-        name = next(name for name in _numbered(scenario.stem) if name not in taken)
+        stem = scenario.stem
+        names = chain([stem], (f"{stem}-{n}" for n in count(2)))
+        name = next(name for name in names if name not in taken)
         found.append(Section(name, scenario, _runs(reference, scenario, kind)))
     return found
-
-
-def _numbered(name: str) -> Iterator[str]:
-    yield name
-    n = 2
-    while True:
-        yield f"{name}-{n}"
-        n += 1
 
 
 def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Request]:

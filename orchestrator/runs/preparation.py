@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 from auv_fmu.euler import STEP
@@ -31,7 +32,7 @@ from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.runs.wiring import closed_loop, read_wiring
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.signals import STANDARD
+from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
 
 #: The components that a comparison exchanges, and keeps.
 CONTROLLER, PLANNER = STANDARD.controller, STANDARD.planner
@@ -48,7 +49,7 @@ class Prepared:
     """A run that is ready to be made, and the scenario that it comes from.
 
     Attributes:
-        scenario: as its file has it, with the events that the request has in their place.
+        scenario: as its file has it, but for events and inputs of the request.
         plan: the system, and its steps.
         isolation: of the FMUs in processes of their own; None: they run in this one.
         loop: that makes the steps.
@@ -75,6 +76,11 @@ class Prepared:
     def experiment(self) -> Experiment:
         """Until when it is run, in which steps and which order."""
         return self.plan.experiment
+
+    @cached_property
+    def loops(self) -> tuple[Loop, ...]:
+        """The loops of its vehicles."""
+        return loops_of(self.system)
 
     def run(self, observers: Sequence[Observer], hooks: Sequence[Hook] = ()) -> Ending:
         """Make the run.
@@ -132,14 +138,13 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     """
     findings, values = Findings(request.strict), request.values
     system = system.with_parameters(values)
-    if request.inputs is None:
-        inputs, given = scenario.inputs, {*values, *scenario.parameters}
-    else:
-        inputs, given = Inputs(Path(request.inputs)), {*values}
-    input_table = None
-    if inputs is not None:
+    given, input_table = {*values, *scenario.parameters}, None
+    if request.inputs is not None:
+        # On the command line a table wins over the scenario's parameters.
+        scenario, given = replace(scenario, inputs=Inputs(Path(request.inputs))), {*values}
+    if scenario.inputs is not None:
         with findings.collecting():
-            system, input_table = read_inputs(inputs, system, given)
+            system, input_table = read_inputs(scenario.inputs, system, given)
     if isinstance(request.events, str):
         scenario = replace(scenario, events=read_scenario(request.events).events)
     elif request.events is not None:
@@ -205,8 +210,9 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         coupling=scenario.coupling,
         events=shared_events(own or scenario.events, system),
         inputs=scenario.inputs or companion.inputs,
+        parameters=companion.parameters if request.inputs is None else {},
     )
-    wanted = replace(request, parameters=shared, steps=steps, events=None)
+    wanted = replace(request, parameters=shared, steps=steps, events=None, inputs=None)
     return [prepared, prepare(same, system, wanted)]
 
 

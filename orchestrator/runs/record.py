@@ -1,4 +1,4 @@
-"""What a run leaves, written and read again: `run.json` says of what it was made; checkpoints."""
+"""What a run leaves, and how it is read again: `run.json`, its table, its checkpoints."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.master.plan import PACKAGES, digest_of
 from orchestrator.runs.preparation import Prepared
 from orchestrator.system.names import port_name
-from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
+from orchestrator.vehicle.signals import STANDARD, Loop
 
 #: The indices of a run.
 METRICS = "metrics.json"
@@ -104,16 +104,9 @@ def write_record(
         "identity": digest_of(prepared.identity),
         "command": list(command),
         **clock.times(),
-        "failure": ending.failure,
-        "remark": ending.remark,
-        "messages": list(ending.messages),
+        **content_of(header, ending, prepared.loops),
         "experiment": {**vars(header.experiment), "steps": dict(prepared.system.steps)},
-        "loop": header.loop,
-        "texts": sorted(header.strings),
-        "units": dict(header.units),
-        "vehicles": [asdict(loop) for loop in loops_of(prepared.system)],
         **(remarks or {}),
-        "events": [occurrence._asdict() for occurrence in ending.events],
         "fmus": {
             component.name: {
                 "file": component.fmu.name,
@@ -122,9 +115,24 @@ def write_record(
             }
             for component in prepared.system.components.values()
         },
-        "parameters": {str(name): value for name, value in header.parameters.items()},
     }
     write_files(folder, content)
+
+
+def content_of(header: Header, ending: Ending, loops: Sequence[Loop]) -> dict[str, object]:
+    """What is written of a table: :func:`header_in`, `ending_in` and `loops_in` read it again."""
+    return {
+        "failure": ending.failure,
+        "remark": ending.remark,
+        "messages": list(ending.messages),
+        "experiment": vars(header.experiment),
+        "loop": header.loop,
+        "texts": sorted(header.strings),
+        "units": dict(header.units),
+        "vehicles": [asdict(loop) for loop in loops],
+        "events": [occurrence._asdict() for occurrence in ending.events],
+        "parameters": {str(name): value for name, value in header.parameters.items()},
+    }
 
 
 def write_files(
@@ -142,17 +150,18 @@ def write_files(
     (folder / RECORD).write_text(json.dumps(whole, indent=2) + "\n", encoding="utf-8")
 
 
-def _ending_in(record: dict[str, Any]) -> Ending:
+def ending_in(record: dict[str, Any]) -> Ending:
     """How a run has ended, from its record."""
     events = record.get("events", ())
     return Ending(
         record.get("failure"),
         record.get("remark"),
+        tuple(record.get("messages", ())),
         events=tuple(Occurrence(float(e["time"]), str(e["text"]), str(e["label"])) for e in events),
     )
 
 
-def _header_in(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
+def header_in(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
     """The header of a table, from the record beside it."""
     stated = record["experiment"]
     known = {field.name: stated[field.name] for field in fields(Experiment) if field.name in stated}
@@ -165,7 +174,7 @@ def _header_in(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
     )
 
 
-def _loops_in(record: dict[str, Any]) -> tuple[Loop, ...]:
+def loops_in(record: dict[str, Any]) -> tuple[Loop, ...]:
     """The loops of the vehicles of a run, from its record; of one without, the standard one."""
     return tuple(Loop(**names) for names in record.get("vehicles", ())) or (STANDARD,)
 
@@ -194,14 +203,14 @@ def read_result(
     first = next(blocks, None)
     if first is None:
         raise InputError(f"{file}: has no rows")
-    loops = _loops_in(record)
+    loops = loops_in(record)
     drawn = {name for loop in loops for name in loop.drawn()}
     table = VisibleRows(drawn if watched is None else watched(columns))
     table.begin(_header(record, columns, first, file))
     table.take(first)
     for rows in blocks:
         table.take(rows)
-    table.end(_ending_in(record))
+    table.end(ending_in(record))
     label = str(record.get("label") or record.get("scenario") or file.stem)
     return Drawn(label, table, bool(record.get("z_up")), loops)
 
@@ -240,7 +249,7 @@ def read_record(table: Path) -> dict[str, Any]:
         try:
             if table.name not in record["files"]:
                 return {}
-            header, *_ = _header_in(record, ()), _ending_in(record), _loops_in(record)
+            header, *_ = header_in(record, ()), ending_in(record), loops_in(record)
             frozenset(record.get("texts", []))
         except (KeyError, TypeError, AttributeError):
             raise ValueError("it lacks what a run writes") from None
@@ -260,7 +269,7 @@ def _header(
 ) -> Header:
     """The header of a table, with its first rows; where no record tells the step, the first is."""
     if record:
-        return _header_in(record, columns)
+        return header_in(record, columns)
     step = float(rows[1, 0] - rows[0, 0]) if len(rows) > 1 else 1.0
     if not 0.0 < step < inf:
         raise InputError(f"{file}: times must grow")

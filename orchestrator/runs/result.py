@@ -36,7 +36,6 @@ from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.vehicle.indices import metrics_of
-from orchestrator.vehicle.signals import loops_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -119,7 +118,7 @@ class Result(Table):
 
     def metrics(self) -> dict[str, Any]:
         """What the command line writes into metrics.json."""
-        found = metrics_of(self, loops_of(self.system))
+        found = metrics_of(self, self._prepared.loops)
         return found.content(self._prepared.scenario.name, self.system)
 
     def to_dataframe(self) -> pd.DataFrame:

@@ -52,7 +52,7 @@ from orchestrator.system.structure import System
 from orchestrator.vehicle.cautions import cautions, cautions_after, cautions_beside, watched
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.proof import CertificatesFile
-from orchestrator.vehicle.signals import Loop, loops_of, suffixes
+from orchestrator.vehicle.signals import Loop, suffixes
 
 #: A file that keeps room for what is written last, so that a full disk does not cost the record.
 _SPARE, _SPARE_BYTES = ".spare", 65536
@@ -112,14 +112,14 @@ def run_into(
     np.linalg.inv(np.eye(1))
     clock = Stopwatch()
     done: list[_Running] = []
-    loops = loops_of(runs[0].system)
+    loops = runs[0].loops
     figures = figure_files(runs[0].scenario.figure, runs[0].scenario.stem, loops)
     folders = _folders(runs, figures)
     names = [*figures, *(Path(below, name).as_posix() for below in folders for name in FILES)]
     names += [
         Path(below, _certificates(vehicle)).as_posix()
         for prepared, below in zip(runs, folders, strict=True)
-        for vehicle in suffixes(loops_of(prepared.system)).values()
+        for vehicle in suffixes(prepared.loops).values()
     ]
     with (
         held_interrupts() as interrupts,
@@ -152,7 +152,7 @@ def run_into(
                 missed = [] if ending.failure else prepared.missed(ending)
                 said = [f"did not happen: {event}" for event in missed]
                 said += cautions_beside(run.seen, runs[0].scenario.name, done[0].seen, loops)
-                said += cautions_after(run.seen, loops_of(prepared.system))
+                said += cautions_after(run.seen, prepared.loops)
                 for caution in said:
                     say(f"warning: {prepared.scenario.name}: {caution}")
                 if interrupts:
@@ -197,7 +197,7 @@ class _Running:
     ) -> None:
         self.folder, self.prepared = folder, prepared
         self.ending, self.metrics = Ending(), dict[str, Any]()
-        loops = loops_of(prepared.system)
+        loops = prepared.loops
         self._metrics = Metrics(loops)
         # Without figures only the cautions look at what was seen.
         seen = watched if files.no_figures else Loop.drawn
@@ -287,7 +287,7 @@ def _draw(
 ) -> list[str]:
     """Draw all figures or, where one of them cannot be written, none; notes on what is left out."""
     drawn = [
-        Drawn(run.prepared.scenario.legend, run.seen, scenario.z_up, loops_of(run.prepared.system))
+        Drawn(run.prepared.scenario.legend, run.seen, scenario.z_up, run.prepared.loops)
         for run in done
     ]
     try:

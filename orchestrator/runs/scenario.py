@@ -6,6 +6,7 @@ import hashlib
 import tomllib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,17 @@ class Inputs:
 
     file: Path
     between: str = "linear"
+
+    @cached_property
+    def content(self) -> tuple[list[PortName], np.ndarray]:
+        """Ports by the names of its columns, and its rows, time first; read once for all systems.
+
+        Raises:
+            InputError: the table cannot be read.
+
+        """
+        names = [port_name(name) for name in read_columns(self.file)]
+        return names, np.vstack([np.empty((0, 1 + len(names))), *read_rows(self.file)])
 
 
 @dataclass(frozen=True)
@@ -171,8 +183,8 @@ def read_inputs(
 
     """
     file = inputs.file
-    targets = tuple(system.named(port_name(name)) for name in read_columns(file))
-    rows = np.vstack([np.empty((0, 1 + len(targets))), *read_rows(file)])
+    names, rows = inputs.content
+    targets = tuple(map(system.named, names))
     try:
         _check_rows(rows, targets)
         for target, column in zip(targets, rows[:, 1:].T, strict=True):

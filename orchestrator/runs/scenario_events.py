@@ -185,24 +185,18 @@ def _members(name: str, value: Any, ports: Sequence[PortName]) -> Iterator[tuple
 # What events do
 
 
-def _override(values: Mapping[str, Any], system: System) -> Action:
-    return Alter("override", tuple(_altered(values, system, _value)))
-
-
-def _bias(values: Mapping[str, Any], system: System) -> Action:
-    return Alter("bias", tuple(_altered(values, system, _offset)))
-
-
 def _altered(
     values: Mapping[str, Any],
     system: System,
     arriving: Callable[[System, PortName, Connection | None, Any], float],
-) -> Iterator[tuple[PortName, float]]:
-    for name, value in flattened(values):
-        ports = _ports(system, name, ("input", "output"))
-        for port, one in _members(name, value, ports):
-            for route in _routes(system, port):
-                yield route.target if route else port, arriving(system, port, route, one)
+) -> tuple[tuple[PortName, float], ...]:
+    """The inputs that some signals reach, with what arrives there of their values."""
+    return tuple(
+        (route.target if route else port, arriving(system, port, route, one))
+        for name, value in flattened(values)
+        for port, one in _members(name, value, _ports(system, name, ("input", "output")))
+        for route in _routes(system, port)
+    )
 
 
 def _value(system: System, port: PortName, route: Connection | None, value: Any) -> float:
@@ -243,18 +237,6 @@ def _text(value: Any) -> Any:
     return literal(value) if isinstance(value, bool) else value
 
 
-def _freeze(names: Any, system: System) -> Action:
-    return Freeze(_inputs(names, system))
-
-
-def _lose(names: Any, system: System) -> Action:
-    return Alter("override", tuple((target, 0.0) for target in _inputs(names, system)))
-
-
-def _release(names: Any, system: System) -> Action:
-    return Release(_inputs(names, system))
-
-
 def _set(values: Mapping[str, Any], system: System) -> Action:
     fed = {connection.target: connection.source for connection in system.connections}
     parameters, inputs = [], []
@@ -281,18 +263,16 @@ def _reset(names: Any, system: System) -> Action:
     return Reset(tuple(_things(names)))
 
 
-def _stop(value: bool, system: System) -> Action:
-    return Stop("stop")
-
-
 ACTIONS: Mapping[str, Callable[[Any, System], Action]] = {
     "set": _set,
-    "override": _override,
-    "bias": _bias,
-    "freeze": _freeze,
-    "drop": _freeze,
-    "lose": _lose,
-    "release": _release,
+    "override": lambda values, system: Alter("override", _altered(values, system, _value)),
+    "bias": lambda values, system: Alter("bias", _altered(values, system, _offset)),
+    "freeze": lambda names, system: Freeze(_inputs(names, system)),
+    "drop": lambda names, system: Freeze(_inputs(names, system)),
+    "lose": lambda names, system: Alter(
+        "override", tuple((target, 0.0) for target in _inputs(names, system))
+    ),
+    "release": lambda names, system: Release(_inputs(names, system)),
     "reset": _reset,
-    "stop": _stop,
+    "stop": lambda _, __: Stop("stop"),
 }

@@ -29,35 +29,41 @@ def test_names_are_apart():
     assert len({effect.name for effect in EFFECTS}) == len(EFFECTS)
 
 
-def test_disturbance(tables):
-    shown = effects.disturbance(
-        *made(
-            tables["effect-disturbance"],
-            *(
-                {"final_error": (0.0, 0.1 * i, 0.01), "peak_command": (60.0 + i, 20.0, 20.0)}
-                for i in (1, 2, 3)
-            ),
-        )
-    )
-    assert tells(shown.text, (0.1, 0.2, 0.3), (61, 62, 63))
-
-
-def test_jacobian(tables):
-    shown = effects.jacobian(
-        *made(
-            tables["effect-jacobian"],
-            {"saturated_fraction": (0.0, 0.0, 0.0), "final_error": (1.0, 2.0, 3.0)},
-            {"saturated_fraction": (0.1, 0.25, 0.0), "final_error": (4.0, 5.0, 6.0)},
-        )
-    )
-    assert tells(shown.text, (25, 5, 4, 5, 6, 0, 1, 2, 3)), "5 is the figure"
-
-
-def test_order(tables):
-    variations = ((1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (3.0, 3.0, 3.0), (4.0, 4.0, 400.0))
-    runs = made(tables["effect-order"], *({"total_variation": each} for each in variations))
-    shown = effects.order(*runs)
-    assert tells(shown.text, (3, 6, 9, 408))
+@pytest.mark.parametrize(
+    ("name", "metrics", "told"),
+    [
+        (
+            "effect-disturbance",
+            [{"final_error": (0, i / 10, 0), "peak_command": (60 + i, 20, 20)} for i in (1, 2, 3)],
+            [(0.1, 0.2, 0.3), (61, 62, 63)],
+        ),
+        (
+            # 5 is the figure.
+            "effect-jacobian",
+            [
+                {"saturated_fraction": (0.0, 0.0, 0.0), "final_error": (1.0, 2.0, 3.0)},
+                {"saturated_fraction": (0.1, 0.25, 0.0), "final_error": (4.0, 5.0, 6.0)},
+            ],
+            [(25, 5, 4, 5, 6, 0, 1, 2, 3)],
+        ),
+        (
+            "effect-order",
+            [{"total_variation": (i, i, i)} for i in (1.0, 2.0, 3.0, 136.0)],
+            [(3, 6, 9, 408)],
+        ),
+        (
+            "effect-saturation",
+            [
+                {"l2_effort": (1.0, 2.0, 3.0), "final_error": (0.1, 0.2, 0.3)},
+                {"l2_effort": (4.0, 5.0, 6.0), "final_error": (0.4, 0.5, 0.6)},
+            ],
+            [(1, 2, 3, 4, 5, 6), (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)],
+        ),
+    ],
+)
+def test_the_text_tells_the_numbers(tables, name, metrics, told):
+    [effect] = [effect for effect in EFFECTS if effect.name == name]
+    assert tells(effect.show(*made(tables[name], *metrics)).text, *told)
 
 
 def test_step(tables):
@@ -102,17 +108,6 @@ def test_condition_30(tables):
     assert tells(shown.text, (10, 1, 1, 1, 21, 2.1), (2.1, 1, 1, 1, 0.476))
     [line, *_] = shown.figure.axes[0].lines
     np.testing.assert_allclose(line.get_ydata(), 10.0 * line.get_xdata())
-
-
-def test_saturation(tables):
-    shown = effects.saturation(
-        *made(
-            tables["effect-saturation"],
-            {"l2_effort": (1.0, 2.0, 3.0), "final_error": (0.1, 0.2, 0.3)},
-            {"l2_effort": (4.0, 5.0, 6.0), "final_error": (0.4, 0.5, 0.6)},
-        )
-    )
-    assert tells(shown.text, (1, 2, 3, 4, 5, 6), (0.1, 0.2, 0.3, 0.4, 0.5, 0.6))
 
 
 def test_certificates(tables):
