@@ -6,6 +6,7 @@ and transformations makes of them, loops have the gain that their formulas are d
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
@@ -691,22 +692,27 @@ def _in_file_order(names: list[str]) -> list[str]:
     return walk(placed, "")
 
 
+def reached(
+    nodes: Iterable[Hashable], edges: Iterable[tuple[Hashable, Hashable]]
+) -> dict[Any, set[Any]]:
+    """What can be reached from each node along one edge or several."""
+    after: dict[Any, set[Any]] = {node: set() for node in nodes}
+    for a, b in edges:
+        after[a].add(b)
+    found: dict[Any, set[Any]] = {}
+    for node in after:
+        found[node], ahead = set(), [node]
+        while ahead:
+            new = after[ahead.pop()] - found[node]
+            found[node] |= new
+            ahead += new
+    return found
+
+
 def _ringed(parts: dict[str, Part], wires: list[Wire]) -> set[str]:
     """Components that reach themselves along connections."""
-    after: dict[str, set[str]] = {name: set() for name in parts}
-    for wire in wires:
-        after[wire.source[0]].add(wire.target[0])
-
-    def reached(name: str) -> set[str]:
-        found: set[str] = set()
-        ahead = [name]
-        while ahead:
-            new = after[ahead.pop()] - found
-            found |= new
-            ahead += new
-        return found
-
-    return {name for name in parts if name in reached(name)}
+    found = reached(parts, ((wire.source[0], wire.target[0]) for wire in wires))
+    return {name for name in parts if name in found[name]}
 
 
 def draw(seed: int) -> Drawn:
