@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
@@ -60,28 +61,33 @@ def python(request, dist: Path) -> ModelDescription:
 @pytest.fixture(scope="module")
 def fmi2(python: ModelDescription, tmp_path_factory) -> Path:
     """A folder with what the native kind says of itself in FMI 2.0."""
-    name, path = python.modelName, tmp_path_factory.mktemp("fmi2")
-    content = fmi2_description(name, declared(name).DESCRIPTION, GUID, declared(name).PORTS)
-    (path / "modelDescription.xml").write_bytes(content)
-    return path
+    return written(tmp_path_factory.mktemp("fmi2"), fmi2_description, python.modelName)
 
 
 @pytest.fixture(scope="module")
 def fmi3(python: ModelDescription, tmp_path_factory) -> Path:
     """A folder with what the native kind says of itself in FMI 3.0."""
-    name, path = python.modelName, tmp_path_factory.mktemp("fmi3")
-    content = fmi3_description(name, declared(name).DESCRIPTION, GUID, declared(name).PORTS)
-    (path / "modelDescription.xml").write_bytes(content)
-    (path / "sources").mkdir()
-    (path / "sources" / "buildDescription.xml").write_bytes(fmi3_build_description(name))
-    (path / "terminalsAndIcons").mkdir()
-    terminals = path / "terminalsAndIcons" / "terminalsAndIcons.xml"
-    terminals.write_bytes(terminals_and_icons(declared(name).PORTS))
+    name = python.modelName
+    path = written(tmp_path_factory.mktemp("fmi3"), fmi3_description, name)
+    for file, content in (
+        ("sources/buildDescription.xml", fmi3_build_description(name)),
+        ("terminalsAndIcons/terminalsAndIcons.xml", terminals_and_icons(declared(name).PORTS)),
+    ):
+        (path / file).parent.mkdir()
+        (path / file).write_bytes(content)
     return path
 
 
-def test_description_of_fmi2_is_valid(fmi2: Path):
-    assert validate_fmu(str(fmi2)) == []
+def written(path: Path, describe: Callable[..., bytes], name: str) -> Path:
+    """The folder, with the description of a component."""
+    content = describe(name, declared(name).DESCRIPTION, GUID, declared(name).PORTS)
+    (path / "modelDescription.xml").write_bytes(content)
+    return path
+
+
+def test_descriptions_are_valid(fmi2: Path, fmi3: Path):
+    """In FMI 3.0 buildDescription.xml, too, against its schema."""
+    assert validate_fmu(str(fmi2)) == validate_fmu(str(fmi3)) == []
 
 
 def test_both_kinds_say_the_same(python: ModelDescription, fmi2: Path):
@@ -100,11 +106,6 @@ def test_native_kind_tells_what_it_is(fmi2: Path):
     assert native.generationDateAndTime is None
     [[sources]] = [build.sourceFileSets for build in native.buildConfigurations]
     assert sources.sourceFiles == ["fmi2.c"]
-
-
-def test_description_of_fmi3_is_valid(fmi3: Path):
-    # Reads buildDescription.xml as well, against its schema.
-    assert validate_fmu(str(fmi3)) == []
 
 
 def test_sources_of_fmi3_are_one_file(fmi3: Path):

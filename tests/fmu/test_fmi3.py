@@ -141,6 +141,7 @@ def test_loop_of_fig4_is_that_of_the_python_kind(dist: Path, unpacked: Path):
     assert np.array_equal(ours.rows[:, outputs], theirs)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="cmake is not installed")
 def test_sources_alone_give_the_same_rows(dist3: Path, tmp_path: Path):
     fmpy.extract(dist3 / "AuvPlant.fmu", unzipdir=tmp_path / "fmu")

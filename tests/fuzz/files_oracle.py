@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
@@ -52,24 +53,11 @@ def agreement(
 
 def _fields(line: str, separator: str) -> list[str] | None:
     """The fields of a line, some in quotes; None: the quotes are not well set."""
-    fields = []
-    while True:
-        line = line.lstrip(" ")
-        if line.startswith('"'):
-            quoted = re.match(r'"((?:[^"]|"")*)"', line)
-            if quoted is None:
-                return None
-            field, line = quoted[1].replace('""', '"'), line[quoted.end() :]
-        else:
-            end = line.find(separator)
-            end = len(line) if end < 0 else end
-            field, line = line[:end], line[end:]
-        fields.append(field)
-        if not line:
-            return fields
-        if not line.startswith(separator):
-            return None
-        line = line[1:]
+    reader = csv.reader([line], delimiter=separator, skipinitialspace=True, strict=True)
+    try:
+        return next(reader, [""])
+    except csv.Error:
+        return None
 
 
 def _agreement(  # noqa: PLR0911  # one for each thing that can be wrong

@@ -54,22 +54,14 @@ def _report(scenario: str) -> Callable[[Path], int]:
     return write
 
 
+_FIG5 = _call("run", "fig5", "--stop-time", "0.5")
+
+_RESUMED = ("--checkpoint-every", "0.1", "--resume", "--no-figures")
+
 #: By name: what writes the earlier result, and the new one.
 WRITERS: dict[str, tuple[Callable[[Path], int], Callable[[Path], int]]] = {
-    "run": (_call("run", "fig5", "--stop-time", "0.5"), _call("run", "fig4", "--stop-time", "1")),
-    "resume": (
-        _call("run", "fig5", "--stop-time", "0.5"),
-        _call(
-            "run",
-            "fig5",
-            "--stop-time",
-            "1",
-            "--checkpoint-every",
-            "0.1",
-            "--resume",
-            "--no-figures",
-        ),
-    ),
+    "run": (_FIG5, _call("run", "fig4", "--stop-time", "1")),
+    "resume": (_FIG5, _call("run", "fig5", "--stop-time", "1", *_RESUMED)),
     "report": (_report("fig3a"), _report("fig4")),
     "build": (_call("build", "--loader", "plain"), _call("build", "--loader", "native")),
     "export": (

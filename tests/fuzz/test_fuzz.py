@@ -22,7 +22,7 @@ from support import states
 from support.calls import CASES, Call, Draw, Item
 from support.hosts import GCC, compiled, sanitized, sanitizers
 from support.native_states import Unwritable
-from support.raw import Description, Library, Variable, instance
+from support.raw import Description, Library, instance
 from support.settings import EACH, NAMES, REPRESENTATIVES
 from support.tiers import slow
 from support.worker import Lost, Worker
@@ -168,17 +168,13 @@ def test_state_that_was_taken_once_does_no_harm(kinds, kind, name, what):
 
 def test_answer_that_is_not_the_tables_is_noticed_and_shrunk(planner: Fuzzer):
     """A good value where the table speaks of NaN: the FMU takes it, which the model denies."""
-    reference = planner_port(planner).reference
+    reference = planner.description().find("tau_d.u").reference
     wrong = Call("fmi2SetReal", "NaN for a parameter", {"items": [Item(reference, 5.0, False)]})
     calls = of_planner(*BEGIN[:1], KEEP, KEEP, wrong, KEEP, *BEGIN[1:], STEP, STEP)
     assert planner.replay(calls).endswith("OK in the state instantiated, not fmi2Error")
     shrunk = planner.shrunk(calls)
     assert [action.call for action in shrunk.actions] == [BEGIN[0], wrong]
     assert planner.show(shrunk).splitlines()[-1].endswith("tau_d.u=5.0)   # NaN for a parameter")
-
-
-def planner_port(planner: Fuzzer) -> Variable:
-    return planner.description().find("tau_d.u")
 
 
 @pytest.mark.skipif(GCC is None, reason="gcc is not installed")

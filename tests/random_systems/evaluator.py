@@ -24,6 +24,7 @@ from random_systems.generator import (
     Part,
     Variable,
     Wire,
+    reached,
 )
 
 GAUSS_SEIDEL, JACOBI = "gauss-seidel", "jacobi"
@@ -147,35 +148,21 @@ def has_feedthrough(fmu: Fmu, output: str) -> bool:
 
 def components(nodes: Sequence[Any], edges: Iterable[tuple[Any, Any]]) -> list[list[Any]]:
     """The strongly connected components of a graph, what feeds others before them."""
-    after: dict[Any, set[Any]] = {node: set() for node in nodes}
-    for a, b in edges:
-        after[a].add(b)
-    reach = {}
-    for node in nodes:
-        found: set[Any] = set()
-        ahead = [node]
-        while ahead:
-            new = after[ahead.pop()] - found
-            found |= new
-            ahead += new
-        reach[node] = found
-    groups: list[list[Any]] = []
-    for node in nodes:
-        for group in groups:
-            if node in reach[group[0]] and group[0] in reach[node]:
-                group.append(node)
-                break
-        else:
-            groups.append([node])
-    found_groups: list[list[Any]] = []
+    reach = reached(nodes, edges)
+    left = [{node} | {other for other in reach[node] if node in reach[other]} for node in nodes]
+    groups = [sorted(group, key=nodes.index) for group in left]
+    groups = [group for i, group in enumerate(groups) if group[0] == nodes[i]]
+    found: list[list[Any]] = []
     while groups:
-        for group in groups:
-            others = [one for one in groups if one is not group]
-            if not any(group[0] in reach[one[0]] for one in others):
-                break
+        # The first that no other leads to.
+        group = next(
+            group
+            for group in groups
+            if not any(group[0] in reach[one[0]] for one in groups if one is not group)
+        )
         groups.remove(group)
-        found_groups.append(group)
-    return found_groups
+        found.append(group)
+    return found
 
 
 def is_ring(group: Sequence[Any], edges: Iterable[tuple[Any, Any]]) -> bool:

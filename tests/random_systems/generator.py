@@ -6,17 +6,15 @@ and transformations makes of them, loops have the gain that their formulas are d
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
 from typing import Any, NamedTuple
-from zipfile import ZipFile
 
-from support import archives
-from support.compiled import library_of
+from support import archives, small_fmus
 
 _SOURCE = Path(__file__).with_name("slave.c")
-_SUPPORT = Path(archives.__file__).parent
 
 #: A formula: an operator and its operands, which are formulas, names or constants.
 Formula = tuple[Any, ...]
@@ -694,22 +692,27 @@ def _in_file_order(names: list[str]) -> list[str]:
     return walk(placed, "")
 
 
+def reached(
+    nodes: Iterable[Hashable], edges: Iterable[tuple[Hashable, Hashable]]
+) -> dict[Any, set[Any]]:
+    """What can be reached from each node along one edge or several."""
+    after: dict[Any, set[Any]] = {node: set() for node in nodes}
+    for a, b in edges:
+        after[a].add(b)
+    found: dict[Any, set[Any]] = {}
+    for node in after:
+        found[node], ahead = set(), [node]
+        while ahead:
+            new = after[ahead.pop()] - found[node]
+            found[node] |= new
+            ahead += new
+    return found
+
+
 def _ringed(parts: dict[str, Part], wires: list[Wire]) -> set[str]:
     """Components that reach themselves along connections."""
-    after: dict[str, set[str]] = {name: set() for name in parts}
-    for wire in wires:
-        after[wire.source[0]].add(wire.target[0])
-
-    def reached(name: str) -> set[str]:
-        found: set[str] = set()
-        ahead = [name]
-        while ahead:
-            new = after[ahead.pop()] - found
-            found |= new
-            ahead += new
-        return found
-
-    return {name for name in parts if name in reached(name)}
+    found = reached(parts, ((wire.source[0], wire.target[0]) for wire in wires))
+    return {name for name in parts if name in found[name]}
 
 
 def draw(seed: int) -> Drawn:
@@ -764,12 +767,6 @@ def _units(prefix: str = "") -> str:
     )
 
 
-def _items(prefix: str = "") -> str:
-    return "".join(
-        f'<{prefix}Item name="{name}" value="{i}"/>' for i, name in enumerate(ITEMS, start=1)
-    )
-
-
 def literal(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
@@ -781,45 +778,36 @@ def description(fmu: Fmu) -> str:
         inside = f' unit="{one.unit}"' if one.unit else ""
         if one.kind == "Enumeration":
             inside = ' declaredType="Level"'
-        if one.start is not None:
-            inside += f' start="{literal(one.start)}"'
-        variability = "continuous" if one.type == "Real" else "discrete"
-        if one.causality == "parameter":
-            variability = "fixed"
-        variables.append(
-            f'<ScalarVariable name="{one.name}" valueReference="{i}" causality="{one.causality}" '
-            f'variability="{variability}"><{one.type}{inside}/></ScalarVariable>'
-        )
+        start = None if one.start is None else literal(one.start)
+        variables.append(small_fmus.variable(one.name, i, one.causality, one.type, start, inside))
     places = {one.name: str(i) for i, one in enumerate(fmu.variables, start=1)}
     inputs = [one.name for one in fmu.having("input")]
-    unknowns = ""
-    for name in [one.name for one in fmu.having("output")]:
+
+    def unknown(name: str) -> str:
         found = inputs if fmu.declares == ALL else sorted(fmu.needs(name), key=inputs.index)
         listed = " ".join(places[one] for one in found)
-        stated = "" if fmu.declares == ABSENT else f' dependencies="{listed}"'
-        unknowns += f'<Unknown index="{places[name]}"{stated}/>'
-    listed = f"<Outputs>{unknowns}</Outputs>" if unknowns and fmu.declares != UNLISTED else ""
-    attributes = " ".join(f'{name}="true"' for name in fmu.capabilities)
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?><fmiModelDescription fmiVersion="2.0" '
-        'modelName="Random" guid="random"><CoSimulation modelIdentifier="random" '
-        f'canHandleVariableCommunicationStepSize="true" {attributes}/>'
-        f"<UnitDefinitions>{_units()}</UnitDefinitions><TypeDefinitions><SimpleType "
-        f'name="Level"><Enumeration>{_items()}</Enumeration></SimpleType></TypeDefinitions>'
-        f"<ModelVariables>{''.join(variables)}</ModelVariables>"
-        f"<ModelStructure>{listed}</ModelStructure></fmiModelDescription>"
+        return small_fmus.unknown(int(places[name]), None if fmu.declares == ABSENT else listed)
+
+    unknowns = [unknown(one.name) for one in fmu.having("output") if fmu.declares != UNLISTED]
+    types = small_fmus.enumeration("Level", {name: i for i, name in enumerate(ITEMS, start=1)})
+    return small_fmus.description(
+        "slave",
+        variables,
+        unknowns,
+        " ".join(
+            f'{name}="true"'
+            for name in ("canHandleVariableCommunicationStepSize", *fmu.capabilities)
+        ),
+        f"<UnitDefinitions>{_units()}</UnitDefinitions><TypeDefinitions>{types}</TypeDefinitions>",
     )
 
 
 def write(drawn: Drawn, folder: Path) -> Path:
     """A system as an archive, or as a scenario beside its FMUs."""
     fmus = {part.fmu.name: part.fmu for part in drawn.parts.values()}
-    library = library_of(_SOURCE, f"-I{_SUPPORT}", "-ffp-contract=off", "-lm")
     for name, fmu in fmus.items():
-        with ZipFile(folder / f"{name}.fmu", "w") as content:
-            content.writestr("modelDescription.xml", description(fmu))
-            content.writestr("resources/model.txt", model_text(fmu))
-            content.writestr("binaries/linux64/random.so", library)
+        model = {"model.txt": model_text(fmu)}
+        small_fmus.write(folder / f"{name}.fmu", description(fmu), _SOURCE, resources=model)
     if drawn.as_scenario:
         return _scenario(drawn, folder)
     return _archive(drawn, folder, list(fmus))
@@ -922,9 +910,12 @@ def _archive(drawn: Drawn, folder: Path, fmus: list[str]) -> Path:
 
     text = archives.described(group(""))
     # The units and items of these systems, in the place of those.
+    items = "".join(
+        f'<ssc:Item name="{name}" value="{i}"/>' for i, name in enumerate(ITEMS, start=1)
+    )
     head, _, _ = text.partition("<ssd:Enumerations>")
     text = (
-        f'{head}<ssd:Enumerations><ssc:Enumeration name="Level">{_items("ssc:")}'
+        f'{head}<ssd:Enumerations><ssc:Enumeration name="Level">{items}'
         f"</ssc:Enumeration></ssd:Enumerations><ssd:Units>{_units('ssc:')}</ssd:Units>"
         f'<ssd:DefaultExperiment startTime="{drawn.start_time!r}" stopTime="{drawn.stop_time!r}"/>'
         "</ssd:SystemStructureDescription>"

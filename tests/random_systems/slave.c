@@ -7,9 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define HAS_STRINGS
-#define HAS_STATE
-#define HAS_DERIVATIVES
 #include "slave.h"
 
 enum { VARIABLES = 64, STATES = 16, TOKENS = 1600, LENGTH = 24, DEPTH = 64 };
@@ -181,11 +178,6 @@ static int read_all(Instance *it, const char *location)
 
 /* FMI */
 
-Status fmi2SetDebugLogging(Component c, int on, size_t n, const char *const *categories)
-{
-    return OK;
-}
-
 Component fmi2Instantiate(const char *name, int type, const char *guid, const char *location,
                           const Callbacks *callbacks, int visible, int logging)
 {
@@ -195,16 +187,12 @@ Component fmi2Instantiate(const char *name, int type, const char *guid, const ch
     return NULL;
 }
 
-void fmi2FreeInstance(Component c) { free(c); }
-
 Status fmi2SetupExperiment(Component c, int given, double tolerance, double start, int ends,
                            double end)
 {
     ((Instance *)c)->live.time = start;
     return OK;
 }
-
-Status fmi2EnterInitializationMode(Component c) { return OK; }
 
 Status fmi2ExitInitializationMode(Component c)
 {
@@ -213,8 +201,6 @@ Status fmi2ExitInitializationMode(Component c)
     it->live.initialised = 1;
     return OK;
 }
-
-Status fmi2Terminate(Component c) { return OK; }
 
 Status fmi2Reset(Component c)
 {

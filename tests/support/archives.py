@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from zipfile import ZipFile
 
+from support import small_fmus
+
 _NAMESPACES = " ".join(
     f'xmlns:{prefix}="http://ssp-standard.org/SSP1/SystemStructure{name}"'
     for prefix, name in (
@@ -31,21 +33,15 @@ ITEMS = {"slow": 2, "fast": 5}
 
 
 def variable(name: str, causality: str, kind: str = "Real", unit: str = "", **more: str) -> str:
-    """A variable of a description."""
-    stated = f' unit="{unit}"' if unit else ""
+    """A variable of a description, without its value reference."""
+    inside = f' unit="{unit}"' if unit else ""
+    start = more.pop("start", "2" if kind == "Enumeration" else None)
     if kind == "Enumeration":
-        stated += ' declaredType="Speed"'
-    given = more.pop(
-        "start", {"Boolean": "false", "Enumeration": "2", "String": "x"}.get(kind, "0")
-    )
-    if causality != "output" or more:
-        stated += f' start="{given}"'
+        inside += ' declaredType="Speed"'
+    if causality == "output":
+        start = "0" if start is None and more else start if more else None
     more.setdefault("variability", "fixed" if causality == "parameter" else "discrete")
-    attributes = " ".join(f'{key}="{value}"' for key, value in more.items())
-    return (
-        f'<ScalarVariable name="{name}" valueReference="{{reference}}" causality="{causality}" '
-        f"{attributes}><{kind}{stated}/></ScalarVariable>"
-    )
+    return small_fmus.variable(name, "{reference}", causality, kind, start, inside, **more)
 
 
 def fmu(path: Path, *variables: str) -> Path:
@@ -53,24 +49,20 @@ def fmu(path: Path, *variables: str) -> Path:
     bases = "".join(
         f'<Unit name="{name}"><BaseUnit {base}/></Unit>' for name, base in UNITS.items()
     )
-    items = "".join(f'<Item name="{name}" value="{value}"/>' for name, value in ITEMS.items())
-    outputs = "".join(
-        f'<Unknown index="{i}"/>'
-        for i, text in enumerate(variables, start=1)
-        if 'causality="output"' in text
+    types = small_fmus.enumeration("Speed", ITEMS)
+    text = small_fmus.description(
+        "m",
+        (text.replace("{reference}", str(i)) for i, text in enumerate(variables)),
+        (
+            small_fmus.unknown(i)
+            for i, text in enumerate(variables, start=1)
+            if 'causality="output"' in text
+        ),
+        attributes="",
+        definitions=f"<UnitDefinitions>{bases}</UnitDefinitions>"
+        f"<TypeDefinitions>{types}</TypeDefinitions>",
     )
-    structure = f"<Outputs>{outputs}</Outputs>" if outputs else ""
-    body = "".join(text.replace("{reference}", str(i)) for i, text in enumerate(variables))
-    with ZipFile(path, "w") as archive:
-        archive.writestr(
-            "modelDescription.xml",
-            '<?xml version="1.0" encoding="UTF-8"?><fmiModelDescription fmiVersion="2.0" '
-            f'modelName="M" guid="g"><CoSimulation modelIdentifier="m"/><UnitDefinitions>{bases}'
-            '</UnitDefinitions><TypeDefinitions><SimpleType name="Speed"><Enumeration>'
-            f"{items}</Enumeration></SimpleType></TypeDefinitions><ModelVariables>{body}"
-            f"</ModelVariables><ModelStructure>{structure}</ModelStructure></fmiModelDescription>",
-        )
-    return path
+    return small_fmus.write(path, text)
 
 
 def described(system: str, version: str = "1.0", after: str = "") -> str:

@@ -314,42 +314,36 @@ _case("fmi2GetReal", "100,000 times the same")(
 )
 
 
-def _beyond(limit: Any, direction: float, random: Random) -> float:
-    return random.choice((nextafter(limit, direction), copysign(1e300, direction)))
+def _bad(
+    case: str,
+    found: Callable[[Draw], list[Variable]],
+    value: Callable[[Variable, Random], float],
+) -> None:
+    """Add a case of a Real port and a value that it does not take."""
 
-
-#: Real ports, and values that they do not take.
-_BAD: dict[str, tuple[Callable[[Draw], list[Variable]], Callable[[Variable, Random], float]]] = {
-    **{
-        case.format(whose): (found, value)
-        for whose, found in (
-            ("an input", _inputs),
-            (
-                "a parameter",
-                lambda draw: _tunable(draw) or draw.description.of("parameter", "Real"),
-            ),
-        )
-        for case, value in (
-            ("NaN for {}", lambda port, random: nan),
-            ("an infinite value for {}", lambda port, random: random.choice((inf, -inf))),
-        )
-    },
-    "below the range": (
-        lambda draw: [v for v in draw.settable("Real") if v.minimum is not None],
-        lambda port, random: _beyond(port.minimum, -inf, random),
-    ),
-    "above the range": (
-        lambda draw: [v for v in draw.settable("Real") if v.maximum is not None],
-        lambda port, random: _beyond(port.maximum, inf, random),
-    ),
-}
-for _case_name in _BAD:
-
-    @_case("fmi2SetReal", _case_name)
-    def _bad(draw: Draw, case: str = _case_name) -> Arguments:
-        found, value = _BAD[case]
+    @_case("fmi2SetReal", case)
+    def arguments(draw: Draw) -> Arguments:
         port = draw.any_of(found(draw))
         return _item(port, value(port, draw.random), False)
+
+
+def _real_parameters(draw: Draw) -> list[Variable]:
+    return _tunable(draw) or draw.description.of("parameter", "Real")
+
+
+for _whose, _found in (("an input", _inputs), ("a parameter", _real_parameters)):
+    _bad(f"NaN for {_whose}", _found, lambda port, random: nan)
+    _bad(f"an infinite value for {_whose}", _found, lambda port, random: random.choice((inf, -inf)))
+for _side, _limit, _end in (("below", "minimum", -inf), ("above", "maximum", inf)):
+    _bad(
+        f"{_side} the range",
+        lambda draw, limit=_limit: [
+            port for port in draw.settable("Real") if getattr(port, limit) is not None
+        ],
+        lambda port, random, limit=_limit, end=_end: random.choice(
+            (nextafter(getattr(port, limit), end), copysign(1e300, end))
+        ),
+    )
 
 
 for _whose, _found in (("inputs", _inputs), ("parameters", _tunable)):

@@ -119,11 +119,6 @@ static Status act(Instance *instance, int phase)
     return OK;
 }
 
-Status fmi2SetDebugLogging(Component c, int on, size_t n, const char *const *categories)
-{
-    return OK;
-}
-
 Component fmi2Instantiate(const char *name, int type, const char *guid, const char *location,
                           const Callbacks *callbacks, int visible, int logging)
 {
@@ -147,15 +142,9 @@ void fmi2FreeInstance(Component c)
     free(c);
 }
 
-Status fmi2SetupExperiment(Component c, int tolerance, double t, double start, int stop, double end)
-{
-    return OK;
-}
 Status fmi2EnterInitializationMode(Component c) { return act(c, ENTER); }
 Status fmi2ExitInitializationMode(Component c) { return act(c, EXIT); }
 Status fmi2Terminate(Component c) { return act(c, TERMINATE); }
-Status fmi2Reset(Component c) { return OK; }
-
 Status fmi2GetReal(Component c, const unsigned *r, size_t n, double *values)
 {
     Instance *instance = c;
@@ -194,6 +183,3 @@ Status fmi2DoStep(Component c, double t, double h, int no_rollback)
     instance->time = t + h;
     return status;
 }
-
-ABSENT(fmi2GetBoolean)
-ABSENT(fmi2SetBoolean)

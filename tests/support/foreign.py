@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from zipfile import ZipFile
 from zlib import crc32
 
 from pythonfmu import FmuBuilder
@@ -12,27 +11,21 @@ from pythonfmu import FmuBuilder
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-from support.compiled import library_of
+from support.small_fmus import description, unknown, variable, write
 
 _SOURCE = Path(__file__).with_name("foreign.c")
 
-_DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="Foreign" guid="foreign">
-  <CoSimulation modelIdentifier="foreign" canHandleVariableCommunicationStepSize="true"/>
-  <ModelVariables>
-    <ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
-    <ScalarVariable name="y" valueReference="1" causality="output" initial="calculated"><Real/>
-    </ScalarVariable>
-    <ScalarVariable name="at" valueReference="2" causality="parameter" variability="fixed">
-      <Real start="0"/></ScalarVariable>
-    <ScalarVariable name="act" valueReference="3" causality="parameter" variability="fixed">
-      <Integer start="0"/></ScalarVariable>
-    <ScalarVariable name="phase" valueReference="4" causality="parameter" variability="fixed">
-      <Integer start="0"/></ScalarVariable>
-  </ModelVariables>
-  <ModelStructure><Outputs><Unknown index="2" dependencies=""/></Outputs></ModelStructure>
-</fmiModelDescription>
-"""
+_DESCRIPTION = description(
+    "foreign",
+    (
+        variable("u", 0, "input"),
+        variable("y", 1, "output", initial="calculated"),
+        variable("at", 2, "parameter"),
+        variable("act", 3, "parameter", "Integer"),
+        variable("phase", 4, "parameter", "Integer"),
+    ),
+    (unknown(2, ""),),
+)
 
 
 def _names(enumeration: str) -> dict[str, int]:
@@ -94,9 +87,4 @@ def foreign_system(fmu: Path, act: str = "BEHAVE", phase: str = "STEP", at: floa
 
 def build_c_fmu(folder: Path) -> Path:
     """The FMU in C; the test is skipped where there is no compiler."""
-    fmu = folder / "foreign.fmu"
-    with ZipFile(fmu, "w") as archive:
-        archive.writestr("modelDescription.xml", _DESCRIPTION)
-        archive.writestr("binaries/linux64/foreign.so", library_of(_SOURCE))
-        archive.writestr("resources/nothing.txt", "")
-    return fmu
+    return write(folder / "foreign.fmu", _DESCRIPTION, _SOURCE)

@@ -6,8 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define HAS_STATE
-#define HAS_DERIVATIVES
 #include "slave.h"
 
 /* Value references: inputs, outputs, then parameters. */
@@ -34,16 +32,6 @@ Component fmi2Instantiate(const char *name, int type, const char *guid, const ch
     return calloc(1, sizeof(Instance));
 }
 
-void fmi2FreeInstance(Component c) { free(c); }
-Status fmi2SetDebugLogging(Component c, int on, size_t n, const char *const *categories)
-{
-    return OK;
-}
-Status fmi2SetupExperiment(Component c, int tolerance, double t, double start, int stop, double end)
-{
-    return OK;
-}
-
 Status fmi2EnterInitializationMode(Component c)
 {
     Instance *it = c;
@@ -58,7 +46,6 @@ Status fmi2ExitInitializationMode(Component c)
     return OK;
 }
 
-Status fmi2Terminate(Component c) { return OK; }
 Status fmi2Reset(Component c)
 {
     memset(c, 0, sizeof(Instance));
@@ -123,11 +110,6 @@ Status fmi2SetFMUstate(Component c, void *state)
 }
 
 STATE_IS(Instance)
-
-ABSENT(fmi2GetInteger)
-ABSENT(fmi2SetInteger)
-ABSENT(fmi2GetBoolean)
-ABSENT(fmi2SetBoolean)
 
 /* The exponential series of the states with the inputs and their slopes after them. */
 Status fmi2DoStep(Component c, double t, double h, int no_rollback)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
-from zipfile import ZipFile
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from orchestrator.master.simulation import simulate
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import Connection, System
-from support.compiled import library_of
+from support.small_fmus import description, unknown, variable, write
 
 _SOURCE = Path(__file__).with_name("linear.c")
 
@@ -127,41 +126,20 @@ def linear(
     fmu = folder / f"linear-{says.replace(' ', '-')}-{cached:d}{can:d}.fmu"
     if fmu.exists():
         return fmu
-    names = [("input", name) for name in INPUTS] + [("output", name) for name in OUTPUTS]
-    names += [("parameter", name) for name in _PARAMETERS]
-    kinds = {"input": "continuous", "output": "continuous", "parameter": "fixed"}
-    starts = {"input": ' start="0"', "output": "", "parameter": ' start="0"'}
-    variables = "".join(
-        f'<ScalarVariable name="{name}" valueReference="{i}" causality="{causality}" '
-        f'variability="{kinds[causality]}"><Real{starts[causality]}/>'
-        "</ScalarVariable>"
-        for i, (causality, name) in enumerate(names)
-    )
-    said = {
-        "dependencies": [' dependencies=""', ' dependencies="1 2"'],
-        "all": [' dependencies="1 2"'] * 2,
-        "nothing": [""] * 2,
-    }
-    unknowns = "".join(
-        f'<Unknown index="{3 + i}"{text}/>' for i, text in enumerate(said.get(says, []))
-    )
-    outputs = f"<Outputs>{unknowns}</Outputs>" if unknowns else ""
+    causes = dict.fromkeys(INPUTS, "input") | dict.fromkeys(OUTPUTS, "output")
+    causes |= dict.fromkeys(_PARAMETERS, "parameter")
+    said = {"dependencies": ("", "1 2"), "all": ("1 2", "1 2"), "nothing": (None, None)}
     able = (
         'canGetAndSetFMUstate="true" canInterpolateInputs="true" '
         'canSerializeFMUstate="true" providesDirectionalDerivative="true"'
     )
-    with ZipFile(fmu, "w") as archive:
-        archive.writestr(
-            "modelDescription.xml",
-            '<?xml version="1.0" encoding="UTF-8"?>'
-            '<fmiModelDescription fmiVersion="2.0" modelName="Linear" guid="linear">'
-            '<CoSimulation modelIdentifier="linear" canHandleVariableCommunicationStepSize="true" '
-            f"{able if can else ''}/><ModelVariables>{variables}</ModelVariables>"
-            f"<ModelStructure>{outputs}</ModelStructure></fmiModelDescription>",
-        )
-        options = ("-ffp-contract=off", *["-DCACHED"] * cached)
-        archive.writestr("binaries/linux64/linear.so", library_of(_SOURCE, *options))
-    return fmu
+    text = description(
+        "linear",
+        (variable(name, i, causes[name]) for i, name in enumerate(causes)),
+        (unknown(3 + i, dependencies) for i, dependencies in enumerate(said.get(says, ()))),
+        f'canHandleVariableCommunicationStepSize="true" {able if can else ""}',
+    )
+    return write(fmu, text, _SOURCE, *["-DCACHED"] * cached)
 
 
 def system_of(

@@ -87,11 +87,6 @@ static void respond(Instance *it)
     }
 }
 
-Status fmi2SetDebugLogging(Component c, int on, size_t n, const char *const *categories)
-{
-    return OK;
-}
-
 Component fmi2Instantiate(const char *name, int type, const char *guid, const char *location,
                           const Callbacks *callbacks, int visible, int logging)
 {
@@ -104,17 +99,6 @@ Component fmi2Instantiate(const char *name, int type, const char *guid, const ch
     respond(it);
     return it;
 }
-
-void fmi2FreeInstance(Component c) { free(c); }
-
-Status fmi2SetupExperiment(Component c, int tolerance, double t, double start, int stop, double end)
-{
-    return OK;
-}
-Status fmi2EnterInitializationMode(Component c) { return OK; }
-Status fmi2ExitInitializationMode(Component c) { return OK; }
-Status fmi2Terminate(Component c) { return OK; }
-Status fmi2Reset(Component c) { return OK; }
 
 /* The parameters are set before the first step, so the first call is theirs and must not fail. */
 #define SETTER(name, type, values_of) \

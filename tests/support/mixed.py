@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
-from zipfile import ZipFile
 
 from hypothesis import strategies as st
 
@@ -16,7 +15,7 @@ from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import Linear, Mapped
-from support.compiled import library_of
+from support.small_fmus import description, enumeration, unknown, variable, write
 
 _SOURCE = Path(__file__).with_name("mixed.c")
 
@@ -69,47 +68,28 @@ class Shape(NamedTuple):
         ]
         n = len(self.ports("input"))
         dependencies = " ".join(str(1 + i) for i in range(n)) if self.feedthrough else ""
-        unknowns = "".join(
-            f'<Unknown index="{1 + i}" dependencies="{dependencies}"/>'
-            for i in range(n, len(variables))
-        )
+        unknowns = [unknown(1 + i, dependencies) for i in range(n, len(variables))]
         variables += [
-            f'<ScalarVariable name="{name}" valueReference="{reference}" causality="parameter" '
-            f'variability="fixed"><Integer start="{-(name == "at")}"/></ScalarVariable>'
+            variable(name, reference, "parameter", "Integer", -(name == "at"))
             for name, reference in _PARAMETERS.items()
         ]
-        outputs = f"<Outputs>{unknowns}</Outputs>" if unknowns else ""
-        return (
-            '<?xml version="1.0" encoding="UTF-8"?>'
-            '<fmiModelDescription fmiVersion="2.0" modelName="Mixed" guid="mixed">'
-            '<CoSimulation modelIdentifier="mixed" canHandleVariableCommunicationStepSize="true"/>'
-            '<TypeDefinitions><SimpleType name="Mood"><Enumeration><Item name="good" value="1"/>'
-            "</Enumeration></SimpleType></TypeDefinitions>"
-            f"<ModelVariables>{''.join(variables)}</ModelVariables>"
-            f"<ModelStructure>{outputs}</ModelStructure></fmiModelDescription>"
-        )
+        types = f"<TypeDefinitions>{enumeration('Mood', {'good': 1})}</TypeDefinitions>"
+        return description("mixed", variables, unknowns, definitions=types)
 
 
 def _variable(name: str, kind: str, reference: int, causality: str) -> str:
-    variability = "continuous" if kind == "Real" else "discrete"
-    start = {"Boolean": "false", "Enumeration": "1"}.get(kind, "0")
-    given = f' start="{start}"' if causality == "input" else ""
-    declared = ' declaredType="Mood"' if kind == "Enumeration" else ""
-    initial = "" if causality == "input" else ' initial="calculated"'
-    return (
-        f'<ScalarVariable name="{name}" valueReference="{reference}" causality="{causality}" '
-        f'variability="{variability}"{initial}><{kind}{declared}{given}/></ScalarVariable>'
-    )
+    more = {} if causality == "input" else {"initial": "calculated"}
+    if kind == "Enumeration":
+        start = 1 if causality == "input" else None
+        return variable(name, reference, causality, kind, start, ' declaredType="Mood"', **more)
+    return variable(name, reference, causality, kind, **more)
 
 
 def build(folder: Path, shape: Shape) -> Path:
     """The FMU of a shape."""
     fmu = folder / f"{abs(hash(shape)):x}.fmu"
     if not fmu.exists():
-        with ZipFile(fmu, "w") as archive:
-            archive.writestr("modelDescription.xml", shape.description())
-            archive.writestr("binaries/linux64/mixed.so", library_of(_SOURCE))
-            archive.writestr("resources/nothing.txt", "")
+        write(fmu, shape.description(), _SOURCE)
     return fmu
 
 

@@ -1,16 +1,13 @@
 /* An FMI 2.0 slave as tools of others make them: see others.py.
 
-   y = gain u, plus the sum of its steps times 1 + u where it ends at a time, and every other output is the input of its kind. What is peculiar about it says how
-   it is compiled. */
+   y = gain u, plus the sum of its steps times 1 + u where it ends at a time, and every other output
+   is the input of its kind. What is peculiar about it says how it is compiled. */
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define HAS_STRINGS
-#define HAS_STATUS
-#define HAS_STATE
 #include "mode.h"
 #include "slave.h"
 
@@ -115,8 +112,6 @@ Status fmi2Terminate(Component c)
     return OK;
 }
 
-Status fmi2Reset(Component c) { return OK; }
-
 #define ACCESS(kind, type, values_of) \
     Status fmi2Set##kind(Component c, const unsigned *r, size_t n, const type *values) \
     { \
@@ -217,6 +212,9 @@ Status fmi2SetFMUstate(Component c, void *state)
     return OK;
 }
 
+#ifdef LACKS
+#define fmi2DeSerializeFMUstate not_there
+#endif
 STATE_IS(Instance)
 
 Status fmi2GetStatus(Component c, int kind, Status *value)

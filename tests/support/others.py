@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
-from zipfile import ZipFile
 
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
@@ -12,8 +11,8 @@ from orchestrator.master.observers.table import Table
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-from support.compiled import library_of
 from support.runs import run_table
+from support.small_fmus import description, enumeration, unknown, variable, write
 
 _SOURCE = Path(__file__).with_name("others.c")
 
@@ -24,45 +23,25 @@ WAYS = {
     "isolated": {"isolation": Isolation(20.0)},
 }
 
-_VARIABLES = """
-<ScalarVariable name="u" valueReference="0" causality="input"><Real/></ScalarVariable>
-<ScalarVariable name="y" valueReference="1" causality="output"><Real/></ScalarVariable>
-<ScalarVariable name="gain" valueReference="2" causality="parameter" variability="fixed">
-  <Real start="1"/></ScalarVariable>
-<ScalarVariable name="stubborn" valueReference="3" causality="parameter" variability="fixed">
-  <Real start="1"/></ScalarVariable>
-<ScalarVariable name="mode" valueReference="0" causality="input" variability="discrete">
-  <Enumeration declaredType="Mode" start="1"/></ScalarVariable>
-<ScalarVariable name="mode_y" valueReference="1" causality="output" variability="discrete">
-  <Enumeration declaredType="Mode"/></ScalarVariable>
-<ScalarVariable name="on" valueReference="0" causality="input" variability="discrete">
-  <Boolean start="false"/></ScalarVariable>
-<ScalarVariable name="fault" valueReference="1" causality="output" variability="discrete">
-  <Boolean/></ScalarVariable>
-<ScalarVariable name="count" valueReference="4" causality="parameter" variability="fixed">
-  <Integer start="0"/></ScalarVariable>
-<ScalarVariable name="said" valueReference="0" causality="input" variability="discrete">
-  <String start="start"/></ScalarVariable>
-<ScalarVariable name="heard" valueReference="1" causality="output" variability="discrete">
-  <String/></ScalarVariable>
-"""
+_MODE = ' declaredType="Mode"'
+_VARIABLES = (
+    '<ScalarVariable name="u" valueReference="0" causality="input"><Real/></ScalarVariable>',
+    variable("y", 1, "output"),
+    variable("gain", 2, "parameter", start=1),
+    variable("stubborn", 3, "parameter", start=1),
+    variable("mode", 0, "input", "Enumeration", 1, _MODE),
+    variable("mode_y", 1, "output", "Enumeration", inside=_MODE),
+    variable("on", 0, "input", "Boolean"),
+    variable("fault", 1, "output", "Boolean"),
+    variable("count", 4, "parameter", "Integer"),
+    variable("said", 0, "input", "String", "start"),
+    variable("heard", 1, "output", "String"),
+)
 
 #: Outputs, by their places among the variables.
 _OUTPUTS = (2, 6, 8, 11)
 
-
-def _description(attributes: str) -> str:
-    outputs = "".join(f'<Unknown index="{index}" dependencies=""/>' for index in _OUTPUTS)
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>'
-        '<fmiModelDescription fmiVersion="2.0" modelName="Others" guid="others">'
-        f'<CoSimulation modelIdentifier="others" {attributes}/>'
-        '<TypeDefinitions><SimpleType name="Mode"><Enumeration>'
-        '<Item name="calm" value="1"/><Item name="storm" value="4"/>'
-        "</Enumeration></SimpleType></TypeDefinitions>"
-        f"<ModelVariables>{_VARIABLES}</ModelVariables>"
-        f"<ModelStructure><Outputs>{outputs}</Outputs></ModelStructure></fmiModelDescription>"
-    )
+_TYPES = f"<TypeDefinitions>{enumeration('Mode', {'calm': 1, 'storm': 4})}</TypeDefinitions>"
 
 
 def build(
@@ -82,12 +61,11 @@ def build(
         change: a text in its description, and what stands there instead.
 
     """
-    fmu = folder / f"{peculiarity or 'plain'}.fmu"
     define = [f"-D{peculiarity}"] * bool(peculiarity)
-    with ZipFile(fmu, "w") as archive:
-        archive.writestr("modelDescription.xml", _description(attributes).replace(*change))
-        archive.writestr(f"binaries/{platform}/others.so", library_of(_SOURCE, *define))
-    return fmu
+    unknowns = [unknown(index, "") for index in _OUTPUTS]
+    text = description("others", _VARIABLES, unknowns, attributes, _TYPES).replace(*change)
+    fmu = folder / f"{peculiarity or 'plain'}.fmu"
+    return write(fmu, text, _SOURCE, *define, platform=platform)
 
 
 def system_of(fmu: Path, names: str = "a", wires: dict[str, str] | None = None) -> System:

@@ -39,8 +39,6 @@ Component fmi2Instantiate(const char *name, int type, const char *guid, const ch
     return it;
 }
 
-void fmi2FreeInstance(Component c) { free(c); }
-
 Status fmi2SetupExperiment(Component c, int tolerance, double t, double start, int stop, double end)
 {
     ((Instance *)c)->values[T] = start;
@@ -52,10 +50,6 @@ Status fmi2EnterInitializationMode(Component c)
     say(c, "initialises");
     return OK;
 }
-
-Status fmi2ExitInitializationMode(Component c) { return OK; }
-Status fmi2Terminate(Component c) { return OK; }
-Status fmi2Reset(Component c) { return OK; }
 
 Status fmi2SetReal(Component c, const unsigned *r, size_t n, const double *values)
 {
@@ -71,11 +65,6 @@ Status fmi2GetReal(Component c, const unsigned *r, size_t n, double *values)
     for (i = 0; i < n; i++) values[i] = ((Instance *)c)->values[r[i]];
     return OK;
 }
-
-ABSENT(fmi2GetInteger)
-ABSENT(fmi2SetInteger)
-ABSENT(fmi2GetBoolean)
-ABSENT(fmi2SetBoolean)
 
 Status fmi2DoStep(Component c, double t, double h, int no_rollback)
 {

@@ -1,7 +1,9 @@
-/* What slaves of FMI 2.0 have in common that are written for tests: FMI's types, and the functions
-   that none of them does anything in. */
+/* What slaves of FMI 2.0 have in common that are written for tests: FMI's types. What a slave leaves
+   out is in defaults.c. */
 
 #include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
 
 typedef void *Component;
 typedef enum { OK, Warning, Discard, Error, Fatal } Status;
@@ -13,9 +15,6 @@ typedef struct {
     void *step_finished;
     void *environment;
 } Callbacks;
-
-const char *fmi2GetTypesPlatform(void) { return "default"; }
-const char *fmi2GetVersion(void) { return "2.0"; }
 
 /* What is the same for all states that are one block of memory: its type is given. The FMU has
    fmi2GetFMUstate and fmi2SetFMUstate of its own. */
@@ -41,34 +40,3 @@ const char *fmi2GetVersion(void) { return "2.0"; }
         *state = memcpy(malloc(size), bytes, size); \
         return OK; \
     }
-
-/* What a host may look for, and nobody here calls. */
-#define ABSENT(name) \
-    Status name(void) { return Error; }
-#ifndef HAS_STRINGS
-ABSENT(fmi2GetString)
-ABSENT(fmi2SetString)
-#endif
-#ifndef HAS_STATE
-ABSENT(fmi2GetFMUstate)
-ABSENT(fmi2SetFMUstate)
-ABSENT(fmi2FreeFMUstate)
-ABSENT(fmi2SerializedFMUstateSize)
-ABSENT(fmi2SerializeFMUstate)
-#ifndef LACKS
-ABSENT(fmi2DeSerializeFMUstate)
-#endif
-#endif
-#ifndef HAS_DERIVATIVES
-ABSENT(fmi2GetDirectionalDerivative)
-ABSENT(fmi2SetRealInputDerivatives)
-#endif
-ABSENT(fmi2GetRealOutputDerivatives)
-ABSENT(fmi2CancelStep)
-#ifndef HAS_STATUS
-ABSENT(fmi2GetStatus)
-ABSENT(fmi2GetRealStatus)
-ABSENT(fmi2GetBooleanStatus)
-#endif
-ABSENT(fmi2GetIntegerStatus)
-ABSENT(fmi2GetStringStatus)

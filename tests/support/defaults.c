@@ -1,0 +1,47 @@
+/* The functions of FMI 2.0 as a slave has them that is written for tests and has none of its own: what
+   a host calls in any run does nothing, and what it may look for is refused. */
+
+#include "slave.h"
+
+#define WEAK __attribute__((weak))
+
+WEAK const char *fmi2GetTypesPlatform(void) { return "default"; }
+WEAK const char *fmi2GetVersion(void) { return "2.0"; }
+WEAK void fmi2FreeInstance(Component c) { free(c); }
+
+#define NOTHING(name) \
+    WEAK Status name(void) { return OK; }
+NOTHING(fmi2SetDebugLogging)
+NOTHING(fmi2SetupExperiment)
+NOTHING(fmi2EnterInitializationMode)
+NOTHING(fmi2ExitInitializationMode)
+NOTHING(fmi2Terminate)
+NOTHING(fmi2Reset)
+
+#define ABSENT(name) \
+    WEAK Status name(void) { return Error; }
+ABSENT(fmi2GetReal)
+ABSENT(fmi2SetReal)
+ABSENT(fmi2GetInteger)
+ABSENT(fmi2SetInteger)
+ABSENT(fmi2GetBoolean)
+ABSENT(fmi2SetBoolean)
+ABSENT(fmi2GetString)
+ABSENT(fmi2SetString)
+ABSENT(fmi2GetFMUstate)
+ABSENT(fmi2SetFMUstate)
+ABSENT(fmi2FreeFMUstate)
+ABSENT(fmi2SerializedFMUstateSize)
+ABSENT(fmi2SerializeFMUstate)
+#ifndef LACKS
+ABSENT(fmi2DeSerializeFMUstate)
+#endif
+ABSENT(fmi2GetDirectionalDerivative)
+ABSENT(fmi2SetRealInputDerivatives)
+ABSENT(fmi2GetRealOutputDerivatives)
+ABSENT(fmi2CancelStep)
+ABSENT(fmi2GetStatus)
+ABSENT(fmi2GetRealStatus)
+ABSENT(fmi2GetIntegerStatus)
+ABSENT(fmi2GetBooleanStatus)
+ABSENT(fmi2GetStringStatus)
