@@ -110,12 +110,6 @@ def test_all_mistakes_of_an_archive_are_said(dist, workplace, capsys):
         assert word in shown
 
 
-def test_archive_may_leave_the_stop_time_open(dist, workplace, capsys):
-    path = changed(dist / "auv.ssp", (' stopTime="100.0"', ""))
-    assert main(["check", str(path)]) == 0
-    assert "--stop-time" in lines(capsys)[0]
-
-
 _FORGOTTEN = '[components]\ncontroller = "PdController"\n'
 _SAID = 'nothing feeds or sets controller.dy.*; wire "controller.dy" = "plant.dy"'
 

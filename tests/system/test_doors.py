@@ -200,12 +200,6 @@ def test_one_fmu_is_a_system_with_its_own_experiment(tmp_path: Path, capsys):
     assert "has no variants" in capsys.readouterr().err
 
 
-def test_an_experiment_of_an_fmu_that_is_none_is_left_out(tmp_path: Path):
-    experiment = '<DefaultExperiment stopTime="1,5" stepSize="-1"/><ModelVariables>'
-    found = load(build(tmp_path, change=("<ModelVariables>", experiment)))
-    assert (found.stop_time, found.step) == (None, None)
-
-
 @pytest.mark.parametrize("name", ["", "SystemStructure.ssd", "Winter.ssd"])
 def test_an_unpacked_ssp_is_what_the_archive_is(tmp_path: Path, name: str):
     relay(tmp_path)
@@ -321,15 +315,3 @@ def test_a_wire_that_cannot_be_says_what_to_write(dist: Path, wired: Path, wire:
     with pytest.raises(InputError) as error:
         load(wired).check()
     assert mentions(str(error.value), why) and "\n" not in str(error.value)
-
-
-def test_a_wire_of_two_single_ports_carries_their_values(dist: Path, workplace: Path):
-    shutil.copy(relay(workplace), "relay.fmu")
-    Path("two.toml").write_text(
-        'stop_time = 1.0\nstep = 0.125\nonly = ["a", "b"]\n[components]\na = "relay.fmu"\n'
-        'b = "relay.fmu"\n[wires]\n"b.u" = "a.y"\n[parameters]\n"a.u" = 2.0\n',
-        encoding="utf-8",
-    )
-    result = simulate("two.toml", order="jacobi")
-    assert result["a.y"].tolist() == [2.0 * t for t in result.time]
-    assert result["b.u"][1:].tolist() == result["a.y"][:-1].tolist()

@@ -17,9 +17,6 @@ from fmpy.validation import validate_fmu
 from fmus.kinds import FMI_VERSIONS, KINDS
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.paper.report import write_report
-from orchestrator.runs import bundle
-from orchestrator.runs.request import Request
 from support.machine import contents
 from support.settings import NAMES
 
@@ -133,29 +130,12 @@ def test_systems_of_both_kinds_differ_in_their_files_alone():
         )
 
 
-def test_ssp_of_the_bundle_runs_without_the_cache(native: Path):
-    ssp = simulate(native / "auv.ssp", stop_time=1.0)
-    assert np.array_equal(ssp.rows, simulate("fig4", stop_time=1.0).rows)
-
-
 def test_loaded_system_can_be_run_saved_and_verified(workplace: Path, capsys):
     system = load("fig4", kind="native")
     folder = simulate(system, stop_time=1.0).save("saved")
     assert {*kinds(folder).values()} == {"native"}
     options = ["--tolerance", "0", "--scenario", "fig4"]
     assert main(["verify", "saved/result.csv", *options]) == 0
-
-
-@pytest.mark.slow
-def test_cache_has_a_folder_a_kind_and_version(workplace: Path):
-    folders = {
-        (kind, fmi): bundle.current_fmus(kind, fmi)
-        for kind, fmi in (("python", "2"), ("native", "2"), ("native", "3"))
-    }
-    assert len({*folders.values()}) == 3
-    for (kind, fmi), folder in folders.items():
-        settings = bundle.settings_of(folder)
-        assert (settings["kind"], settings.get("fmi", "2")) == (kind, fmi)
 
 
 def test_export_with_fmi_3_is_an_ssp_2(workplace: Path, capsys):
@@ -188,15 +168,6 @@ def test_container_takes_fmus_of_either_version(workplace: Path):
         with zipfile.ZipFile(workplace / fmi / "fig4.fmu") as archive:
             root = ElementTree.fromstring(archive.read("modelDescription.xml"))
         assert root.get("fmiVersion") == f"{fmi}.0"
-
-
-@pytest.mark.slow
-def test_report_is_made_of_runs_of_the_kind(tmp_path: Path):
-    assert Request("fig4", kind="native").command_line == "fig4 --kind native"
-    write_report(tmp_path, ["fig4"], ["auv-fmu", "report"], stop_time=0.1, kind="native")
-    runs = json.loads((tmp_path / "run.json").read_text())["runs"]
-    assert runs
-    assert all(run.endswith("--kind native") or "--kind native --set" in run for run in runs)
 
 
 @pytest.mark.parametrize("run", [lambda: load("fig4", "c"), lambda: simulate("fig4", kind="c")])

@@ -113,15 +113,6 @@ def test_time_is_computed_and_the_last_step_ends_at_the_stop_time(system: System
     assert len(run(system, 0.3, 0.1, loop=loop).time) == 4
 
 
-@pytest.mark.parametrize("loop", LOOPS)
-def test_an_open_component_runs_with_inputs_that_were_set(system: System, loop: str):
-    """One FMU, no connections: 10 N against 30 kg/s settle at 1/3 m/s."""
-    alone = replace(system, components={"plant": system.components["plant"]}, connections=())
-    result = run(alone.with_parameters({port("plant.tau.u"): 10.0}), 20.0, 0.02, loop=loop)
-    assert result["plant.nu.u"][-1] == pytest.approx(1 / 3, rel=1e-9)
-    assert (result["plant.tau.u"] == 10.0).all()
-
-
 class Impatient(Table):
     """A table that presses Ctrl-C when it gets rows."""
 
@@ -251,39 +242,6 @@ def test_ssp_holds_the_system_it_was_made_from(system, dist):
     assert list(again.components) == list(system.components)
     assert (again.stop_time, again.step) == (100.0, 0.02)
     assert ssp_bytes(system) == (dist / "auv.ssp").read_bytes()
-
-
-def test_ssp_with_parameters_and_a_swapped_component_runs(dist: Path, tmp_path: Path):
-    """What a user does: edit the structure, add a parameter set, zip it again."""
-    with zipfile.ZipFile(dist / "auv.ssp") as archive:
-        archive.extractall(tmp_path / "edited")
-    structure = tmp_path / "edited" / "SystemStructure.ssd"
-    shutil.move(
-        tmp_path / "edited/resources/MotionPlanner.fmu", tmp_path / "edited/resources/Mine.fmu"
-    )
-    (tmp_path / "edited" / "quiet.ssv").write_text(
-        '<?xml version="1.0"?><ssv:ParameterSet version="1.0" name="mine" '
-        'xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"><ssv:Parameters>'
-        '<ssv:Parameter name="noise.std"><ssv:Real value="0.0"/></ssv:Parameter>'
-        "</ssv:Parameters></ssv:ParameterSet>"
-    )
-    text = structure.read_text().replace("resources/MotionPlanner.fmu", "resources/Mine.fmu")
-    end = text.index("</ssd:Component>")
-    structure.write_text(
-        text[:end]
-        + '<ssd:ParameterBindings><ssd:ParameterBinding source="quiet.ssv"/>'
-        + "</ssd:ParameterBindings>"
-        + text[end:]
-    )
-    mine = tmp_path / "mine.ssp"
-    with zipfile.ZipFile(mine, "w") as archive:
-        for path in (tmp_path / "edited").rglob("*"):
-            archive.write(path, path.relative_to(tmp_path / "edited"))
-    mine_system = read_ssp(mine)
-    assert mine_system.parameters == {port("plant.noise.std"): 0.0}
-    result = run(mine_system, 1.0, 0.02)
-    assert result.parameters[port("plant.noise.std")] == 0.0
-    assert result.failure is None
 
 
 def test_csv_opens_in_the_reader_of_fmpy_and_loses_no_digit(system, tmp_path):

@@ -25,7 +25,6 @@ from orchestrator.runs.result import simulate as simulated
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.graph import delayed
 from orchestrator.system.structure import System
-from support.machine import LOOPS
 from support.relay import relay, system_of
 from support.runs import whole as run
 
@@ -114,18 +113,6 @@ def test_equal_steps_of_all_components_are_one_step(order):
     finer = replace(experiment, step=0.01)
     slow = run(replace(system, steps=dict.fromkeys(system.components, 0.02)), finer)
     assert slow.rows[::2].tobytes() == whole.rows.tobytes()
-
-
-@pytest.mark.parametrize("loop", LOOPS)
-def test_a_slow_controller_is_sampled_and_held(loop):
-    table = run(
-        replace(load("fig4", NATIVE), steps={"controller": 0.1}), Experiment(2.0, 0.02), loop
-    )
-    force, measured = table["controller.tau.u"][1:], table["controller.y.x"][1:]
-    for signal in (force, measured, table["plant.tau.u"][1:]):
-        np.testing.assert_array_equal(signal.reshape(-1, 5), signal[::5, None] * np.ones(5))
-    np.testing.assert_array_equal(measured[::5], table["plant.y.x"][:-1:5])
-    assert len(set(force[::5])) == 20
 
 
 def test_isolated_components_have_steps_of_their_own_too(folder):

@@ -71,15 +71,6 @@ def test_path_from_a_table_is_passed_at_its_times(workplace: Path, native: Path)
 
 
 @pytest.mark.parametrize("kind", ["dist", "native"])
-def test_path_that_the_vehicle_cannot_follow_is_refused_in_one_line(request, kind: str):
-    system = closed_loop(request.getfixturevalue(kind), read_scenario("path"))
-    sharp = system.with_parameters({PortName("planner", "rounding"): 1.0})
-    with pytest.raises(InputError, match=r"planner: .*at \(14\.9, .*more tightly than") as error:
-        run(sharp, 1.0, 0.02)
-    assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("kind", ["dist", "native"])
 @pytest.mark.parametrize(
     ("places", "why"),
     [
