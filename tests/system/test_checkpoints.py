@@ -20,6 +20,7 @@ from orchestrator.runs.bundle import current_fmus
 from orchestrator.system.structure import System
 from support import others
 from support.machine import LOOPS, contents, ended, eventually, forked, killed_at, start
+from support.texts import mentions
 
 pytestmark = pytest.mark.usefixtures("workplace")
 
@@ -233,7 +234,7 @@ def test_a_signal_leaves_the_rows_and_the_checkpoint(loop, capsys):
     [
         (["--set", "plant.m44=26"], "plant.m44 differ"),
         (["--stop-time", "3", "--order", "jacobi"], "order, stop_time differ"),
-        (["--kind", "native"], "the FMU of controller, the FMU of disturbance, the FMU of planner"),
+        (["--kind", "native"], "controller, disturbance, planner"),
     ],
 )
 def test_another_run_is_refused(left, capsys, change, words):
@@ -241,7 +242,7 @@ def test_another_run_is_refused(left, capsys, change, words):
     assert run(*LEFT, *change, "--resume", out="r") == 2
     [line] = capsys.readouterr().err.splitlines()
     assert line.startswith("auv-fmu: r/checkpoint is of another run: ")
-    assert words in line
+    assert mentions(line, words)
     assert contents(Path("r/checkpoint")) == {
         name.removeprefix("checkpoint/"): content
         for name, content in before.items()
@@ -291,10 +292,8 @@ def test_an_fmu_that_does_not_restore_all_of_its_state_is_told(tmp_path):
     system = others.system_of(others.build(tmp_path, "FORGETS", WITH_STATES))
     stopped(system)
     resumed = simulate(system, stop_time=2.0, step=0.1, checkpoint="kept", resume=True)
-    assert resumed.ending.messages == (
-        "a.heard is not what it was at t = 1.9 s before the run was resumed: an FMU does not "
-        "restore all of its state",
-    )
+    [message] = resumed.ending.messages
+    assert mentions(message, "a.heard 1.9 s resumed")
     assert len(resumed) == 21
 
 

@@ -74,18 +74,18 @@ def test_connection_that_does_not_fit_is_refused(system, source, target, reason)
 @pytest.mark.parametrize(
     ("name", "value", "reason"),
     [
-        ("plant.m1", 1, "did you mean m11"),
-        ("plant.m11", "heavy", "not a real number"),
-        ("plant.m11", -1, "m11 = -1: must be at least"),
+        ("plant.m1", 1, "m11"),
+        ("plant.m11", "heavy", "m11 .* real"),
+        ("plant.m11", -1, "m11 = -1"),
         ("plant.m11", "nan", "must be finite"),
         ("plant.noise.seed", 1.5, "not an integer"),
         ("controller.printed_jacobian", "perhaps", "not a Boolean"),
-        ("controller.saturation", "sigmoid", "use one of tanh, algebraic"),
+        ("controller.saturation", "sigmoid", "tanh, algebraic"),
         ("plant.tau_min.q", 0.0, None),
-        ("plant.actuator.T.u", -1, "must be at least 0"),
-        ("plant.y.x", 1, "is of causality output and cannot be set"),
-        ("plant.tau.u", 1, "is fed by controller.tau.u"),
-        ("pilot.mood", 1, "no component 'pilot'"),
+        ("plant.actuator.T.u", -1, "plant.actuator.T.u = -1"),
+        ("plant.y.x", 1, "plant.y.x .* output"),
+        ("plant.tau.u", 1, "controller.tau.u"),
+        ("pilot.mood", 1, "'pilot'"),
     ],
 )
 def test_wrong_parameter_is_refused_in_one_line(system, name, value, reason):
@@ -101,7 +101,7 @@ def test_wrong_parameter_is_refused_in_one_line(system, name, value, reason):
 @pytest.mark.parametrize("name", ["plant.eta0.phi", "plant.nu0.p"])
 def test_roll_that_is_held_cannot_start_otherwise(system, name):
     values = {port("plant.roll"): False, port(name): 0.1}
-    with pytest.raises(InputError, match="must be 0 where roll is false"):
+    with pytest.raises(InputError, match=name):
         run(system.with_parameters(values), 1.0, 0.02)
 
 
@@ -207,7 +207,7 @@ def test_temporary_folder_that_would_crash_a_plain_fmu_is_refused(dist: Path, tm
     check_place(system)
     for library in system.glob("binaries/*/*_pythonfmu.*"):
         library.unlink()
-    with pytest.raises(InputError, match=r"takes no '\+' in it; set TMPDIR"):
+    with pytest.raises(InputError, match=r"'\+' .*TMPDIR"):
         check_place(system)
     system.rename(tmp_path / "a b")
     check_place(tmp_path / "a b")
@@ -220,17 +220,17 @@ def test_fmus_are_unpacked_once_a_process(system: System, monkeypatch: pytest.Mo
 
 
 def test_broken_and_missing_fmus_are_refused(tmp_path: Path, dist: Path):
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match=r"missing\.fmu"):
         read_component("plant", tmp_path / "missing.fmu")
     broken = tmp_path / "broken.fmu"
     broken.write_bytes(b"not a zip")
-    with pytest.raises(InputError, match="cannot be opened: File is not a zip file"):
+    with pytest.raises(InputError, match=r"broken\.fmu: .*zip"):
         read_component("plant", broken)
     hollow = tmp_path / "hollow.fmu"
     with zipfile.ZipFile(dist / "AuvPlant.fmu") as full, zipfile.ZipFile(hollow, "w") as archive:
         archive.writestr("modelDescription.xml", full.read("modelDescription.xml"))
     alone = System("alone", {"plant": read_component("plant", hollow)}, ())
-    with pytest.raises(InputError, match="has no binaries at all"):
+    with pytest.raises(InputError, match=r"hollow\.fmu"):
         run(alone, 1.0, 0.02)
 
 
