@@ -27,29 +27,21 @@ STEP, STEPS = 0.125, 24
 #: A ring by way of a function, written from both ends, with a component of a longer step.
 OSP = f"""<?xml version="1.0"?>
 <OspSystemStructure xmlns="http://opensimulationplatform.com/MSMI/OSPSystemStructure" version="0.1">
-  <StartTime>0.0</StartTime>
-  <BaseStepSize>{STEP}</BaseStepSize>
-  <Algorithm>fixedStep</Algorithm>
+  <StartTime>0.0</StartTime><BaseStepSize>{STEP}</BaseStepSize><Algorithm>fixedStep</Algorithm>
   <!-- the first is beside this file's folder -->
   <Simulators>
-    <Simulator name="a" source="../fmus/relay%20one.fmu" stepSize="{STEP}">
-      <InitialValues>
-        <InitialValue variable="v"><Real value="0.7"/></InitialValue>
-        <InitialValue variable="a"><Real value="1.5"/></InitialValue>
-      </InitialValues>
-    </Simulator>
-    <Simulator name="b" source="relay.fmu" stepSize="{2 * STEP}">
-      <InitialValues>
-        <InitialValue variable="a"><Real value="-0.3"/></InitialValue>
-        <InitialValue variable="c"><Real value="0.1"/></InitialValue>
-        <InitialValue variable="u"><Real value="9"/></InitialValue>
-      </InitialValues>
-    </Simulator>
+    <Simulator name="a" source="../fmus/relay%20one.fmu" stepSize="{STEP}"><InitialValues>
+      <InitialValue variable="v"><Real value="0.7"/></InitialValue>
+      <InitialValue variable="a"><Real value="1.5"/></InitialValue>
+    </InitialValues></Simulator>
+    <Simulator name="b" source="relay.fmu" stepSize="{2 * STEP}"><InitialValues>
+      <InitialValue variable="a"><Real value="-0.3"/></InitialValue>
+      <InitialValue variable="c"><Real value="0.1"/></InitialValue>
+      <InitialValue variable="u"><Real value="9"/></InitialValue>
+    </InitialValues></Simulator>
     <Simulator name="c" source="relay.fmu"/>
   </Simulators>
-  <Functions>
-    <LinearTransformation name="scaled" factor="0.5" offset="-0.25"/>
-  </Functions>
+  <Functions><LinearTransformation name="scaled" factor="0.5" offset="-0.25"/></Functions>
   <Connections>
     <SignalConnection>
       <Variable simulator="a" name="y"/><Signal function="scaled" name="in"/>

@@ -353,9 +353,15 @@ def test_a_folder_that_another_process_writes_into_is_left_alone(workplace, caps
 @pytest.mark.parametrize("hours", [-1000, 1000])
 def test_a_clock_that_jumps_changes_no_duration(workplace, monkeypatch, capsys, hours):
     """With the bar, which a terminal would show."""
-    jump = iter(3600 * hours * k for k in count())
-    monkeypatch.setattr(time, "time", lambda now=time.time: now() + next(jump))
-    monkeypatch.setattr(record, "datetime", jumping_datetime(hours))
+    jump = count(step=hours)
+
+    class Jumping(datetime):
+        @classmethod
+        def now(cls, tz: tzinfo | None = None) -> datetime:
+            return datetime.now(tz) + timedelta(hours=next(jump))
+
+    monkeypatch.setattr(time, "time", lambda now=time.time: now() + 3600 * next(jump))
+    monkeypatch.setattr(record, "datetime", Jumping)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     begun = time.monotonic()
     assert main([*RUN, "20"]) == 0
@@ -363,17 +369,3 @@ def test_a_clock_that_jumps_changes_no_duration(workplace, monkeypatch, capsys, 
     told = json.loads(Path("results/fig4/run.json").read_text())["seconds"]
     assert 0.0 < told <= taken
     assert len(rows(workplace / "results" / "fig4")) == 1001
-
-
-def jumping_datetime(hours: float) -> type[datetime]:
-    """Dates of which each is some hours further off."""
-
-    class Jumping(datetime):
-        n = 0
-
-        @classmethod
-        def now(cls, tz: tzinfo | None = None) -> datetime:
-            cls.n += 1
-            return datetime.now(tz) + timedelta(hours=hours * cls.n)
-
-    return Jumping

@@ -101,7 +101,7 @@ def test_wrong_parameter_is_refused_in_one_line(system, name, value, reason):
 @pytest.mark.parametrize("name", ["plant.eta0.phi", "plant.nu0.p"])
 def test_roll_that_is_held_cannot_start_otherwise(system, name):
     values = {port("plant.roll"): False, port(name): 0.1}
-    with pytest.raises(InputError, match=name):
+    with pytest.raises(InputError, match="roll"):
         run(system.with_parameters(values), 1.0, 0.02)
 
 
