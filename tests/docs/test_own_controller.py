@@ -16,6 +16,8 @@ from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.runs.record import read_result
 from support.markdown import DOCS, blocks
+from support.texts import mentions
+from support.tiers import slow
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +82,7 @@ def test_both_bases_give_the_same_motion(followed: Path):
     [
         ("x = = 1", "mine.py:1: SyntaxError"),
         ("import os\nraise ValueError('no')", "mine.py:2: ValueError: no"),
-        ("x = 1", "No child class of Fmi2Slave"),
+        ("x = 1", "Fmi2Slave"),
     ],
 )
 def test_mistake_in_a_script_is_told_with_its_line(text, complaint, tmp_path, capsys):
@@ -91,13 +93,12 @@ def test_mistake_in_a_script_is_told_with_its_line(text, complaint, tmp_path, ca
     assert not list(tmp_path.glob("*.fmu"))
 
 
-@pytest.mark.parametrize("isolated", [[], ["--isolate"]])
-@pytest.mark.parametrize("base", ["plain", "hardened"])
-def test_mistake_in_a_step_is_told_once_with_its_line(
-    base, isolated, tmp_path, monkeypatch, capsys
-):
+@pytest.mark.parametrize(
+    ("base", "isolated"),
+    [("plain", []), ("hardened", ["--isolate"]), *slow(("plain", ["--isolate"]), ("hardened", []))],
+)
+def test_mistake_in_a_step_is_told_once_with_its_line(base, isolated, workplace, capsys):
     """One that shows after half a second, in a module beside the script; rows until then stay."""
-    monkeypatch.chdir(tmp_path)
     assert main(["new", "controller", "my_law", ".", "--base", base]) == 0
     Path("beside.py").write_text("def waiting(t):\n    return t < 0.5 or value\n")
     script = Path("my_law.py")
@@ -110,21 +111,26 @@ def test_mistake_in_a_step_is_told_once_with_its_line(
     assert main(["build", "my_law.py"]) == 0
     capsys.readouterr()
     assert main(["run", "scenario.toml", "--no-figures", "--out", "out", *isolated]) == 1
-    assert capsys.readouterr().err == (
-        "auv-fmu: scenario stopped at t = 0.5 s: controller: step refused at t = 0.5 s: "
-        "beside.py:2: NameError: name 'value' is not defined\n"
-    )
+    [line] = capsys.readouterr().err.splitlines()
+    assert mentions(line, "scenario t = 0.5 s: controller: beside.py:2: NameError: 'value'")
+    assert line.count("beside.py") == 1
     assert len(Path("out/result.csv").read_text().splitlines()) == 1 + 26
 
 
-def test_mistake_in_the_first_step_is_all_that_is_told(tmp_path, monkeypatch, capsys):
-    """No figures and no indices of a run that has made no step."""
-    monkeypatch.chdir(tmp_path)
+def built_with(old: str, new: str) -> int:
+    """Build a controller with another text in it; the number of that text's last line."""
     assert main(["new", "controller", "my_law", "."]) == 0
     script = Path("my_law.py")
-    script.write_text(script.read_text().replace("value = self.values", "value = self.valu"))
-    line = script.read_text().splitlines().index("        value = self.valu") + 1
+    before, found, after = script.read_text().partition(old)
+    assert found
+    script.write_text(before + new + after)
     assert main(["build", "my_law.py"]) == 0
+    return (before + new).count("\n")
+
+
+def test_mistake_in_the_first_step_is_all_that_is_told(workplace, capsys):
+    """No figures and no indices of a run that has made no step."""
+    line = built_with("        value = self.values\n", "        value = self.valu\n")
     capsys.readouterr()
     assert main(["run", "scenario.toml", "--out", "out"]) == 1
     told = capsys.readouterr()
@@ -138,28 +144,19 @@ def test_mistake_in_the_first_step_is_all_that_is_told(tmp_path, monkeypatch, ca
     ("head", "mistake", "status"),
     [("get()", "if self.smoothed: nothing", 1), ("put(value)", "nothing", 2)],
 )
-def test_mistake_in_a_value_is_told_with_its_line(
-    head, mistake, status, tmp_path, monkeypatch, capsys
-):
+def test_mistake_in_a_value_is_told_with_its_line(workplace, capsys, head, mistake, status):
     """Where a plain slave gives or takes a value; PythonFMU alone ends with fmi2Fatal."""
-    monkeypatch.chdir(tmp_path)
-    assert main(["new", "controller", "my_law", "."]) == 0
-    script = Path("my_law.py")
-    head, mistake = f"        def {head}:\n", f"            {mistake}\n"
-    script.write_text(script.read_text().replace(head, f"{head}{mistake}"))
-    line = script.read_text().splitlines(keepends=True).index(mistake) + 1
-    assert main(["build", "my_law.py"]) == 0
+    head = f"        def {head}:\n"
+    line = built_with(head, f"{head}            {mistake}\n")
     capsys.readouterr()
     assert main(["run", "scenario.toml", "--no-figures"]) == status
-    [complaint] = capsys.readouterr().err.splitlines()
-    assert complaint.endswith(
-        f"controller: my_law.py:{line}: NameError: name 'nothing' is not defined"
-    )
+    complaint = capsys.readouterr().err
+    assert complaint.count("\n") == 1
+    assert f"controller: my_law.py:{line}: NameError: " in complaint
 
 
-def test_changed_script_runs_changed_in_the_same_process(tmp_path, monkeypatch):
+def test_changed_script_runs_changed_in_the_same_process(workplace):
     """Modules beside the script are in the FMU, and those of two versions do not meet."""
-    monkeypatch.chdir(tmp_path)
     assert main(["new", "controller", "two_versions", "."]) == 0
     script = Path("two_versions.py")
     text = script.read_text().replace(
@@ -174,9 +171,8 @@ def test_changed_script_runs_changed_in_the_same_process(tmp_path, monkeypatch):
     assert forces[0] == -forces[1] != 0.0
 
 
-def test_many_instances_of_a_plain_slave_in_one_process(tmp_path, monkeypatch):
+def test_many_instances_of_a_plain_slave_in_one_process(workplace):
     """PythonFMU alone crashes the process after some dozens."""
-    monkeypatch.chdir(tmp_path)
     assert main(["new", "controller", "Often", "."]) == 0
     code = (
         "from orchestrator import simulate\n"

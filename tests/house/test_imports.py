@@ -61,14 +61,21 @@ def modules(package: str) -> Iterator[tuple[Path, tuple[str, ...]]]:
         yield path, tuple(part for part in parts if part != "__init__")
 
 
-def imports(path: Path) -> Iterator[tuple[str, ...]]:
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+@cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
+def imports(path: Path) -> set[tuple[str, ...]]:
+    found = set()
+    for node in ast.walk(tree(path)):
         if isinstance(node, ast.Import):
-            yield from (tuple(alias.name.split(".")) for alias in node.names)
+            found |= {tuple(alias.name.split(".")) for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: relative import"
-            base = tuple(str(node.module).split("."))
-            yield from ((*base, alias.name) for alias in node.names)
+            found |= {(*str(node.module).split("."), alias.name) for alias in node.names}
+    return found
 
 
 @cache
@@ -149,7 +156,7 @@ def test_the_general_half_names_no_component_and_no_port_of_this_vehicle():
             continue
         text = path.read_text(encoding="utf-8")
         assert (word.findall(text), port.findall(text)) == ([], []), path
-        for node in ast.walk(ast.parse(text)):
+        for node in ast.walk(tree(path)):
             if isinstance(node, ast.Constant) and isinstance(node.value, str):
                 assert node.value not in quoted, f"{path} names {node.value}"
 

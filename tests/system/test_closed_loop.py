@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from itertools import pairwise
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -22,7 +19,6 @@ from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 from orchestrator.vehicle.indices import metrics_of
 from orchestrator.vehicle.signals import tracking_error, true_control_point
-from support.instances import unpacked
 from support.runs import final_error, run
 
 STEPS = 5000
@@ -202,55 +198,3 @@ def test_finer_steps_converge_to_the_same_motion(system: System, quiet: Table):
     differences = np.abs(np.diff(halves))
     assert quiet["plant.eta.x"][1000] == halves[0]
     np.testing.assert_allclose(differences[:-1] / differences[1:], 2.0, rtol=0.25)
-
-
-def test_host_without_initial_exchange_ends_where_the_others_end(system: System):
-    """Zeros in the controller's first step, the true measurement in the second."""
-    with_exchange = simple_jacobi_host(system, initial_exchange=True)
-    without = simple_jacobi_host(system, initial_exchange=False)
-    assert np.abs(without - with_exchange).max() < 1e-3
-    ungated = simple_jacobi_host(system, initial_exchange=False, innovation_gate=0.0)
-    assert np.abs(ungated - with_exchange).max() > 1e-2, "the gate is what makes the difference"
-
-
-def simple_jacobi_host(
-    system: System, initial_exchange: bool, innovation_gate: float = 1.0
-) -> np.ndarray:
-    """Position of the vehicle after 100 s in a host that knows no more than it must."""
-    wires: dict[tuple[str, str], tuple[list[int], list[int]]] = {}
-    for connection in system.connections:
-        source, target = connection.source, connection.target
-        outs, ins = wires.setdefault((source.component, target.component), ([], []))
-        outs.append(system.components[source.component].variables[source.port].valueReference)
-        ins.append(system.components[target.component].variables[target.port].valueReference)
-
-    with TemporaryDirectory(prefix="auvfmu") as folder, ExitStack() as stack:
-        instances = {
-            name: stack.enter_context(unpacked(component.fmu, Path(folder, name), name))
-            for name, component in system.components.items()
-        }
-
-        def read() -> list[list[float]]:
-            return [
-                instances[source].read("Real", outs) for (source, _), (outs, _) in wires.items()
-            ]
-
-        def write(values: list[list[float]]) -> None:
-            for ((_, target), (_, ins)), numbers in zip(wires.items(), values, strict=True):
-                instances[target].write("Real", ins, numbers)
-
-        instances["controller"].set(innovation_gate=innovation_gate)
-        for instance in instances.values():
-            instance.fmu.setupExperiment(startTime=0.0)
-            instance.fmu.enterInitializationMode()
-        for _ in range(3 if initial_exchange else 0):
-            write(read())
-        for instance in instances.values():
-            instance.fmu.exitInitializationMode()
-        values = read() if initial_exchange else [[0.0] * len(outs) for outs, _ in wires.values()]
-        for _ in range(STEPS):
-            write(values)
-            for instance in instances.values():
-                instance.step()
-            values = read()
-        return np.array([instances["plant"].get(f"eta.{k}") for k in XYZ])

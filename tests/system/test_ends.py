@@ -14,6 +14,7 @@ from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from support.others import WAYS, build, run, system_of
+from support.texts import mentions, tells
 from support.tiers import slow
 
 EVERY_WAY = pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
@@ -128,9 +129,7 @@ def test_the_last_row_is_that_of_the_time_which_the_fmu_has_come_to(
     table = run(system, 1.0, _STEP, order=order, **way)
     expected = plain_rows(system, order)
     assert table.failure is None
-    assert table.ending.remark.startswith(
-        f"ended at t = {at:g} s: {who} has ended the simulation, at {at:g} s"
-    )
+    assert mentions(table.ending.remark, f"t = {at:g} s: {who} {at:g} s")
     assert len(table) == len(expected) == n
     assert table.time[-1] == pytest.approx(at, rel=1e-15)
     assert np.array_equal(rows_of(table), expected)
@@ -147,10 +146,7 @@ def two_by_themselves(folder, ends, **variants):
 @EVERY_WAY
 def test_who_is_at_another_time_in_the_last_row_is_named(tmp_path, way):
     table = run(two_by_themselves(tmp_path, [0.45, _NEVER]), **way)
-    assert table.ending.remark == (
-        "ended at t = 0.45 s: a has ended the simulation, at 0.45 s; "
-        "the last row has b at another time"
-    )
+    assert mentions(table.ending.remark, "t = 0.45 s: a 0.45 s; b")
     assert table["a.y"][-1] == pytest.approx(1.9)
     assert table["b.y"][-1] == pytest.approx(2.0)
 
@@ -161,17 +157,14 @@ def test_the_others_come_to_a_time_that_ends_a_run_if_they_can(tmp_path, way):
     order = ("a", "b", "c")
     ring = a_ring_of(tmp_path, [0.45, _NEVER, _NEVER], rigid="c")
     table = run(ring, order=order, **way)
-    assert table.ending.remark.endswith("; the last row has c at another time")
+    assert " c " in table.ending.remark.partition("; ")[2]
     assert table["c.y"][-1] == table["c.y"][-2]
 
 
 @EVERY_WAY
 def test_a_run_ends_at_the_earliest_of_two_ends_in_one_step(tmp_path, way):
     table = run(two_by_themselves(tmp_path, [0.47, 0.43]), **way)
-    assert table.ending.remark == (
-        "ended at t = 0.43 s: b has ended the simulation, at 0.43 s; "
-        "the last row has a at another time"
-    )
+    assert mentions(table.ending.remark, "t = 0.43 s: b 0.43 s; a")
     assert table["b.y"][-1] == pytest.approx(1.86)
 
 
@@ -180,7 +173,7 @@ def test_the_others_go_on_until_the_time_at_which_a_slow_one_has_ended(tmp_path,
     system = replace(two_by_themselves(tmp_path, [0.75, _NEVER]), steps={"a": 0.4})
     table = run(system, **way)
     assert table.failure is None
-    assert table.ending.remark == "ended at t = 0.75 s: a has ended the simulation, at 0.75 s"
+    assert tells(table.ending.remark, (0.75, 0.75)) and ";" not in table.ending.remark
     assert table.time == pytest.approx([*(0.1 * k for k in range(8)), 0.75])
     assert table["b.y"] == pytest.approx(1.0 + 2.0 * table.time)
     assert table["a.y"] == pytest.approx([1.0] * 4 + [1.8] * 4 + [2.5])
@@ -199,5 +192,5 @@ def test_an_end_at_the_stop_time_completes_the_run(tmp_path, way):
 def test_one_that_gives_nothing_at_its_end_ends_the_run_before_that_step(tmp_path, way):
     table = run(system_of(build(tmp_path, "MUTE")), **way)
     assert table.failure is None
-    assert table.ending.remark == "ended at t = 0.4 s: a has ended the simulation, at 0.5 s"
+    assert tells(table.ending.remark, (0.4, 0.5))
     assert len(table) == 5

@@ -25,6 +25,7 @@ from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.vehicle.signals import tracking_error
+from support.texts import mentions
 
 H = 0.02
 STEPS = 120
@@ -208,7 +209,7 @@ def test_what_happens_is_said_recorded_and_kept(workplace: Path, capsys):
     )
     assert main(["run", "mine.toml", "--kind", "native", "--out", "out"]) == 0
     said = capsys.readouterr().err.splitlines()
-    assert "auv-fmu: warning: mine: did not happen: stop, when plant.eta.z > 100" in said
+    assert any(mentions(line, "warning: mine: plant.eta.z > 100") for line in said)
     assert "auv-fmu: mine: t = 0.3 s: lose controller.tau.r (no yaw)" in said
     assert "auv-fmu: mine: t = 0.5 s: lose controller.tau.r, ended" in said
     # The PD controller has no k_d.

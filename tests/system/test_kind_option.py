@@ -17,11 +17,9 @@ from fmpy.validation import validate_fmu
 from fmus.kinds import FMI_VERSIONS, KINDS
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.paper.report import write_report
-from orchestrator.runs import bundle
-from orchestrator.runs.request import Request
 from support.machine import contents
 from support.settings import NAMES
+from support.texts import mentions
 
 SECOND = ["--stop-time", "1"]
 
@@ -43,7 +41,7 @@ def test_build_writes_fmus_ssp_checksums_and_bill(workplace, capsys):
     folder = workplace / "fmus/dist/native"
     papers = {"auv.ssp", "SHA256SUMS", "bom.cdx.json", "build.json"}
     assert contents(folder).keys() == papers | {f"{name}.fmu" for name in NAMES}
-    assert "is built, FMI 2.0 for linux64, by " in capsys.readouterr().out
+    assert mentions(capsys.readouterr().out, "FMI 2.0 linux64")
     for line in (folder / "SHA256SUMS").read_text().splitlines():
         digest, name = line.split("  ")
         assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest
@@ -133,29 +131,12 @@ def test_systems_of_both_kinds_differ_in_their_files_alone():
         )
 
 
-def test_ssp_of_the_bundle_runs_without_the_cache(native: Path):
-    ssp = simulate(native / "auv.ssp", stop_time=1.0)
-    assert np.array_equal(ssp.rows, simulate("fig4", stop_time=1.0).rows)
-
-
 def test_loaded_system_can_be_run_saved_and_verified(workplace: Path, capsys):
     system = load("fig4", kind="native")
     folder = simulate(system, stop_time=1.0).save("saved")
     assert {*kinds(folder).values()} == {"native"}
     options = ["--tolerance", "0", "--scenario", "fig4"]
     assert main(["verify", "saved/result.csv", *options]) == 0
-
-
-@pytest.mark.slow
-def test_cache_has_a_folder_a_kind_and_version(workplace: Path):
-    folders = {
-        (kind, fmi): bundle.current_fmus(kind, fmi)
-        for kind, fmi in (("python", "2"), ("native", "2"), ("native", "3"))
-    }
-    assert len({*folders.values()}) == 3
-    for (kind, fmi), folder in folders.items():
-        settings = bundle.settings_of(folder)
-        assert (settings["kind"], settings.get("fmi", "2")) == (kind, fmi)
 
 
 def test_export_with_fmi_3_is_an_ssp_2(workplace: Path, capsys):
@@ -174,10 +155,11 @@ def test_export_with_fmi_3_is_an_ssp_2(workplace: Path, capsys):
     assert validate_fmu("resources/AuvPlant.fmu") == []
     capsys.readouterr()
     assert main(["run", "out/fig4.ssp"]) == 2
-    assert capsys.readouterr().err == (
-        "auv-fmu: out/fig4.ssp: plant: resources/AuvPlant.fmu: is of FMI 3.0; only FMUs of FMI 2.0 "
-        "are supported (and 3 more: see `auv-fmu check`)\n"
+    said = capsys.readouterr().err
+    assert mentions(
+        said, "auv-fmu: out/fig4.ssp: plant: resources/AuvPlant.fmu: FMI 3.0 2.0 3 more"
     )
+    assert said.count("\n") == 1
 
 
 @pytest.mark.skipif(find_spec("fmu_manipulation_toolbox") is None, reason="no FMU toolbox")
@@ -190,23 +172,14 @@ def test_container_takes_fmus_of_either_version(workplace: Path):
         assert root.get("fmiVersion") == f"{fmi}.0"
 
 
-@pytest.mark.slow
-def test_report_is_made_of_runs_of_the_kind(tmp_path: Path):
-    assert Request("fig4", kind="native").command_line == "fig4 --kind native"
-    write_report(tmp_path, ["fig4"], ["auv-fmu", "report"], stop_time=0.1, kind="native")
-    runs = json.loads((tmp_path / "run.json").read_text())["runs"]
-    assert runs
-    assert all(run.endswith("--kind native") or "--kind native --set" in run for run in runs)
-
-
 @pytest.mark.parametrize("run", [lambda: load("fig4", "c"), lambda: simulate("fig4", kind="c")])
 def test_unknown_kind_is_a_value_error(run):
-    with pytest.raises(ValueError, match="kind 'c': use one of python, native"):
+    with pytest.raises(ValueError, match=r"'c': .*python, native"):
         run()
 
 
 def test_system_keeps_the_fmus_it_was_loaded_with():
-    with pytest.raises(ValueError, match="comes with its FMUs"):
+    with pytest.raises(ValueError, match="FMUs"):
         simulate(load("fig4"), kind="native")
 
 

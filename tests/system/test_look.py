@@ -40,14 +40,6 @@ def test_plot_draws_results_over_each_other(results, tmp_path, monkeypatch, caps
         assert f"<!-- {label} -->" in text
 
 
-def test_plots_need_no_record(results, tmp_path):
-    """A table of another tool, by itself."""
-    table = tmp_path / "other.csv"
-    table.write_bytes((results / "quiet" / "result.csv").read_bytes())
-    assert main(["plot", str(table), "--out", str(tmp_path / "plot.pdf")]) == 0
-    assert (tmp_path / "plot.pdf").read_bytes().startswith(b"%PDF")
-
-
 def test_record_that_does_not_name_a_table_is_not_its_record(results, tmp_path):
     """Another table beside the record: nothing is known of its parameters."""
     for name in ("result.csv", "other.csv"):
@@ -67,7 +59,7 @@ def test_parameter_of_a_wrong_kind_is_told(results, tmp_path, capsys):
     (tmp_path / "run.json").write_text(json.dumps(record))
     assert main(["view", str(tmp_path)]) == 2
     error = capsys.readouterr().err
-    assert "plant.ell is 'long', not a number" in error
+    assert "plant.ell is 'long'" in error
     assert error.count("\n") == 1
 
 

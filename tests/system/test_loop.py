@@ -34,6 +34,7 @@ from orchestrator.system.units import Linear
 from support.machine import LOOPS
 from support.mixed import ACTS, CALLS, Shape, altered, system_of, systems
 from support.runs import run_table
+from support.texts import mentions
 
 #: Step [s].
 H = 0.5
@@ -130,32 +131,32 @@ def pair(folder: Path, act: str, call: str = "STEP", milliseconds: int = 0) -> S
 @pytest.mark.parametrize(
     ("act", "call", "rows", "words"),
     [
-        ("DISCARD", "SET", 8, "3.5 s: bad: setting inputs failed with status 2 (discard)."),
-        ("DISCARD", "STEP", 7, "3 s: bad: fmi2DoStep failed with status 2 (discard)."),
-        ("DISCARD", "GET", 7, "3 s: bad: getting outputs failed with status 2 (discard)."),
-        ("FAIL", "STEP", 7, "3 s: bad: fmi2DoStep failed with status 3 (error)."),
+        ("DISCARD", "SET", 8, "3.5 s: bad: inputs 2 discard"),
+        ("DISCARD", "STEP", 7, "3 s: bad: fmi2DoStep 2 discard"),
+        ("DISCARD", "GET", 7, "3 s: bad: outputs 2 discard"),
+        ("FAIL", "STEP", 7, "3 s: bad: fmi2DoStep 3 error"),
         *(
-            (act, call, rows, f"{name} failed with status {status} (illegal return code).")
+            (act, call, rows, f"{name} {status} illegal")
             for act, status in (("BELOW_ALL", -1), ("BEYOND_ALL", 6))
             for call, rows, name in (
-                ("SET", 8, "3.5 s: bad: setting inputs"),
+                ("SET", 8, "3.5 s: bad: inputs"),
                 ("STEP", 7, "3 s: bad: fmi2DoStep"),
-                ("GET", 7, "3 s: bad: getting outputs"),
+                ("GET", 7, "3 s: bad: outputs"),
             )
         ),
-        ("FATAL", "SET", 8, "3.5 s: bad: setting inputs failed with status 4 (fatal)."),
-        ("FATAL", "STEP", 7, "3 s: bad: fmi2DoStep failed with status 4 (fatal)."),
-        ("FATAL", "GET", 7, "3 s: bad: getting outputs failed with status 4 (fatal)."),
+        ("FATAL", "SET", 8, "3.5 s: bad: inputs 4 fatal"),
+        ("FATAL", "STEP", 7, "3 s: bad: fmi2DoStep 4 fatal"),
+        ("FATAL", "GET", 7, "3 s: bad: outputs 4 fatal"),
         ("SAYS", "STEP", 7, "3 s: bad: tired"),
-        ("NOT_A_NUMBER", "STEP", 7, "3.5 s: bad.output.Real0 is nan"),
-        ("INFINITE", "STEP", 7, "3.5 s: bad.output.Real0 is inf"),
+        ("NOT_A_NUMBER", "STEP", 7, "3.5 s: bad.output.Real0 nan"),
+        ("INFINITE", "STEP", 7, "3.5 s: bad.output.Real0 inf"),
     ],
 )
 def test_a_step_that_fails_is_named_and_the_rows_before_it_kept(
     folder, way, act, call, rows, words
 ):
     table = run(pair(folder, act, call), Experiment(100.0, H), **way)
-    assert table.failure == f"stopped at t = {words}"
+    assert mentions(table.failure, words)
     assert np.array_equal(table.time, np.arange(rows) * H)
     assert table.ending.messages == (("bad: step 7", "bad: tired") if act == "SAYS" else ())
 
@@ -172,10 +173,10 @@ FED = {
 @pytest.mark.parametrize(
     ("factor", "target", "bias", "words"),
     [
-        (1e306, None, 0.0, "b.input.Real0 is inf, fed by a.output.Real0"),
-        (1e300, "b.input.Real0", -1.7e308, "b.input.Real0 is -inf, fed by a.output.Real0"),
-        (1.0, "a.input.Real0", 1.7e308, "a.input.Real0 is inf, as a table or an event has it"),
-        (1.0, "b.input.Integer0", 2.0**31, "which no Integer of FMI can be, fed by a."),
+        (1e306, None, 0.0, "b.input.Real0 inf, a.output.Real0"),
+        (1e300, "b.input.Real0", -1.7e308, "b.input.Real0 -inf, a.output.Real0"),
+        (1.0, "a.input.Real0", 1.7e308, "a.input.Real0 inf, event"),
+        (1.0, "b.input.Integer0", 2.0**31, "b.input.Integer0 Integer a."),
     ],
 )
 def test_an_input_that_its_type_cannot_hold_ends_the_run(
@@ -193,7 +194,7 @@ def test_an_input_that_its_type_cannot_hold_ends_the_run(
         where = PortName(*target.split(".", 1))
         events = [Event("bias", Alter("bias", ((where, bias),)), "bias", at=3.0)]
     table = run(system, Experiment(200.0, H, order), **way, events=events)
-    assert words in table.failure
+    assert mentions(table.failure, words)
     assert np.isfinite(table.rows).all()
     assert table.failure.startswith(f"stopped at t = {len(table) * H:g} s: ")
     assert len(table) == 7 if target else 7 < len(table) < 400

@@ -184,9 +184,3 @@ def test_files_on_the_command_line_come_after_the_scenarios(tmp_path, monkeypatc
     assert (folder, scenarios[-2:]) == (tmp_path, ["path-pd", "mine.toml"])
     assert command == ["auv-fmu", "report", "mine.toml", "--out", str(tmp_path)]
     assert capsys.readouterr().out == "a\nb\n"
-
-
-def test_a_file_that_is_not_there_is_said_in_a_line(tmp_path, capsys):
-    assert main(["report", str(tmp_path / "gone.toml"), "--out", str(tmp_path / "out")]) == 2
-    assert "gone.toml" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()

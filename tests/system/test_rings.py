@@ -22,6 +22,7 @@ from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from support.linear import QUARTER_TRUCK, SINE, TWO_MASSES, Model, Part, error, linear, system_of
 from support.runs import whole as run
+from support.texts import mentions
 
 H = 0.1
 
@@ -120,16 +121,14 @@ def test_of_two_solved_rings_neither_is_the_first(folder, names):
 def test_fmus_that_compute_outputs_in_steps_only_are_delayed_and_one_line_says_so(folder):
     system, table = ring(folder, 0.5, 0.9, cached=True, can=False), Table()
     ending = simulate(planned(system, Experiment(2.0, H)), [table])
-    assert ending.messages == (
-        "a takes b.y1 one step late: direct feedthroughs form a ring; no Real output of a "
-        "follows a Real input between steps",
-    )
+    [message] = ending.messages
+    assert mentions(message, "a b.y1 late: ring; Real")
     a = b = 0.0
     for k, sine in enumerate(np.sin(H * np.arange(20)), start=1):
         a = 0.5 * b + sine
         b = 0.9 * a
         assert table["a.y1"][k] == pytest.approx(a, abs=1e-13)
-    with pytest.raises(InputError, match=r"coupling solve: a takes b\.y1 one step late"):
+    with pytest.raises(InputError, match=r"solve: a .*b\.y1"):
         simulate(planned(system, Experiment(2.0, H, coupling="solve")))
 
 
@@ -137,8 +136,7 @@ def test_fmus_that_compute_outputs_in_steps_only_are_delayed_and_one_line_says_s
 @pytest.mark.parametrize("stop", [20.0, 200.0])
 def test_a_delayed_ring_that_grows_without_bound_ends_the_run(folder, k, stop):
     ending = simulate(planned(ring(folder, k, 1.0), Experiment(stop, H, coupling="delay")))
-    assert ending.failure is not None
-    assert "grows without bound" in ending.failure
+    assert "bound" in str(ending.failure)
 
 
 @pytest.mark.parametrize("growth", [0.0, 0.3, -0.3])
@@ -191,12 +189,12 @@ def test_linear_inputs_are_of_second_order_where_held_ones_are_of_first(
 
 def test_linear_inputs_are_refused_where_an_fmu_cannot_take_them(folder):
     system = ring(folder, 0.5, 0.9, can=False)
-    with pytest.raises(InputError, match=r"coupling linear: a cannot go back .*canInterpolateInp"):
+    with pytest.raises(InputError, match=r"linear: a .*canInterpolateInputs"):
         simulate(planned(system, Experiment(1.0, H, coupling="linear")))
     system = replace(ring(folder, 0.5, 0.9), steps={"b": 2 * H})
-    with pytest.raises(InputError, match="coupling linear: b: takes steps of its own"):
+    with pytest.raises(InputError, match="linear: b: "):
         simulate(planned(system, Experiment(1.0, H, coupling="linear")))
-    with pytest.raises(InputError, match="leave the order out"):
+    with pytest.raises(InputError, match="order"):
         Experiment(1.0, H, ("a", "b", "s"), coupling="linear")
-    with pytest.raises(InputError, match="coupling 'strong': use one of solve, delay, linear"):
+    with pytest.raises(InputError, match=r"'strong': .*solve, delay, linear"):
         Experiment(1.0, H, coupling="strong")

@@ -24,6 +24,7 @@ from orchestrator.studies.sweep import Means, faster
 from orchestrator.vehicle.indices import index_columns
 from support import others
 from support.machine import contents
+from support.texts import mentions, tells
 
 pytest.importorskip("numba", reason="needs the extra `studies`")
 
@@ -81,10 +82,7 @@ def test_option_that_makes_many_runs_sooner_is_named(scenario, kind, n, option, 
     runs = {"scenario": scenario, "vary": {"plant.eta0.y": {"from": 0, "to": 1, "n": n}}}
     space = Space(study_of("many", runs), {scenario: loaded(scenario, kind)})
     said = faster(space, FmuEngine(space.prepared), Means(kind=kind))
-    assert said.endswith(
-        f"{option} gives the same numbers in a fraction of the time" * bool(option)
-    )
-    assert said.startswith(f"{n:,} runs by FMUs of the {kind} kind; " * bool(option))
+    assert mentions(said, f"{n:,} {kind} {option}") if option else said == ""
     assert faster(space, BatchEngine({}), Means(kind=kind)) == ""
 
 
@@ -93,7 +91,9 @@ def test_command_makes_what_is_missing_and_nothing_twice(study, capfd):
     assert main(command) == 0
     folder = study.parent / "results" / "mine"
     out, err = capfd.readouterr()
-    assert out.splitlines() == ["mine: 8 runs, of which 0 failed", "written to results/mine/"]
+    first, second = out.splitlines()
+    assert tells(first, (8, 0)) and first.startswith("mine: ")
+    assert second.endswith(" results/mine/")
     assert err == ""
     before = files(folder)
     assert {"runs.parquet", "study.json"} < before.keys()

@@ -13,6 +13,7 @@ from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.formats.tables import read_rows
 from support.machine import contents
+from support.texts import mentions
 
 pytestmark = pytest.mark.usefixtures("workplace")
 
@@ -88,7 +89,7 @@ def test_somebody_elses_result_is_read_and_no_more(capsys):
     assert after.keys() - before.keys() == {"plot.png", "r/view.html"}
     assert mine.items() <= after.items()
     assert main(["run", "fig3a", "--stop-time", "0.2", "--no-figures", "--out", "r"]) == 2
-    assert "r/result.csv is not a file that auv-fmu wrote" in capsys.readouterr().err
+    assert "r/result.csv" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["result.csv", "result.parquet", "metrics.json", "run.json"])
@@ -97,10 +98,7 @@ def test_a_file_that_no_run_wrote_is_refused_before_the_first_step(name, capsys)
     os.chmod(f"r/{name}", 0o444)  # noqa: PTH101  # as the next line reads it
     assert main(RUN) == 2
     [line] = capsys.readouterr().err.splitlines()
-    assert line == (
-        f"auv-fmu: r/{name} is not a file that auv-fmu wrote, or was changed since: move it, "
-        "choose another place (--out), or let --force move it aside"
-    )
+    assert mentions(line, f"auv-fmu: r/{name} --out --force")
     assert contents(Path()) == mine
     assert main([*RUN, "--force"]) == 0
     assert Path(f"r/{name}.~1~").read_bytes() == mine[f"r/{name}"]

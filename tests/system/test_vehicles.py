@@ -13,6 +13,8 @@ from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.runs.wiring import read_wiring
 from orchestrator.system.names import PortName
+from orchestrator.system.structure import System
+from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.indices import INDICES, VEHICLES, index_columns
 from orchestrator.vehicle.proof import certificates, gain_check
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
@@ -91,9 +93,8 @@ def test_each_vehicle_has_the_numbers_that_it_has_alone(results, alone, name):
     assert apart == (results / "two" / certificates[1]).read_bytes()
 
 
-def test_names_of_components_may_have_dots():
-    """As those of nested systems have, of which several may have a plant."""
-    system = load("fig4", "native")
+def inner(system: System) -> System:
+    """The same with components named as in a nested system, of which several may have a plant."""
 
     def nested(port: PortName) -> PortName:
         return PortName(f"auv1.{port.component}", port.port)
@@ -107,13 +108,20 @@ def test_names_of_components_may_have_dots():
         for wire in system.connections
     )
     values = {nested(port): value for port, value in system.parameters.items()}
-    inner = replace(system, components=components, connections=connections, parameters=values)
-    [loop] = loops_of(inner)
+    return replace(system, components=components, connections=connections, parameters=values)
+
+
+def test_names_of_components_may_have_dots():
+    flat_system = load("fig4", "native")
+    system = inner(flat_system)
+    [loop] = loops_of(system)
     assert vars(loop) == {role: f"auv1.{name}" for role, name in vars(STANDARD).items()}
-    found, flat = (simulate(one, stop_time=1.0) for one in (inner, system))
+    found, flat = (simulate(one, stop_time=1.0) for one in (system, flat_system))
     for key in ("l2_effort", "peak_command", "final_error", "velocities_reaching_controller"):
         assert found.metrics()[key] == flat.metrics()[key]
     assert (certificates(found, loop) == certificates(flat)).all()
+    reaching = velocities_reaching(inner(load("fig5-pd", "native")), "auv1.controller")
+    assert reaching == [f"auv1.plant.dy.{axis}" for axis in "xyz"]
 
 
 def test_each_vehicle_is_drawn(results):

@@ -213,6 +213,7 @@ def test_killed_at_any_moment_the_folder_holds_the_old_result_or_the_new_one(tmp
     assert n > 20
 
 
+@pytest.mark.slow
 def test_killed_again_while_the_next_command_goes_on_with_it(tmp_path: Path):
     new, folder = tmp_path / "new", tmp_path / "r"
     write(new, "a.csv", "new.png")

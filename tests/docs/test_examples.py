@@ -1,0 +1,171 @@
+"""The examples of the guides run, and give what the guides say."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from importlib.util import find_spec
+from inspect import signature
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import orchestrator.studies.batch
+from orchestrator import simulate, sweep
+from orchestrator.commands.main import main
+from orchestrator.runs.loading import loaded
+from orchestrator.runs.scenario import read_scenario
+from orchestrator.studies.space import Space
+from orchestrator.studies.study import ready_studies
+from orchestrator.studies.study_file import read_figures, study_of
+from orchestrator.vehicle.indices import index_columns
+from orchestrator.vehicle.signals import true_control_point
+from support.machine import contents
+from support.markdown import DOCS, blocks
+
+pytestmark = pytest.mark.usefixtures("workplace")
+
+ACCURACY, BATCH, EVENTS, PYTHON, SCENARIOS, STUDIES = (
+    DOCS / f"{name}.md"
+    for name in ("accuracy", "batch", "events", "python", "scenarios", "studies")
+)
+
+
+def needs(extra: str, *packages: str) -> pytest.MarkDecorator:
+    missing = not all(map(find_spec, packages))
+    return pytest.mark.skipif(missing, reason=f"needs the extra `{extra}`")
+
+
+needs_studies = needs("studies", "numba", "pyarrow", "scipy")
+
+
+def executed(page: Path, capsys: pytest.CaptureFixture[str], number: int = 0) -> list[str]:
+    """What an example in Python prints."""
+    exec(compile(blocks(page, "python")[number].text, str(page), "exec"), {})
+    return str(capsys.readouterr().out).splitlines()
+
+
+@pytest.mark.parametrize(
+    ("page", "number"),
+    [(page, n) for page in (SCENARIOS, EVENTS) for n in range(len(blocks(page, "toml")))],
+    ids=lambda value: getattr(value, "stem", value),
+)
+def test_scenario_of_a_guide_runs_and_is_drawn(page: Path, number: int):
+    """What it says of its stop time holds, unless the command line says another."""
+    [table] = [text for _, text in blocks(EVENTS, "text") if text.startswith("time")]
+    Path("inputs.csv").write_text(table)
+    Path("survey.csv").write_text("x,y,z\n3,6,0\n15,6,4\n15,10,4\n")
+    Path("mine.toml").write_text(blocks(page, "toml")[number].text)
+    assert main(["run", "mine.toml", "--stop-time", "2", "--kind", "native"]) == 0
+    assert [*Path("results/mine").glob("mine*.png")]
+    assert json.loads(Path("results/mine/metrics.json").read_text())["stop_time"] == 2.0
+
+
+@pytest.mark.parametrize("name", ["fault-thruster", "fault-sensor", "current-step"])
+def test_what_a_scenario_says_stands_on_the_page(name):
+    text = " ".join(EVENTS.read_text(encoding="utf-8").split())
+    assert " ".join(read_scenario(name).remark.split()) in text
+
+
+def test_events_in_python_are_told(capsys):
+    assert executed(EVENTS, capsys) == [
+        "10.0 lose controller.tau.r",
+        "15.0 lose controller.tau.r, ended",
+        "20.0 set plant.current.x = 0.3",
+    ]
+
+
+@needs("parquet, and pandas", "pandas", "pyarrow")
+def test_examples_in_python_print_what_the_page_says(workplace, capsys):
+    names: dict[str, object] = {}
+    printed = ""
+    for language, text in blocks(PYTHON, "python", "text"):
+        if language == "text":
+            assert printed == text
+            continue
+        exec(compile(text, "docs/python.md", "exec"), names)
+        printed = capsys.readouterr().out
+    assert Path("commands.png").is_file()
+    files = contents(workplace / "results/mine").keys()
+    assert files == {"result.parquet", "metrics.json", "run.json"}
+
+
+def test_first_result_on_the_page_is_shown_as_it_is(capsys):
+    [shown] = executed(PYTHON, capsys)
+    assert f"`{shown}`" in PYTHON.read_text(encoding="utf-8")
+
+
+@needs("studies", "numba")
+def test_batch_engine_gives_what_the_fmus_give(capsys):
+    first, *lines = executed(BATCH, capsys)
+    result = simulate("fig5", {"controller.eps_t": 1.0}, stop_time=40.0, kind="native")
+    z, failure = first.split()
+    assert (float(z), failure) == (result["plant.eta.z"][-1], "None")
+    assert float(lines[-1].split()[0]) == result.metrics()["l2_effort"][0]
+    assert len(lines) == 3
+
+
+def test_modules_of_the_batch_engine_on_the_page_are_there():
+    listed = re.findall(r"^\| `(\w+)\.py` \|", BATCH.read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(listed) > 3
+    assert all(f":mod:`.{name}`" in str(orchestrator.studies.batch.__doc__) for name in listed)
+
+
+def test_page_of_studies_names_all_columns_options_and_ready_studies():
+    text = STUDIES.read_text(encoding="utf-8")
+    for name in index_columns():
+        assert f"`{name.split('.')[0].split('[')[0]}" in text, name
+    for name in (*signature(sweep).parameters.keys() - {"study", "progress"}, *ready_studies()):
+        assert f"--{name} " in text or f"`{name}`" in text, name
+
+
+@needs_studies
+def test_study_has_as_many_runs_as_the_page_says():
+    [example] = blocks(STUDIES, "toml")
+    study = study_of("mine", tomllib.loads(example.text))
+    space = Space(study, {name: loaded(name) for name in study.scenario})
+    assert len(space) == 8 * 2 * 64 * 2
+    assert read_figures("mine", study.figures, space.columns, space.has_scenarios)
+
+
+@needs_studies
+def test_study_in_python_has_the_columns_that_the_page_says(capsys):
+    first, second, *_ = executed(STUDIES, capsys)
+    assert first == "6 0 ['run', 'plant.eta0.y', 'controller.saturation', 'l2_effort.u']"
+    assert second == "[0. 0. 1. 1. 2. 2.] [None None None None None None]"
+
+
+QUIET = {"plant.noise.std": 0.0}
+RK4 = {**QUIET, "plant.integrator": "rk4"}
+
+
+def said_of_accuracy(*cells: str) -> list[str]:
+    """The rest of the first row of a table that begins with some cells, without its marks."""
+    begins = f"| {' | '.join(cells)} |"
+    lines = ACCURACY.read_text(encoding="utf-8").splitlines()
+    found = next(line for line in lines if line.startswith(begins))
+    return [cell.strip(" *") for cell in found.strip("|").split("|")[len(cells) :]]
+
+
+@pytest.mark.parametrize("name", ["fig4", "fig5-pd"])
+def test_paths_of_the_plants_schemes_are_as_far_apart_as_the_page_says(name):
+    """To the two digits of the page; of `rk4` that it is exact to less than a micrometre."""
+    euler, rk4, exact = (
+        true_control_point(simulate(name, values, kind="native"))
+        for values in (QUIET, RK4, {**RK4, "plant.h_max": 0.002})
+    )
+    said = said_of_accuracy(f"`{name}`")[0].split("; ")[0]
+    away = np.linalg.norm(euler - exact, axis=1).max()
+    assert away == pytest.approx(float(said.removesuffix(" cm")) / 100, rel=0.05)
+    assert np.linalg.norm(rk4 - exact, axis=1).max() < 1e-6
+
+
+def test_effort_of_the_pd_controller_belongs_to_the_plants_scheme_as_the_page_says():
+    said = said_of_accuracy("`fig5-pd`", "L2 q")
+    found = [
+        simulate("fig5-pd", values, kind="native").metrics()["l2_effort"][1]
+        for values in (QUIET, RK4)
+    ]
+    assert [f"{effort:.3g}" for effort in found] == [said[0], said[-1]] == ["166", "133"]
