@@ -43,8 +43,6 @@ class _Output(RawIOBase):
             is_there = False
         if not is_there:
             raise FileNotFoundError(f"{self._path} was moved or deleted while it was written")
-        if not self._is_open():
-            self._descriptor = self._opened()
 
     def fileno(self) -> int:
         """Its descriptor."""
@@ -60,6 +58,7 @@ class _Output(RawIOBase):
 
     def write(self, content: Any) -> int:
         """Write some of what there is to write."""
+        self._reopen()
         os.lseek(self._descriptor, self._at, os.SEEK_SET)
         n = os.write(self._descriptor, content)
         self._at += n
@@ -68,6 +67,7 @@ class _Output(RawIOBase):
     def truncate(self, size: int | None = None) -> int:
         """Cut it off."""
         self._at = self._at if size is None else size
+        self._reopen()
         os.ftruncate(self._descriptor, self._at)
         return self._at
 
@@ -77,6 +77,11 @@ class _Output(RawIOBase):
             super().close()
             if self._is_open():
                 os.close(self._descriptor)
+
+    def _reopen(self) -> None:
+        """Open it again if it was closed, by an FMU or by the owner of a file that an FMU closed."""
+        if not self._is_open():
+            self._descriptor = self._opened()
 
     def _opened(self, flags: int = 0) -> int:
         return os.open(self._path, os.O_WRONLY | getattr(os, "O_BINARY", 0) | flags, 0o666)
