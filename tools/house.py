@@ -1,4 +1,4 @@
-"""Print the house: every module with its first line, every room, and the names that occur twice.
+"""Print the house: modules with their first lines, rooms, odd sizes, and names that occur twice.
 
 `python tools/house.py --rooms` leaves the modules out.
 """
@@ -17,6 +17,28 @@ ROOT = Path(__file__).parents[1]
 
 #: The folders of the packages.
 PACKAGES = ("src/auv_fmu", "fmus", "orchestrator")
+
+#: The pages of the components.
+COMPONENTS = [page.relative_to(ROOT) for page in ROOT.glob("fmus/*/page.md")]
+
+#: How many lines a module has, unless there is a reason.
+SIZES = range(100, 401)
+
+#: Where a module is as long as its subject: one thing of the paper, or one component.
+BY_SUBJECT = ("src/auv_fmu", *(page.parent.as_posix() for page in COMPONENTS))
+
+#: Why others have another size.
+REASONS = {
+    "fmus/discovery.py": "all kinds and tests need it before they need the packaging",
+    "fmus/ports/controllers.py": "in the FMUs of controllers only",
+    "fmus/ports/quantities.py": "ports and groups need it, and it needs nothing",
+    "fmus/ports/vehicle.py": "in the FMUs of plant and planners only",
+    "fmus/python/own.py": "a program of its own: python -m fmus.python.own",
+    "orchestrator/commands/many_runs.py": "imports studies, which other commands must not wait for",
+    "orchestrator/commands/run_command.py": "must not import studies or the paper",
+    "orchestrator/commands/streams.py": "all commands need it before they import anything large",
+    "orchestrator/paper/claims.py": "a function for each claim of the paper",
+}
 
 
 class Module(NamedTuple):
@@ -55,6 +77,18 @@ def names_that_occur_twice() -> dict[str, list[str]]:
     return {name: found for name, found in places.items() if len(found) > 1}
 
 
+def odd_sizes() -> dict[str, int]:
+    """The modules that are shorter or longer than most, and how long they are."""
+    return {
+        module.path.as_posix(): module.lines
+        for package in PACKAGES
+        for module in modules(package)
+        if module.lines not in SIZES
+        and not module.path.name.startswith("__")
+        and not any(module.path.is_relative_to(folder) for folder in BY_SUBJECT)
+    }
+
+
 def main(arguments: Sequence[str]) -> None:
     """Print it."""
     house = [module for package in PACKAGES for module in modules(package)]
@@ -66,6 +100,8 @@ def main(arguments: Sequence[str]) -> None:
     for room, found in {**rooms, "all": house}.items():
         lines = [module.lines for module in found]
         print(f"{room:32} {len(found):4} modules {sum(lines):6} lines, median {median(lines):g}")
+    for name, lines in odd_sizes().items():
+        print(f"{name:40} {lines:4}  {REASONS.get(name, 'no reason')}")
     twice = names_that_occur_twice()
     for name, found in twice.items():
         print(f"{name}: {', '.join(found)}")
