@@ -24,15 +24,7 @@ from auv_fmu.attitude import (
     rotation_from_quaternion,
 )
 from auv_fmu.control_point import ELL, control_point, control_point_velocity
-from auv_fmu.vectors import (
-    Rotation,
-    Vector3,
-    Vector4,
-    Vector6,
-    difference,
-    plus_scaled,
-    total,
-)
+from auv_fmu.vectors import Rotation, Vector3, Vector4, Vector6, difference, plus_scaled, total
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 
 #: Initial posture of section 4.1: x, y, z [m], phi, theta, psi [rad]; it does not give phi.

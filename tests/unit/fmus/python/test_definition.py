@@ -1,17 +1,21 @@
-"""What a component defines, in one as small as can be: dx/dt = gain a, seen as b."""
+"""What a component defines, in one as small as can be, dx/dt = gain a, seen as b; and its class."""
 
 from __future__ import annotations
 
 from math import inf, nan
+from types import ModuleType
 from typing import NamedTuple, TypedDict
 
 import pytest
 from pythonfmu.enums import Fmi2Status
 
+from fmus.motion_planner import ports as of_a_planner
+from fmus.observer_controller import behaviour, ports
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, Port, Refusal, inputs, outputs, parameter
 from fmus.python import callbacks, component
 from fmus.python.component import Component
+from fmus.python.slave import slave_of
 from support.instances import answers_of, messages_of
 
 GAIN = parameter("gain", 1.0, "1", "Gain", 0.0, tunable=True)
@@ -347,3 +351,22 @@ def test_experiment_without_a_start_leaves_the_one_before(slave, start):
     assert answers_of(slave) == [Fmi2Status.error]
     slave.enter_initialization_mode()
     assert slave.get_real(C) == [2.0]
+
+
+def test_instances_share_one_class_that_is_named_like_the_component():
+    made = slave_of("ObserverController", ports, behaviour)
+    assert slave_of("ObserverController", ports, behaviour) is made
+    assert (made.__module__, made.__name__) == ("fmus.observer_controller", "ObserverController")
+
+
+def test_ports_of_another_component_are_refused():
+    with pytest.raises(TypeError, match="has the groups"):
+        slave_of("Mixed", of_a_planner, behaviour)
+
+
+def test_parameter_without_a_meaning_is_refused():
+    more = ModuleType("more")
+    vars(more).update(vars(ports))
+    more.PORTS = (*ports.PORTS, next(p for p in of_a_planner.PORTS if p.name == "m11"))
+    with pytest.raises(TypeError, match="Odd: not every parameter has a meaning, or a port"):
+        slave_of("Odd", more, behaviour)
