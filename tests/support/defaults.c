@@ -9,14 +9,14 @@ WEAK const char *fmi2GetTypesPlatform(void) { return "default"; }
 WEAK const char *fmi2GetVersion(void) { return "2.0"; }
 WEAK void fmi2FreeInstance(Component c) { free(c); }
 
-#define NOTHING(name) \
+#define IDLE(name) \
     WEAK Status name(void) { return OK; }
-NOTHING(fmi2SetDebugLogging)
-NOTHING(fmi2SetupExperiment)
-NOTHING(fmi2EnterInitializationMode)
-NOTHING(fmi2ExitInitializationMode)
-NOTHING(fmi2Terminate)
-NOTHING(fmi2Reset)
+IDLE(fmi2SetDebugLogging)
+IDLE(fmi2SetupExperiment)
+IDLE(fmi2EnterInitializationMode)
+IDLE(fmi2ExitInitializationMode)
+IDLE(fmi2Terminate)
+IDLE(fmi2Reset)
 
 #define ABSENT(name) \
     WEAK Status name(void) { return Error; }

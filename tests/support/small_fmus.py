@@ -73,7 +73,7 @@ def description(
     """A modelDescription.xml.
 
     Args:
-        identifier: of the model, and its name and GUID.
+        identifier: of the model, its GUID, and, capitalised, its name.
         variables: made by :func:`variable`.
         unknowns: made by :func:`unknown`; none: the structure does not even name the outputs.
         attributes: of the element CoSimulation.
@@ -85,7 +85,7 @@ def description(
     outputs = f"<Outputs>{listed}</Outputs>" if listed else ""
     return (
         '<?xml version="1.0" encoding="UTF-8"?><fmiModelDescription fmiVersion="2.0" '
-        f'modelName="{identifier}" guid="{identifier}">'
+        f'modelName="{identifier.capitalize()}" guid="{identifier}">'
         f'<CoSimulation modelIdentifier="{identifier}" '
         f"{attributes}/>{definitions}{experiment}<ModelVariables>\n{''.join(variables)}"
         f"</ModelVariables><ModelStructure>{outputs}</ModelStructure></fmiModelDescription>"

@@ -17,27 +17,30 @@ from orchestrator.master.fmi import binary
 from support.relay import relay
 
 SUPPORT = Path(__file__).parents[1] / "support"
-SOURCE = (SUPPORT / "relay.c").read_text(encoding="utf-8")
-HEADER = (SUPPORT / "slave.h").read_text(encoding="utf-8")
+SOURCE, DEFAULTS, HEADER = (
+    (SUPPORT / name).read_text(encoding="utf-8") for name in ("relay.c", "defaults.c", "slave.h")
+)
+TOGETHER = {"relay.c": SOURCE, "defaults.c": DEFAULTS, "slave.h": HEADER}
 
 BUILD = """<fmiBuildDescription fmiVersion="3.0">
 <BuildConfiguration modelIdentifier="other"><SourceFileSet><SourceFile name="none.c"/>
 </SourceFileSet></BuildConfiguration>
 <BuildConfiguration modelIdentifier="relay"><SourceFileSet language="C99">
-<SourceFile name="own/relay.c"/><PreprocessorDefinition name="NOTHING" value=""/>
+<SourceFile name="own/relay.c"/><SourceFile name="own/defaults.c"/>
+<PreprocessorDefinition name="NOTHING" value=""/>
 <IncludeDirectory name="headers"/></SourceFileSet></BuildConfiguration></fmiBuildDescription>
 """
 
 #: Sources as FMUs have them: all of a folder, those that a list names, or a list of FMI 3.0's kind.
 WAYS = {
-    "all": ({"relay.c": SOURCE, "slave.h": HEADER}, ""),
+    "all": (TOGETHER, ""),
     "named": (
-        {"relay.c": SOURCE, "slave.h": HEADER, "example.c": "int main(void) { broken }"},
-        '<SourceFiles><File name="relay.c"/></SourceFiles>',
+        {**TOGETHER, "example.c": "int main(void) { broken }"},
+        '<SourceFiles><File name="relay.c"/><File name="defaults.c"/></SourceFiles>',
     ),
     "described": (
-        {"buildDescription.xml": BUILD, "own/relay.c": SOURCE, "headers/slave.h": HEADER,
-         "example.c": "broken"},
+        {"buildDescription.xml": BUILD, "own/relay.c": SOURCE, "own/defaults.c": DEFAULTS,
+         "headers/slave.h": HEADER, "example.c": "broken"},
         "",
     ),
 }  # fmt: skip
