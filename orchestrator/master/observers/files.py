@@ -79,7 +79,7 @@ class _Output(RawIOBase):
                 os.close(self._descriptor)
 
     def _reopen(self) -> None:
-        """Open it again if it was closed, by an FMU or by the owner of a file that an FMU closed."""
+        """Open it again if an FMU has closed it, or the owner of a file that an FMU has closed."""
         if not self._is_open():
             self._descriptor = self._opened()
 
