@@ -9,6 +9,7 @@ import struct
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -95,7 +96,9 @@ def run_compiler(
             said, complaints = process.communicate(timeout=limit)
         except BaseException as error:
             if os.name == "posix":
-                os.killpg(process.pid, signal.SIGKILL)
+                # After Ctrl-C, Python has waited for it, and it may have ended.
+                with suppress(ProcessLookupError):
+                    os.killpg(process.pid, signal.SIGKILL)
             process.kill()
             if isinstance(error, subprocess.TimeoutExpired):
                 raise TimeoutError(f"{command[0]} has not ended after {limit:g} s") from None

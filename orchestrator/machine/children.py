@@ -13,6 +13,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -150,7 +151,9 @@ def run_compiler(command: Sequence[str], limit: float | None = None) -> Complete
             said, complaints = process.communicate(timeout=limit)
         except BaseException as error:
             if os.name == "posix":
-                os.killpg(process.pid, signal.SIGKILL)
+                # After Ctrl-C, Python has waited for it, and it may have ended.
+                with suppress(ProcessLookupError):
+                    os.killpg(process.pid, signal.SIGKILL)
             process.kill()
             if isinstance(error, TimeoutExpired):
                 raise TimeoutError(f"{command[0]} has not ended after {limit:g} s") from None

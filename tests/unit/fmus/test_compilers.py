@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
+import sys
+import threading
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -14,6 +18,7 @@ from fmus import compilers
 from fmus.compilers import compiler_for, library, universal
 from fmus.kinds import platforms
 from fmus.python import packaging
+from orchestrator.machine import children
 from orchestrator.machine.children import COMPILERS, machines_compiler
 from support.tiers import slow
 
@@ -91,6 +96,17 @@ def test_any_one_compiler_will_do(name, tmp_path, monkeypatch):
     assert library(compiler_for([own]), own, "Answer", SOURCES, "main.c")
     packaging.compiled_loader.cache_clear()
     assert b"fmi2DoStep" in packaging.compiled_loader()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are sent as POSIX has them")
+@pytest.mark.parametrize(
+    "run", [partial(compilers.run_compiler, folder=None), children.run_compiler]
+)
+def test_an_interrupt_stays_one_though_the_compiler_has_ended(run):
+    """Python waits a quarter of a second for it, in which it ends."""
+    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        run([sys.executable, "-c", "import time; time.sleep(0.6)"])
 
 
 def test_machine_without_a_compiler(machine: pytest.MonkeyPatch):
