@@ -109,7 +109,7 @@ def test_batch_engine_gives_what_the_fmus_give(capsys):
 
 def test_modules_of_the_batch_engine_on_the_page_are_there():
     listed = re.findall(r"^\| `(\w+)\.py` \|", BATCH.read_text(encoding="utf-8"), re.MULTILINE)
-    assert len(listed) > 3
+    assert listed
     assert all(f":mod:`.{name}`" in str(orchestrator.studies.batch.__doc__) for name in listed)
 
 
