@@ -54,6 +54,7 @@ def final_error(folder: Path) -> list[float]:
     return error
 
 
+@pytest.mark.slow
 def test_law_of_the_guide_follows_the_reference(followed: Path):
     """Within 6 cm, as the page says; the gain alone, made five times softer, misses that."""
     assert max(final_error(followed / "my_law/results")) < 0.06
@@ -171,6 +172,7 @@ def test_changed_script_runs_changed_in_the_same_process(workplace):
     assert forces[0] == -forces[1] != 0.0
 
 
+@pytest.mark.slow
 def test_many_instances_of_a_plain_slave_in_one_process(workplace):
     """PythonFMU alone crashes the process after some dozens."""
     assert main(["new", "controller", "Often", "."]) == 0

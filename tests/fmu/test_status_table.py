@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from functools import cache
-from itertools import product
+from itertools import cycle, product
 from pathlib import Path
 
 import fmpy
@@ -66,6 +66,9 @@ def unpacked(fmus: Path, folder: Path, *names: str) -> list[Path]:
     return [Path(fmpy.extract(fmus / f"{name}.fmu", folder / name)) for name in names]
 
 
+#: What stands for the others in the fast tests: every kind, and every one of the representatives.
+FAST = set(zip((*FIXTURES, FMI3), cycle(REPRESENTATIVES), strict=False))
+
 #: Kinds, components, and the cells that they have.
 ALL = [
     pytest.param(
@@ -73,7 +76,7 @@ ALL = [
         name,
         cell,
         id=f"{kind}-{name}-{cell}",
-        marks=() if name in REPRESENTATIVES else pytest.mark.slow,
+        marks=() if (kind, name) in FAST else pytest.mark.slow,
     )
     for kind, name in [*product(FIXTURES, NAMES), *product([FMI3], REPRESENTATIVES)]
     for cell, (key, state) in (OF_BOTH_VERSIONS if kind == FMI3 else CELLS).items()

@@ -19,8 +19,9 @@ from orchestrator.master.observers.observer import Ending
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.system.structure import System
 from support import others
-from support.machine import LOOPS, contents, ended, eventually, forked, killed_at, start
+from support.machine import contents, ended, eventually, forked, killed_at, start
 from support.texts import mentions
+from support.tiers import slow
 
 pytestmark = pytest.mark.usefixtures("workplace")
 
@@ -214,7 +215,7 @@ def test_killed_at_any_time_by_the_kernel():
     assert result("killed") == result("whole")
 
 
-@pytest.mark.parametrize("loop", LOOPS)
+@pytest.mark.parametrize("loop", ["compiled", *slow("python")])
 def test_a_signal_leaves_the_rows_and_the_checkpoint(loop, capsys):
     arguments = ["fig4", "--no-figures", "--stop-time", "3", *CHECKPOINTS, "--loop", loop]
     assert run(*arguments, out="whole") == 0

@@ -18,6 +18,7 @@ from orchestrator.runs import bundle
 from orchestrator.runs.scenario import FOLDER as SCENARIOS
 from orchestrator.runs.scenario import names, read_scenario
 from support.texts import mentions, tells
+from support.tiers import slow
 
 
 def files(folder: Path) -> set[str]:
@@ -26,7 +27,10 @@ def files(folder: Path) -> set[str]:
 
 @pytest.mark.parametrize(
     ("name", "content"),
-    [("build.json", '{"fingerprint": "1"}'), ("build.json", "[]"), ("AuvPlant.fmu", "cut short")],
+    [
+        ("AuvPlant.fmu", "cut short"),
+        *slow(("build.json", '{"fingerprint": "1"}'), ("build.json", "[]")),
+    ],
 )
 def test_build_replaces_what_is_not_what_was_built(dist, workplace, refused, capsys, name, content):
     """Where it may; and what is as it was built is not written again."""
@@ -134,7 +138,7 @@ def test_own_component_takes_the_place_of_another(dist, workplace):
     assert "controller.y_hat.x" not in header
 
 
-@pytest.mark.parametrize("name", ["fig3a", "fig3b", "fig6"])
+@pytest.mark.parametrize("name", ["fig3a", *slow("fig3b", "fig6")])
 def test_figures_of_other_kinds_are_drawn(workplace, name):
     assert main(["run", name, "--stop-time", "1"]) == 0
     assert {f"{name}.png", f"{name}.svg"} <= files(workplace / "results" / name)
@@ -184,6 +188,7 @@ def test_every_scenario_is_exported_and_runs_from_its_ssp(workplace, scenario):
     assert exported == direct
 
 
+@pytest.mark.slow
 def test_animation_of_a_failed_run_says_so(workplace, capsys):
     arguments = ["animate", "fig4", "--set", "plant.d11=1e4", "--out", "failed.gif"]
     assert main(arguments) == 1

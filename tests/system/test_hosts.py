@@ -20,6 +20,7 @@ from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+from support.tiers import slow
 
 LIBDIR = sysconfig.get_config_var("LIBDIR")
 
@@ -33,7 +34,7 @@ def check(system: System, host: str, steps: int) -> None:
     assert verdict.deviation <= HOSTS[host].bound
 
 
-@pytest.mark.parametrize("scenario", ["fig4", "fig5-pd"])
+@pytest.mark.parametrize("scenario", ["fig4", *slow("fig5-pd")])
 @pytest.mark.parametrize("host", HOSTS)
 def test_host_gives_the_numbers_of_our_jacobi_master(dist: Path, host: str, scenario: str):
     """Every Real output over 500 steps, to 1e-9; fmpy.ssp ignores parameters, so fig4 only."""
@@ -44,7 +45,7 @@ def test_host_gives_the_numbers_of_our_jacobi_master(dist: Path, host: str, scen
     check(closed_loop(dist, read_scenario(scenario)), host, 500)
 
 
-@pytest.mark.parametrize("host", ["libcosim-ssp", "ecos"])
+@pytest.mark.parametrize("host", ["libcosim-ssp", *slow("ecos")])
 def test_text_in_a_parameter_set_reaches_its_component_without_a_connector(dist: Path, host: str):
     """The other saturation moves the vehicle by 19 cm in these steps."""
     system = closed_loop(dist).with_parameters({PortName("controller", "saturation"): "algebraic"})
@@ -52,7 +53,7 @@ def test_text_in_a_parameter_set_reaches_its_component_without_a_connector(dist:
     check(system, host, 300)
 
 
-@pytest.mark.parametrize("host", ["libcosim-ssp", "libcosim-osp"])
+@pytest.mark.parametrize("host", slow("libcosim-ssp", "libcosim-osp"))
 def test_longer_steps_of_components_are_those_of_libcosim(dist: Path, host: str):
     system = replace(closed_loop(dist), steps={"controller": 0.06, "disturbance": 0.04})
     check(system, host, 300)

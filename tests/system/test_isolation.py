@@ -119,7 +119,7 @@ def test_a_foreign_fmu_that_behaves_runs_to_the_end(c_fmu: Path):
         ("CLOSES_ALL", "0 doStep"),
         ("ANSWERS_ITSELF", "process"),
         ("HANGS", "doStep 1"),
-        ("SPINS", "doStep 1"),
+        *slow(("SPINS", "doStep 1")),
     ],
 )
 def test_what_an_isolated_fmu_does_ends_the_run_in_one_line(c_fmu, mark, act, words):
@@ -155,7 +155,10 @@ def test_an_fmu_that_cannot_be_instantiated_is_bad_input(c_fmu, monkeypatch, iso
 @pytest.mark.parametrize("phase", ["ENTER", "EXIT"])
 @pytest.mark.parametrize(
     ("act", "words"),
-    [("CRASHES", "SIGSEGV .* in {call}"), ("HANGS", "{call} has not ended"), ("FATAL", "beyond")],
+    [
+        ("CRASHES", "SIGSEGV .* in {call}"),
+        *slow(("HANGS", "{call} has not ended"), ("FATAL", "beyond")),
+    ],
 )
 def test_an_isolated_fmu_that_fails_before_its_first_step(c_fmu, mark, phase, act, words):
     call = f"{phase.lower()}_initialization"
@@ -165,7 +168,7 @@ def test_an_isolated_fmu_that_fails_before_its_first_step(c_fmu, mark, phase, ac
 
 
 @pytest.mark.parametrize("phase", ["TERMINATE", "FREE"])
-@pytest.mark.parametrize("act", ["CRASHES", "HANGS"])
+@pytest.mark.parametrize("act", ["CRASHES", *slow("HANGS")])
 def test_an_isolated_fmu_that_fails_at_the_end_loses_nothing(c_fmu, mark, phase, act):
     table = run_isolated(foreign_system(c_fmu, act, phase), timeout=1.0)
     assert table.failure is None
@@ -189,6 +192,7 @@ def test_a_value_that_is_not_finite_is_named_with_its_time(c_fmu, act, value, is
         run_table(foreign_system(c_fmu, act, "ENTER"), SHORT, isolation=isolation)
 
 
+@pytest.mark.slow
 def test_what_is_written_and_said_is_kept_within_bounds(c_fmu, capfd):
     """And none of it speaks to the terminal."""
     assert run_isolated(foreign_system(c_fmu, "WRITES", at=0.46)).failure is None

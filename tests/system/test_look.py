@@ -83,6 +83,7 @@ def test_view_stands_by_itself_and_is_light(results, capsys):
     assert re.search(r'Content-Security-Policy" content="default-src .none.;', text)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium")
 def test_view_plays_in_a_browser(results, tmp_path):
     """Opened with #play, time moves on; nothing is said on the console."""

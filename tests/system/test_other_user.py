@@ -22,9 +22,12 @@ from support.machine import called
 from support.texts import mentions
 from support.toy_engine import Toy, outcome, run
 
-pytestmark = pytest.mark.skipif(
-    os.geteuid() != 0 or shutil.which("useradd") is None, reason="only root makes users"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        os.geteuid() != 0 or shutil.which("useradd") is None, reason="only root makes users"
+    ),
+]
 
 #: A library that leaves a mark when it is loaded.
 LIBRARY = """

@@ -21,6 +21,8 @@ from orchestrator.studies.study import ready_studies
 from orchestrator.vehicle.proof import gain_check
 from support.variants import found, planted
 
+pytestmark = pytest.mark.slow
+
 STRANGER = """\
 title = "Mine | <b>own</b>"
 figure = "comparison-errors"

@@ -18,13 +18,14 @@ from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import FmuEngine
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import BATCH, ENGINES
+from orchestrator.studies.study import BATCH, FMU
 from orchestrator.studies.study_file import read_study, study_of
 from orchestrator.studies.sweep import Means, faster
 from orchestrator.vehicle.indices import index_columns
 from support import others
 from support.machine import contents
 from support.texts import mentions, tells
+from support.tiers import slow
 
 pytest.importorskip("numba", reason="needs the extra `studies`")
 
@@ -153,7 +154,7 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", [FMU, *slow(BATCH)])
 def test_another_scenario_of_the_same_name_is_another_study(workplace, capfd, engine):
     """Nothing that decides the numbers may change between two rows."""
     (workplace / "mine.toml").write_text(OWN.format(engine))
