@@ -5,6 +5,7 @@ import pytest
 sp = pytest.importorskip("sympy", reason="sympy is in the extra test")
 
 
+@pytest.mark.slow
 def test_15_needs_one_more_term():
     """J^T times (15), at the acceleration that (1) and (2) give, less tau_a.
 

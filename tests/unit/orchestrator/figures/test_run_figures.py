@@ -148,6 +148,7 @@ def test_nothing_is_drawn_when_it_is_to_stop(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_same_run_is_the_same_file(tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()

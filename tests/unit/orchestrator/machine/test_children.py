@@ -30,7 +30,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     return figures(folder)
 
 
-@pytest.mark.parametrize("content", [RC[0], *slow(RC[1], None)])
+@pytest.mark.parametrize("content", slow(*RC, None))
 def test_figures_are_the_same_whatever_a_matplotlibrc_says(workplace, plain, content):
     if content is None:
         os.mkfifo("matplotlibrc")

@@ -125,6 +125,7 @@ def test_no_link_is_written_through(tmp_path: Path):
     assert (tmp_path / "r" / "a").read_text() == "ours"
 
 
+@pytest.mark.slow
 def test_no_bit_of_a_ledger_is_changed_unseen(tmp_path: Path):
     write(tmp_path, "ours", "a")
     text = (tmp_path / LEDGER).read_bytes()

@@ -138,6 +138,7 @@ def test_a_compiler_that_hangs_is_ended_with_what_it_has_started(tmp_path, monke
 
 
 @needs_compiler
+@pytest.mark.slow
 def test_processes_that_compile_at_once_do_so_once(tmp_path, cache):
     (tmp_path / "cc").write_text(
         f'#!/bin/sh\necho compiled >> {tmp_path}/log\nexec {shutil.which("cc")} "$@"\n'

@@ -26,6 +26,7 @@ def test_every_run_is_made_once_by_processes_that_stay_silent(capfd):
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_runs_are_taken_as_they_are_needed():
     """A study of any number of runs has a bounded number of them under way."""
     taken = count()
@@ -104,6 +105,7 @@ def test_script_without_a_guard_is_told_what_it_needs(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["x" * 150, "a:b [c] %41"])
+@pytest.mark.slow
 def test_temporary_folders_have_any_name(tmp_path, monkeypatch, name):
     folder = tmp_path / name
     folder.mkdir()
