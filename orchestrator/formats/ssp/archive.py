@@ -1,9 +1,7 @@
 """An SSP archive or its folder while it is read: its files, and what is found wrong with it.
 
-Files are read leniently, and held against the schemas. fmpy.ssp is no such reader: it looks for
-transformations in the wrong namespace, passes over parameter mappings, units and annotations, does
-not decode the addresses of files, and reads a file only if it is valid to the letter. What is
-harmless is a note here.
+Files are read leniently, and held against the schemas: what is harmless is a note. fmpy.ssp reads
+a file only if it is valid to the letter, and does not decode the addresses of files.
 """
 
 from __future__ import annotations
