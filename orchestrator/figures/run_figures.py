@@ -40,14 +40,7 @@ from orchestrator.figures.style import (
 from orchestrator.figures.visible import draw_signal
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.master.observers.table import Table
-from orchestrator.vehicle.signals import (
-    AXES,
-    STANDARD,
-    Loop,
-    Needs,
-    suffixes,
-    true_control_point,
-)
+from orchestrator.vehicle.signals import AXES, STANDARD, Loop, Needs, suffixes, true_control_point
 
 
 def _all_errors(cell: Cell, runs: Sequence[Drawn]) -> None:

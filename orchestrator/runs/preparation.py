@@ -9,13 +9,7 @@ from pathlib import Path
 
 from auv_fmu.euler import STEP
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.master.experiment import (
-    GAUSS_SEIDEL,
-    ORDERS,
-    SOLVE,
-    Experiment,
-    with_common_step,
-)
+from orchestrator.master.experiment import GAUSS_SEIDEL, ORDERS, SOLVE, Experiment, with_common_step
 from orchestrator.master.fmi.isolated import Isolation, isolation_of
 from orchestrator.master.hooks.events import Alter, Event, Events, Set
 from orchestrator.master.hooks.hook import Hook

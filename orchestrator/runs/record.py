@@ -25,11 +25,7 @@ from orchestrator.machine.ledger import RECORD, is_changed, located
 from orchestrator.machine.user_files import explained, text_of
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.binary import runs_python
-from orchestrator.master.hooks.checkpoint import (
-    Checkpoints,
-    check_gives_states,
-    interval_in,
-)
+from orchestrator.master.hooks.checkpoint import Checkpoints, check_gives_states, interval_in
 from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.master.plan import PACKAGES, digest_of

@@ -15,12 +15,7 @@ from support.calls import MANY
 from support.cells import check, company_of
 from support.fmi3 import Fmi3Library
 from support.raw import MODEL_EXCHANGE, Host, Library, Status, harmless, instance
-from support.status_table import (
-    CREATION,
-    WITHOUT_AN_INSTANCE,
-    creations,
-    without_an_instance,
-)
+from support.status_table import CREATION, WITHOUT_AN_INSTANCE, creations, without_an_instance
 
 #: Beside the kinds: FMUs in C of FMI 3.0, behind the functions of FMI 2.0.
 FMI3 = "FMI 3.0"

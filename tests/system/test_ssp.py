@@ -10,15 +10,7 @@ import pytest
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
-from support.archives import (
-    archive,
-    binding,
-    component,
-    connection,
-    connector,
-    described,
-    system,
-)
+from support.archives import archive, binding, component, connection, connector, described, system
 from support.relay import relay
 
 #: When the run begins and ends, and its step [s].

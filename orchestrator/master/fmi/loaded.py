@@ -41,13 +41,7 @@ from fmpy.model_description import ModelVariable
 
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.fmi.binary import Library, library_of, named
-from orchestrator.master.fmi.instance import (
-    DO_STEP,
-    ComponentFailed,
-    Ended,
-    Listener,
-    Part,
-)
+from orchestrator.master.fmi.instance import DO_STEP, ComponentFailed, Ended, Listener, Part
 from orchestrator.master.fmi.surroundings import put_back
 from orchestrator.master.fmi.transfer import CMember, CMove, PortBlock, text_of
 from orchestrator.system.component import Component

@@ -8,12 +8,7 @@ from types import SimpleNamespace
 import pytest
 from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
 
-from orchestrator.master.schedule import (
-    Decimation,
-    Member,
-    StageCall,
-    step,
-)
+from orchestrator.master.schedule import Decimation, Member, StageCall, step
 
 
 def test_a_slow_component_is_stepped_at_the_beginning_and_shown_at_the_end():
