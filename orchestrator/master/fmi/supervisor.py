@@ -47,8 +47,8 @@ _BEGIN = """
 import json, sys
 order = json.loads(sys.stdin.buffer.raw.readline())
 sys.path[:] = order["path"]
-from orchestrator.master.fmi.supervisor import keep
-keep(order)
+from orchestrator.master.fmi.supervisor import supervise
+supervise(order)
 """
 
 
@@ -128,7 +128,7 @@ class Supervisor:
             self._process.stdin.write(text)
 
 
-def keep(order: dict[str, Any]) -> None:
+def supervise(order: dict[str, Any]) -> None:
     """Run each component in a process, until all have ended or their run has.
 
     Reads :data:`_END` from the standard input, and writes a line with the number of a component
