@@ -1,7 +1,8 @@
-"""Child processes, which do not outlive this one: Python's modules, and C compilers.
+"""Child processes that do not outlive this one: modules of Python, and C compilers.
 
-As a module it is what runs in the process of another one, and never from the current folder:
-`python -m orchestrator.machine.children MODULE ...`.
+Run as a module, `python -m orchestrator.machine.children MODULE ...`, it is the child: it runs
+another module, and ends with its parent. Nothing here takes code or settings from the current
+folder, which may be someone else's.
 """
 
 from __future__ import annotations
@@ -89,12 +90,6 @@ def run_module(
         os.close(end_of_ours)
 
 
-def _follow() -> None:
-    """End with the process that has started this one."""
-    os.read(sys.stdin.fileno(), 1)
-    os._exit(1)
-
-
 def compiler() -> Compiler | None:
     """A C compiler: this machine's, or else the package ziglang's; None: there is none."""
     if found := of_the_machine():
@@ -111,7 +106,7 @@ def of_the_machine() -> Compiler | None:
 
 
 def machines_compiler() -> str | None:
-    """Its command."""
+    """The command of this machine's C compiler; None: it has none."""
     return next(filter(None, map(shutil.which, COMPILERS)), None)
 
 
@@ -159,6 +154,12 @@ def run_compiler(command: Sequence[str], limit: float | None = None) -> Complete
                 raise TimeoutError(f"{command[0]} has not ended after {limit:g} s") from None
             raise
     return CompletedProcess(command, process.returncode, said, complaints)
+
+
+def _follow() -> None:
+    """End with the process that has started this one."""
+    os.read(sys.stdin.fileno(), 1)
+    os._exit(1)
 
 
 if __name__ == "__main__":
