@@ -1,1 +1,1 @@
-"""The command line: a file a group of commands, `main` calls them."""
+"""The command line: a file for each group of commands; `main` calls them."""

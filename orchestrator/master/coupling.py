@@ -8,14 +8,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from orchestrator.machine.errors import InputError, StartError, shortened
-from orchestrator.master.experiment import (
-    DELAY,
-    GAUSS_SEIDEL,
-    LINEAR,
-    OURS,
-    SOLVE,
-    Exchange,
-)
+from orchestrator.master.experiment import DELAY, GAUSS_SEIDEL, LINEAR, OURS, SOLVE, Exchange, Order
 from orchestrator.master.fmi.instance import ComponentFailed, Instance, Log
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.plan import Plan, delays, stages
@@ -316,7 +309,7 @@ class Coupling:
     def _ring(self, names: Sequence[str]) -> Ring:
         return Ring(names, self._system, self._instances, self._row)
 
-    def _in_stages(self, order: str | Sequence[str], solved: Sequence[Ring]) -> list[list[str]]:
+    def _in_stages(self, order: Order, solved: Sequence[Ring]) -> list[list[str]]:
         if self._exchange.latest and not isinstance(order, str):
             return [[name] for name in order]
         return stages(self._system, order, [ring.names for ring in solved])

@@ -29,6 +29,9 @@ ROUNDING, _MOST_OF_A_STEP = 1e-9, 1e-3
 #: More steps than this are taken for a mistake.
 MOST_STEPS = 1_000_000_000
 
+#: So many times a common measure of steps may go into the smallest of them.
+_MOST_PARTS = 1000
+
 
 def order_of(text: str) -> Order:
     """An order as a command line has it: one of :data:`ORDERS`, or names with commas."""
@@ -175,10 +178,6 @@ def _rounded(n: float) -> float:
     """A number of steps; a whole number where it is one apart from rounding."""
     nearest = round(n)
     return nearest if abs(n - nearest) <= min(ROUNDING * nearest, _MOST_OF_A_STEP) else n
-
-
-#: So many times a common measure of steps may go into the smallest of them.
-_MOST_PARTS = 1000
 
 
 def decimations(system: System, step: float) -> dict[str, int]:

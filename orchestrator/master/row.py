@@ -20,6 +20,9 @@ from orchestrator.system.values import StringTable, Value
 #: A change so small, or so small a share of the value, is a rounding error.
 _ROUNDING = 1e-12
 
+#: Times one, plus minus zero: every number stays what it is, minus zero, too.
+FACTOR, OFFSET = 1.0, -0.0
+
 
 class Row:
     """All inputs and outputs of a system side by side, as floats.
@@ -173,10 +176,6 @@ def _hides(component: str, causality: str, hidden: Collection[str]) -> bool:
 
 def _ports(component: Component, causality: str, fmi_type: str) -> list[ModelVariable]:
     return [variable for variable in component.having(causality) if variable.type == fmi_type]
-
-
-#: Times one, plus minus zero: every number stays what it is, minus zero, too.
-FACTOR, OFFSET = 1.0, -0.0
 
 
 class Gathering:

@@ -15,6 +15,9 @@ from orchestrator.system.values import unit_of
 #: Values of a mapping that is made of several.
 _MOST_PAIRS = 1000
 
+#: The base units of FMI 2.0 and SSP 1.0, in the order of :attr:`Unit.exponents`.
+BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+
 
 @dataclass(frozen=True)
 class Linear:
@@ -78,10 +81,6 @@ def chained(first: Transformation | None, then: Transformation | None) -> Transf
         passed = ((source, before.get(source, source)) for source in sources)
         return Mapped(tuple((source, after.get(value, value)) for source, value in passed))
     raise InputError("a linear transformation and a mapping of single values follow each other")
-
-
-#: The base units of FMI 2.0 and SSP 1.0, in the order of :attr:`Unit.exponents`.
-BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,10 @@ FMI2_NAMES = {"Float64": "Real", "Int32": "Integer"}
 #: An FMU may keep a value in another unit, and round it by such a share.
 _ROUNDING = 1e-9
 
+#: Truth values, as XML writes them.
 BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
+
+#: Types in words.
 _KINDS = {
     "Real": "a real number",
     "Boolean": "a Boolean (true or false)",

@@ -17,6 +17,12 @@ from orchestrator.system.values import StringTable, Value
 #: What a component is asked for in every step, one after the other.
 CALLS = SET_INPUTS, DO_STEP, GET_OUTPUTS = "setting inputs", "fmi2DoStep", "getting outputs"
 
+#: Messages that are kept: an FMU may have something to say in every step.
+_MOST_MESSAGES = 100
+
+#: Letters of a message on its way from another process.
+_LONGEST_LETTER = 10_000
+
 
 class ComponentFailed(Exception):
     """A component did not do what it was asked for; the text names it and says why.
@@ -52,7 +58,7 @@ class Part(NamedTuple):
 
     Attributes:
         causality: `input` or `output`.
-        fmi_type: one of :data:`orchestrator.master.fmi.transfer.FMI_TYPES`.
+        fmi_type: one of :data:`.transfer.FMI_TYPES`.
         references: value references.
         place: of their values among the component's.
 
@@ -162,13 +168,6 @@ class Instance(Protocol):
 
     def terminate(self) -> None:
         """Let the FMU end what it has begun."""
-
-
-#: Messages that are kept: an FMU may have something to say in every step.
-_MOST_MESSAGES = 100
-
-#: Letters of a message on its way from another process.
-_LONGEST_LETTER = 10_000
 
 
 class Listener(Protocol):

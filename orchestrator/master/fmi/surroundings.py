@@ -22,6 +22,9 @@ A, B, C, PRODUCT = 1e-308, 0.1, 1e300, 1.000000000000002e-09
 #: More bytes than any machine needs for its mode.
 _SIZE = 1024
 
+#: Modules that FMUs in Python share with this program; what they add to them is theirs.
+_MODULES = (builtins, json, os, np)
+
 
 def _functions() -> Iterator[Callable[..., object]]:
     """C's functions: to take on the default mode, and to get and to set one."""
@@ -56,10 +59,6 @@ def default_mode() -> Iterator[None]:
         yield
     finally:
         _set(before)
-
-
-#: Modules that FMUs in Python share with this program; what they add to them is theirs.
-_MODULES = (builtins, json, os, np)
 
 
 class Surroundings:

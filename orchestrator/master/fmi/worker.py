@@ -2,8 +2,8 @@
 
 A message is a frame of numbers, whose size both sides know, and a note, which is JSON, with bytes
 in base64; the first number of the frame is the note's length. In a step there is nothing to note,
-so that a message is one write and one read. Numbers and JSON are all that is read: whoever runs an
-FMU cannot be made to run anything else by its process.
+so that a message is one write and one read. Numbers and JSON are all that is read: the process of
+an FMU cannot make the other one run anything.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ def serve(name: str, fmu: Path, digest: str, folder: Path, connection: socket.so
         fmu: the file, for messages.
         digest: of it.
         folder: into which it is unpacked.
-        connection: to whom wants it simulated.
+        connection: to the process that simulates it.
 
     """
     component = Component(name, fmu, read_description(folder).description, digest)
@@ -167,7 +167,7 @@ def serve(name: str, fmu: Path, digest: str, folder: Path, connection: socket.so
 
 
 class _Served:
-    """An instance and whom it answers.
+    """An instance, and the channel on which it answers requests.
 
     A request without a call is a step. An answer without a note says that all is well; else the
     note has messages of the FMU, the value that a call has given, or why it has failed.

@@ -22,6 +22,7 @@ from orchestrator.master.row import Row
 from orchestrator.system.names import PortName
 from orchestrator.system.values import Value, literal, same
 
+#: Comparisons, as a scenario writes them.
 COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
     "<=": operator.le,
     ">=": operator.ge,

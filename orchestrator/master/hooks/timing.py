@@ -15,6 +15,19 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.hooks.hook import NEVER, Run
 from orchestrator.system.names import PortName
 
+#: The clock is looked at after as many steps as take so long by it [s].
+_GRAIN = 1e-3
+
+#: How often a wait checks whether the run is to stop, or rows are due [s].
+_GLANCE = 0.02
+
+#: Latenesses are counted in classes that are so much longer one than the other, from the first on
+#: [s]: a percentile is known to that share.
+_RESOLUTION, _FIRST = 0.01, 1e-7
+
+#: The share of the latenesses that is said to be below a percentile.
+_SHARE = 0.99
+
 
 @dataclass(frozen=True)
 class InputTable:
@@ -83,20 +96,6 @@ class Playback:
         if row + 1 == len(self._steps):
             return NEVER
         return run.made + 1 if input_table.linear.any() else int(self._steps[row + 1])
-
-
-#: The clock is looked at after as many steps as take so long by it [s].
-_GRAIN = 1e-3
-
-#: How often a wait checks whether the run is to stop, or rows are due [s].
-_GLANCE = 0.02
-
-#: Latenesses are counted in classes that are so much longer one than the other, from the first on
-#: [s]: a percentile is known to that share.
-_RESOLUTION, _FIRST = 0.01, 1e-7
-
-#: The share of the latenesses that is said to be below a percentile.
-_SHARE = 0.99
 
 
 class Lateness:

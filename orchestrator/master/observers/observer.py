@@ -25,6 +25,9 @@ from orchestrator.system.values import StringTable
 #: Rows in a block, and the longest time until observers are told of them [s].
 _ROWS, _PATIENCE = 512, 0.2
 
+#: How long a run takes at least for a progress bar to appear [s].
+_BAR_DELAY = 2.0
+
 
 @dataclass(frozen=True)
 class Header:
@@ -295,10 +298,6 @@ def matches(name: str, pattern: str) -> bool:
     escaped = pattern.replace("[", "[[]")
     is_member = name.startswith((f"{pattern}.", f"{pattern}["))
     return name == pattern or is_member or fnmatchcase(name, escaped)
-
-
-#: Seconds before a progress bar appears.
-_BAR_DELAY = 2.0
 
 
 class Progress:
