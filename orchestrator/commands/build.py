@@ -1,4 +1,4 @@
-"""Commands that make FMUs: build, new; and what is known before a run: list, gains."""
+"""`auv-fmu build`, `new`, `list` and `gains`: making FMUs, and what is known before a run."""
 
 from __future__ import annotations
 
@@ -48,6 +48,24 @@ def add_build(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(action=_build)
 
 
+def add_new(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu new`."""
+    kinds = parser.add_subparsers(required=True, metavar="KIND")
+    controller = kinds.add_parser("controller", help="a folder with a controller that runs")
+    controller.add_argument("name", metavar="NAME", help="of the controller, MyLaw or my_law")
+    controller.add_argument(
+        "folder", nargs="?", type=Path, metavar="DIR", help="to make; default: NAME/"
+    )
+    controller.add_argument(
+        "--base",
+        choices=BASES,
+        default=BASES[0],
+        help="plain: PythonFMU alone; hardened: the base of the bundle's components, which checks "
+        f"values, saves states and survives exceptions; default: {BASES[0]}",
+    )
+    controller.set_defaults(action=_controller)
+
+
 def add_list(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu list`."""
     parser.set_defaults(action=_list)
@@ -88,6 +106,16 @@ def _described(settings: Mapping[str, str]) -> str:
     return f"FMI {settings['fmi']}.0 for {settings['platforms']}, by {settings['compiler']}"
 
 
+def _controller(options: argparse.Namespace) -> int:
+    script, scenario, *others = new_controller(options.name, options.folder, options.base)
+    for path in (script, scenario, *others):
+        show(path)
+    show(f"change {script}, then build and run it:")
+    show(f"  auv-fmu build {script}")
+    show(f"  auv-fmu run {scenario} --out {script.parent}{os.sep}results")
+    return OK
+
+
 def _list(_: argparse.Namespace) -> int:
     for name in names():
         show(f"{name:10} {read_scenario(name).title}")
@@ -97,32 +125,4 @@ def _list(_: argparse.Namespace) -> int:
 def _gains(options: argparse.Namespace) -> int:
     system = closed_loop(bundle.current_fmus()).with_parameters(assignments(options))
     show(*gain_check(system).splitlines())
-    return OK
-
-
-def add_new(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu new`."""
-    kinds = parser.add_subparsers(required=True, metavar="KIND")
-    controller = kinds.add_parser("controller", help="a folder with a controller that runs")
-    controller.add_argument("name", metavar="NAME", help="of the controller, MyLaw or my_law")
-    controller.add_argument(
-        "folder", nargs="?", type=Path, metavar="DIR", help="to make; default: NAME/"
-    )
-    controller.add_argument(
-        "--base",
-        choices=BASES,
-        default=BASES[0],
-        help="plain: PythonFMU alone; hardened: the base of the bundle's components, which checks "
-        f"values, saves states and survives exceptions; default: {BASES[0]}",
-    )
-    controller.set_defaults(action=_controller)
-
-
-def _controller(options: argparse.Namespace) -> int:
-    script, scenario, *others = new_controller(options.name, options.folder, options.base)
-    for path in (script, scenario, *others):
-        show(path)
-    show(f"change {script}, then build and run it:")
-    show(f"  auv-fmu build {script}")
-    show(f"  auv-fmu run {scenario} --out {script.parent}{os.sep}results")
     return OK

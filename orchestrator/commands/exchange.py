@@ -1,4 +1,4 @@
-"""`auv-fmu export`, `hosts` and `verify`."""
+"""`auv-fmu export`, `hosts` and `verify`: what is exchanged with other tools."""
 
 from __future__ import annotations
 
@@ -138,16 +138,6 @@ def _export(options: argparse.Namespace) -> int:
     return OK
 
 
-def _verify(options: argparse.Namespace) -> int:
-    system = load(options.scenario).with_parameters(assignments(options))
-    at_start, verbose = options.initial == _INITIAL[0], options.verbose
-    certificate = verify(
-        options.table, system, options.tolerance, options.order, at_start=at_start, verbose=verbose
-    )
-    show(*certificate.splitlines())
-    return OK
-
-
 def _hosts(options: argparse.Namespace) -> int:
     unknown = set(options.host) - HOSTS.keys()
     if unknown:
@@ -168,3 +158,13 @@ def _hosts(options: argparse.Namespace) -> int:
             f"{verdict.steps_per_second:8.0f}  {verdict.port}{note}"
         )
     return OK if all(verdict.agrees for verdict in verdicts) else FAILED
+
+
+def _verify(options: argparse.Namespace) -> int:
+    system = load(options.scenario).with_parameters(assignments(options))
+    at_start, verbose = options.initial == _INITIAL[0], options.verbose
+    certificate = verify(
+        options.table, system, options.tolerance, options.order, at_start=at_start, verbose=verbose
+    )
+    show(*certificate.splitlines())
+    return OK

@@ -28,19 +28,6 @@ def add_sweep(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(action=_sweep)
 
 
-def _sweep(options: argparse.Namespace) -> int:
-    study = read_study(options.study)
-    folder = folder_of(study, options.out)
-    try:
-        result = swept(study, taken(Means, options), folder, options.command, say, progress=True)
-    except KeyboardInterrupt:
-        say(f"interrupted; {folder} keeps what is done: the same command goes on from there")
-        return INTERRUPTED
-    show(f"{study.name}: {result.runs:,} runs, of which {result.failed:,} failed")
-    show(f"written to {folder}{os.sep}")
-    return OK
-
-
 def add_report(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu report`."""
     parser.add_argument(
@@ -66,6 +53,19 @@ def add_table(parser: argparse.ArgumentParser) -> None:
     add_out(parser, Path("results", "table"))
     add_options(parser, Files, "force")
     parser.set_defaults(action=_table)
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    study = read_study(options.study)
+    folder = folder_of(study, options.out)
+    try:
+        result = swept(study, taken(Means, options), folder, options.command, say, progress=True)
+    except KeyboardInterrupt:
+        say(f"interrupted; {folder} keeps what is done: the same command goes on from there")
+        return INTERRUPTED
+    show(f"{study.name}: {result.runs:,} runs, of which {result.failed:,} failed")
+    show(f"written to {folder}{os.sep}")
+    return OK
 
 
 def _report(options: argparse.Namespace) -> int:
