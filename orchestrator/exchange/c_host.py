@@ -14,32 +14,33 @@ from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.children import COMPILERS, LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.fmi.binary import binary_of
 from orchestrator.master.plan import gathered, stages
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.values import Value
 
+#: The program.
 SOURCE = Path(__file__).with_name("host.c")
 
 #: What the host is compiled with, and what it writes.
 PLAN, TABLE = "plan.h", "table.csv"
 
 #: Where the library of an unpacked FMU is.
-Library = Callable[[Component], Path]
+LibraryOf = Callable[[Component], Path]
 
 
-def library_of(component: Component) -> Path:
+def _library_of(component: Component) -> Path:
     """The library of an FMU for this machine, unpacked."""
-    identifier = component.description.coSimulation.modelIdentifier
-    return component.folder / "binaries" / "linux64" / f"{identifier}.so"
+    return binary_of(component, component.folder)
 
 
 def compiled(
     folder: Path,
     system: System,
     experiment: Experiment,
-    library: Library = library_of,
+    library: LibraryOf = _library_of,
     command: Sequence[str] = (),
     name: str = "host",
 ) -> Path:
@@ -77,7 +78,7 @@ def compiled(
     return program
 
 
-def _plan(system: System, experiment: Experiment, library: Library) -> str:
+def _plan(system: System, experiment: Experiment, library: LibraryOf) -> str:
     """What the host is compiled with: FMUs and members in the order of the stages."""
     if system.steps or any(connection.transformation for connection in system.connections):
         raise InputError("the C program has one step for all components, and no transformations")

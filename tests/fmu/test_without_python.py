@@ -58,7 +58,7 @@ def unpacked(native: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def place(folder: Path, platform: str, ending: str) -> c_host.Library:
+def place(folder: Path, platform: str, ending: str) -> c_host.LibraryOf:
     """Where the libraries of a platform are below a folder."""
 
     def library(component: Component) -> Path:
@@ -103,7 +103,7 @@ def run_elsewhere(
     system: System,
     folder: Path,
     machine: str,
-    library: c_host.Library,
+    library: c_host.LibraryOf,
     command: Sequence[str | Path],
     name: str = "host",
 ) -> tuple[np.ndarray, np.ndarray]:
