@@ -1,1 +1,1 @@
-"""How a system is written down: SSP, libcosim's files, a container FMU; schemas of TOML files."""
+"""How systems, runs and settings are written down: SSP, OSP, a container; tables; TOML schemas."""
