@@ -1,4 +1,4 @@
-"""Options that several commands have, and what they say."""
+"""Options that several commands have, what they stand for, and what is said of a run's end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is run, checked before any FMU is loaded, and what makes it another run than others.
+"""The plan of a run: checked before any FMU is loaded, with its stages and its identity.
 
 Every communication step has stages. Before a stage is stepped its inputs are gathered; the
 outputs of a component are read as soon as it was stepped.

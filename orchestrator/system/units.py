@@ -1,4 +1,4 @@
-"""Transformations of values on their way through a connection: given, or from unit to unit."""
+"""Transformations of values on their way through a connection, units, and their conversion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What observers of a run are told, in which blocks of rows, and how a part of it is handed on.
+"""Observers of a run: what they are told, in which blocks of rows, a selection, a progress bar.
 
 A row holds, at time t_k, the outputs after the step that ended there, and the inputs that this
 step was made with.
