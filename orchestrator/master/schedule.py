@@ -13,7 +13,7 @@ is `jacobi`; all others when the time has come that they belong to.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from ctypes import CFUNCTYPE, c_double, c_int, c_void_p, cast
+from ctypes import c_double
 from functools import partial
 from typing import NamedTuple
 
@@ -22,16 +22,13 @@ from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
 from orchestrator.master.experiment import JACOBI, Order
 from orchestrator.master.fmi.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
 from orchestrator.master.fmi.surroundings import PRODUCT, A, B, C, put_back
-from orchestrator.master.fmi.transfer import CMember, CMove
+from orchestrator.master.fmi.transfer import CMember, CMove, DoStepCallback, address_of
 from orchestrator.master.plan import Plan, gathered
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Gathering, Row
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection
-
-#: FMI's doStep, as the compiled loop calls it.
-_CALLBACK = CFUNCTYPE(c_int, c_void_p, c_double, c_double, c_int)
 
 
 class Member(NamedTuple):
@@ -57,7 +54,7 @@ class StageCall:
         """
         self._act = act
         self._error: Exception | None = None
-        self._called_back = _CALLBACK(lambda _, t, h, __: self._tried(t, h))
+        self._called_back = DoStepCallback(lambda _, t, h, __: self._tried(t, h))
 
     @property
     def member(self) -> Member:
@@ -76,7 +73,7 @@ class StageCall:
     def pointers(self) -> CMember:
         """The same for the compiled loop."""
         nothing = (CMove * 0)()
-        return CMember(None, cast(self._called_back, c_void_p).value, nothing, nothing, 0, 0)
+        return CMember(None, address_of(self._called_back), nothing, nothing, 0, 0)
 
     def _tried(self, t: float, h: float) -> int:
         try:

@@ -17,7 +17,6 @@ import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
-    fmi2Boolean,
     fmi2CallbackAllocateMemoryTYPE,
     fmi2CallbackFreeMemoryTYPE,
     fmi2CallbackFunctions,
@@ -31,7 +30,6 @@ from fmpy.fmi2 import (
     fmi2LastSuccessfulTime,
     fmi2OK,
     fmi2Pending,
-    fmi2Real,
     fmi2Status,
     fmi2Terminated,
     fmi2Warning,
@@ -43,7 +41,15 @@ from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.fmi.binary import Library, library_of, named
 from orchestrator.master.fmi.instance import DO_STEP, ComponentFailed, Ended, Listener, Part
 from orchestrator.master.fmi.surroundings import put_back
-from orchestrator.master.fmi.transfer import CMember, CMove, PortBlock, text_of
+from orchestrator.master.fmi.transfer import (
+    DO_STEP_TYPES,
+    CMember,
+    CMove,
+    DoStepCallback,
+    PortBlock,
+    address_of,
+    text_of,
+)
 from orchestrator.system.component import Component
 from orchestrator.system.values import StringTable, Value
 
@@ -51,10 +57,6 @@ from orchestrator.system.values import StringTable, Value
 _LOGGED = {f"logStatus{status}" for status in ("Warning", "Discard", "Error", "Fatal")}
 
 _DoStep: TypeAlias = Callable[[Any, Any, int], int]
-
-#: FMI's doStep, as the compiled loop calls it.
-_DO_STEP = (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean)
-_CALLBACK = ctypes.CFUNCTYPE(fmi2Status, *_DO_STEP)
 
 #: Messages that are remembered, to say why something has failed.
 _MOST_COMPLAINTS = 3
@@ -111,8 +113,8 @@ class LoadedInstance:
         self._called_back: Any = None
         if component.description.coSimulation.canRunAsynchronuously:
             # Called back with numbers of Python, too.
-            self.do_step = do_step = self._awaited(self.function("DoStep", _DO_STEP))
-            self._called_back = _CALLBACK(lambda _, *step: do_step(*step))
+            self.do_step = do_step = self._awaited(self.function("DoStep", DO_STEP_TYPES))
+            self._called_back = DoStepCallback(lambda _, *step: do_step(*step))
 
     def _awaited(self, do_step: _DoStep) -> _DoStep:
         """Steps that the FMU may go on with after the call, as calls that end when they do."""
@@ -158,12 +160,12 @@ class LoadedInstance:
     def pointers(self) -> CMember:
         """The same calls for the compiled loop."""
         inputs, outputs = (
-            [block.move(_address(self._fmu.dll[f"fmi2{block.function}"])) for block in blocks]
+            [block.move(address_of(self._fmu.dll[f"fmi2{block.function}"])) for block in blocks]
             for blocks in (self._inputs, self._outputs)
         )
         return CMember(
             self._fmu.component,
-            _address(self._called_back or self._fmu.dll["fmi2DoStep"]),
+            address_of(self._called_back or self._fmu.dll["fmi2DoStep"]),
             (CMove * len(inputs))(*inputs),
             (CMove * len(outputs))(*outputs),
             len(inputs),
@@ -324,10 +326,6 @@ class LoadedInstance:
             self._library.corrupted = True
         last = self._complaints[-1] if self._complaints else f"{self.name}: {error}"
         return ComponentFailed(last, fatal)
-
-
-def _address(function: Any) -> int | None:
-    return ctypes.cast(function, ctypes.c_void_p).value
 
 
 def _fmi_type(variable: ModelVariable) -> str:

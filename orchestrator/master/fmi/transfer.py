@@ -1,10 +1,11 @@
-"""The FMI calls that move values between an FMU and its part of the row."""
+"""The FMI calls that move values between an FMU and its row, also for the compiled loop."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from ctypes import CFUNCTYPE, POINTER, Structure, addressof, c_size_t, c_void_p, cast
 from functools import partial
+from typing import Any
 
 import numpy as np
 from fmpy.fmi2 import (
@@ -30,8 +31,13 @@ FMI_TYPES = {
     "String": ("String", fmi2Integer),
 }
 
-#: FMI's functions that move Integers, as the compiled loop calls them.
-_CALLBACK = CFUNCTYPE(fmi2Status, fmi2Component, c_void_p, c_size_t, c_void_p)
+#: Types of the arguments of FMI's doStep, and a function of Python in its place for the compiled
+#: loop.
+DO_STEP_TYPES = (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean)
+DoStepCallback = CFUNCTYPE(fmi2Status, *DO_STEP_TYPES)
+
+#: The same in place of FMI's functions that move Integers.
+_MoveCallback = CFUNCTYPE(fmi2Status, fmi2Component, c_void_p, c_size_t, c_void_p)
 
 
 class CMove(Structure):
@@ -138,7 +144,7 @@ class PortBlock:
         """The same for the compiled loop, by the address of the FMU's function of this block."""
         integers = None if self._fmi_type == "Real" else addressof(self._values)
         if self._fmi_type == "String":
-            address = cast(self._called_back, c_void_p).value
+            address = address_of(self._called_back)
         references, row = addressof(self._references), self._row.ctypes.data
         return CMove(address, references, self._n, row, integers)
 
@@ -147,7 +153,7 @@ class PortBlock:
             move = self._set_texts if self.function.startswith("Set") else self._get_texts
             call = partial(move, function)
             # The compiled loop looks for numbers and has an FMU's function move them.
-            self._called_back = _CALLBACK(lambda *_: call())
+            self._called_back = _MoveCallback(lambda *_: call())
             return call
         return partial(function, self._references, self._n, self._values)
 
@@ -161,6 +167,11 @@ class PortBlock:
         for i, text in enumerate(texts):
             self._values[i] = self._strings.number(text_of(text))
         return status
+
+
+def address_of(function: Any) -> int | None:
+    """The address of a function of ctypes, for the compiled loop."""
+    return cast(function, c_void_p).value
 
 
 def are_integers(values: np.ndarray) -> bool:
