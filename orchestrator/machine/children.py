@@ -24,7 +24,8 @@ from tempfile import TemporaryDirectory
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import last_line
 
-#: C compilers: the first one that there is, is taken. :mod:`fmus.compilers` has the same.
+#: C compilers: the first one that there is, is taken. :mod:`fmus.compilers` has the same, and runs
+#: them in the same way: neither of the two may import the other.
 COMPILERS = ("cc", "gcc", "clang")
 
 #: How long this machine's compiler may take [s], and ziglang, which makes a C library, too.

@@ -255,7 +255,7 @@ def _unpacked(archive: Path, file: BufferedReader) -> Unpacked:
     if digest is None:
         with ZipFile(file) as content:
             # Before the file is read to its end, which it may not have.
-            _check(content.infolist())
+            _check_entries(content.infolist())
             if (size := os.fstat(file.fileno()).st_size) > _LONGEST_ARCHIVE:
                 raise ValueError(f"it is {size:,} bytes long, more than {_LONGEST_ARCHIVE:,}")
             file.seek(0)
@@ -281,7 +281,7 @@ def _extracted(archive: Path, content: ZipFile) -> Path:
     around = (_wholes.get(folder) for folder in archive.parents)
     whole = next(filter(None, around), None) or _Whole(archive)
     files, size = len(entries), sum(entry.file_size for entry in entries)
-    _check_with(whole, files, size)
+    _check_room(whole, files, size)
     try:
         folder = Path(mkdtemp(dir=process_folder().resolve()))
         try:
@@ -300,7 +300,7 @@ def _extracted(archive: Path, content: ZipFile) -> Path:
     return folder
 
 
-def _check_with(whole: _Whole, files: int, size: int) -> None:
+def _check_room(whole: _Whole, files: int, size: int) -> None:
     """Refuse what fills the disk together with what there is."""
     within = f"and {whole.archive} with all that is in it to"
     if (together := whole.files + files) > _MOST_FILES:
@@ -319,7 +319,7 @@ def _check_with(whole: _Whole, files: int, size: int) -> None:
         )
 
 
-def _check(entries: Sequence[ZipInfo]) -> None:
+def _check_entries(entries: Sequence[ZipInfo]) -> None:
     """Refuse what fills the disk or the memory, and what tools unpack in different ways."""
     if len(entries) > _MOST_FILES:
         raise ValueError(f"it holds {len(entries):,} files, more than {_MOST_FILES:,}")

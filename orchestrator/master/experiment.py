@@ -1,4 +1,4 @@
-"""Start, stop and step of a run, t_k = k h, and which components take longer steps."""
+"""Start, stop and steps of a run, t_k = k h; orders, couplings, and longer steps of components."""
 
 from __future__ import annotations
 

@@ -365,7 +365,7 @@ class IsolatedInstance:
     def _lost(self) -> ComponentFailed:
         status = self._status(FAREWELL)
         return ComponentFailed(
-            f"{self.name}: its process {_end(status)} in {self._doing}", fatal=True
+            f"{self.name}: its process {_how_it_ended(status)} in {self._doing}", fatal=True
         )
 
 
@@ -379,7 +379,7 @@ def _line(value: str) -> str:
     return "; ".join(_text(value).splitlines())
 
 
-def _end(status: int | None) -> str:
+def _how_it_ended(status: int | None) -> str:
     if status is None:
         return "answers no more"
     if status >= 0:
