@@ -204,6 +204,7 @@ def _c_program(system: System, folder: Path, steps: int, step: float) -> Ran:
     return Ran(rows[1:], seconds)
 
 
+#: By the names that the command line has for them.
 HOSTS: dict[str, Host] = {
     "libcosim-ssp": Host("libcosimpy", _libcosim_ssp),
     "libcosim-osp": Host("libcosimpy", _libcosim_osp),
