@@ -99,7 +99,7 @@ class Verdict:
     agrees: bool = False
 
 
-def real_outputs(system: System) -> list[tuple[str, str, int]]:
+def _real_outputs(system: System) -> list[tuple[str, str, int]]:
     """Component, port and value reference of every Real output."""
     return [
         (component.name, variable.name, variable.valueReference)
@@ -111,7 +111,7 @@ def real_outputs(system: System) -> list[tuple[str, str, int]]:
 
 def _names(system: System, between: str = ".") -> list[str]:
     """Names of all Real outputs, as tools write them."""
-    return [f"{component}{between}{port}" for component, port, _ in real_outputs(system)]
+    return [f"{component}{between}{port}" for component, port, _ in _real_outputs(system)]
 
 
 def _stepped(step: Callable[[], object], read: Callable[[], list[float]], steps: int) -> Ran:
@@ -137,7 +137,7 @@ def _libcosim(system: System, steps: int, opener: str, **path: str) -> Ran:
     observer = CosimObserver.create_last_value()
     execution.add_observer(observer=observer)
     references: dict[str, list[int]] = {}
-    for component, _, reference in real_outputs(system):
+    for component, _, reference in _real_outputs(system):
         references.setdefault(component, []).append(reference)
     index = {name: execution.slave_index_from_instance_name(name) for name in references}
 

@@ -116,7 +116,7 @@ class _Reader:
         raise ValueError("it has a document type, which no file of an SSP has")
 
 
-def violations(root: str, text: bytes) -> list[str]:
+def _violations(root: str, text: bytes) -> list[str]:
     """What is not as the schema has it, with the number of its line.
 
     Args:
@@ -214,7 +214,7 @@ class Archive:
             stated = "no version" if version is None else f"version {version!r}"
             remarks.append(f"names {stated} of SSP; it is read as {_VERSION}")
         # Of other namespaces and versions the schemas know nothing.
-        if not remarks and (wrong := violations(root.tag, text)):
+        if not remarks and (wrong := _violations(root.tag, text)):
             remarks.append(f"not valid: {listed(wrong, '; ')}")
         for remark in dict.fromkeys(remarks):
             self.note(f"{name}: {remark}")

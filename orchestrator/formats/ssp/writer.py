@@ -48,7 +48,7 @@ def ssp_bytes(system: System) -> bytes:
     with ZipFile(archive, "w") as content:
         content.writestr(ZipInfo(STRUCTURE, _EPOCH), structure_xml(system))
         for name, source in _parameter_sources(system).items():
-            values = parameter_set_xml(system, system.components[name])
+            values = _parameter_set_xml(system, system.components[name])
             content.writestr(ZipInfo(source, _EPOCH), values)
         for fmu, source in _sources(system).items():
             content.writestr(ZipInfo(source, _EPOCH), fmu.read_bytes())
@@ -67,7 +67,7 @@ def _parameter_sources(system: System) -> dict[str, str]:
     return {name: f"parameters/{file}" for name, file in zip(having, names, strict=True)}
 
 
-def parameter_set_xml(system: System, component: Component) -> bytes:
+def _parameter_set_xml(system: System, component: Component) -> bytes:
     """The values that a system sets in one component, as an SSV."""
     root = Element(_tag("ssv:ParameterSet"), name=PARAMETER_SET, version=_version(component))
     parameters = _add(root, "ssv:Parameters")

@@ -192,7 +192,7 @@ def make_binary(component: Component, folder: Path) -> None:
 
     """
     binary = binary_of(component, folder)
-    if binary.is_file() or not (sources := sources_of(component, folder)):
+    if binary.is_file() or not (sources := _sources_of(component, folder)):
         return
     key = _key(component)
     try:
@@ -228,8 +228,8 @@ def check_binary(component: Component, folder: Path) -> None:
             if path.is_file() and _is_cut_short(path):
                 raise InputError(f"{named(component)}: its {path.name} is cut short: get it anew")
         return
-    if sources_of(component, folder):
-        check_compiler(component)
+    if _sources_of(component, folder):
+        _check_compiler(component)
         return
     others = sorted({path.parent.name for path in binaries.glob(f"*/{glob.escape(identifier)}.*")})
     named_otherwise = sorted(path.name for path in (binaries / fmpy.platform).glob(f"*{suffix}"))
@@ -316,7 +316,7 @@ class Sources(NamedTuple):
     options: list[str]
 
 
-def sources_of(component: Component, folder: Path) -> Sources | None:
+def _sources_of(component: Component, folder: Path) -> Sources | None:
     """The sources of an FMU that is unpacked into a folder; None: it has none.
 
     Raises:
@@ -351,7 +351,7 @@ def sources_of(component: Component, folder: Path) -> Sources | None:
     return Sources(files, list(dict.fromkeys(options)))
 
 
-def check_compiler(component: Component) -> None:
+def _check_compiler(component: Component) -> None:
     """Check that an FMU can be compiled here, if it was not before.
 
     Raises:
@@ -366,7 +366,7 @@ def check_compiler(component: Component) -> None:
 
 
 def _compiled(component: Component, sources: Sources) -> bytes:
-    check_compiler(component)
+    _check_compiler(component)
     run = compiler()
     assert run is not None
     warnings.warn(
