@@ -134,7 +134,7 @@ def test_bad_file_is_refused_in_one_line(
 def test_number_that_makes_no_sense_is_refused(workplace, refused, arguments, number):
     *command, option = arguments
     if (option, number) in GOOD:
-        pytest.skip("is one")
+        pytest.skip("the option takes this number")
     assert refused(*command, f"{option}={number}")
 
 

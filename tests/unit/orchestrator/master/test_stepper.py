@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.machine import cache as user_cache
 from orchestrator.machine import children
+from orchestrator.machine.cache import keep
 from orchestrator.machine.errors import InputError
 from orchestrator.master import loop, stepper
 from orchestrator.master.experiment import Experiment
@@ -109,7 +109,7 @@ def test_a_library_without_the_function_is_no_library(cache, tmp_path):
     source.write_text("int other(void) { return 0; }")
     other = tmp_path / "other.so"
     subprocess.run(["cc", "-shared", "-o", other, source], check=True)
-    user_cache.keep("loop", stepper._key(), {"stepper.so": other.read_bytes()})
+    keep("loop", stepper._key(), {"stepper.so": other.read_bytes()})
     assert stepper.kept() is None
     assert stepper.made().advance
 
