@@ -21,11 +21,7 @@ from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, heading, style
 from orchestrator.figures.view import PAINT, Z_UP, body
 from orchestrator.figures.visible import moving_mean
 from orchestrator.machine.errors import InputError
-from orchestrator.vehicle.signals import (
-    Loop,
-    parameter,
-    true_control_point,
-)
+from orchestrator.vehicle.signals import Loop, parameter, true_control_point
 
 FRAMES_PER_SECOND = 20
 

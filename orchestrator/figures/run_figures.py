@@ -49,6 +49,9 @@ from orchestrator.vehicle.signals import (
     true_control_point,
 )
 
+#: Seconds before a bar appears on a terminal.
+_PATIENCE = 2.0
+
 
 def _all_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
     axes = cell.axes()
@@ -198,10 +201,6 @@ def overlay(heading: str, runs: Sequence[Drawn]) -> Figure:
     if figure is None:
         raise InputError(f"no figure: the runs have no {missing[0]}")
     return figure
-
-
-#: Seconds before a bar appears on a terminal.
-_PATIENCE = 2.0
 
 
 def check_figure(kind: str) -> None:

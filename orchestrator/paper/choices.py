@@ -83,6 +83,7 @@ _WAVES, _SIGN = Disturbance(), "(2): the minus of tau_w"
 #: What the reference's surge force drives it at, straight on [m/s].
 _UNDER_WAY = TAU_D[0] / Vehicle().d11
 
+#: Name of the choice that runs with five degrees of freedom have one option of.
 VEHICLE = "vehicle"
 
 #: Choices that a run depends on.

@@ -263,6 +263,7 @@ def _reset(names: Any, system: System) -> Action:
     return Reset(tuple(_things(names)))
 
 
+#: What an event can do, by the key of its table.
 ACTIONS: Mapping[str, Callable[[Any, System], Action]] = {
     "set": _set,
     "override": lambda values, system: Alter("override", _altered(values, system, _value)),

@@ -153,6 +153,7 @@ def _sampling(system: System, loop: Loop) -> list[str]:
     ]
 
 
+#: Columns of :func:`certificates`.
 CERTIFICATE_COLUMNS = (
     "time",
     "V_without_theta",
