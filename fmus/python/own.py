@@ -18,8 +18,7 @@ from fmus.python.packaging import LOADERS, best_loader, fmu_entries, seal
 
 #: The script of the FMU, with a slave that may raise.
 _SCRIPT = """\
-from fmus.python.loading import settle
-from fmus.python.loading import caught
+from fmus.python.loading import caught, settle
 from {module} import {component}
 
 settle(caught({component}), globals(), locals())
