@@ -24,7 +24,6 @@ _DESCRIPTION = description(
     (unknown(2, ""),),
 )
 
-
 #: When it misbehaves, and how.
 PHASES, ACTS = constants(_SOURCE, "ENTER"), constants(_SOURCE, "BEHAVE")
 

@@ -28,7 +28,6 @@ _SOURCE = Path(__file__).with_name("mixed.c")
 KINDS = ("Real", "Integer", "Enumeration", "Boolean")
 _MOST = 4
 
-
 _PLACES, CALLS, ACTS = (constants(_SOURCE, first) for first in ("PORTS", "SET", "BEHAVE"))
 _PARAMETERS = {name: _PLACES[name.upper()] for name in ("at", "act", "call", "milliseconds")}
 

@@ -70,7 +70,6 @@ def states(out: str) -> dict[str, object]:
 
 CHECKPOINTS = ["--checkpoint-every", "0.3"]
 
-
 LEFT = ["fig4", "--stop-time", "1", "--no-figures"]
 
 

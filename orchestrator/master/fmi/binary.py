@@ -42,7 +42,6 @@ _ELF = {1: (28, "3I5H", 32, "2I8xI"), 2: (32, "2QI5H", 56, "I4xQ16xQ")}
 #: The kind of segments that are mapped into memory.
 _LOADED = 1
 
-
 #: As the standard of C has it: no product is contracted with a sum, nothing is reordered.
 _FLAGS = (
     "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-w",
