@@ -116,7 +116,7 @@ def description(
 def _library_of(source: Path, *options: str) -> bytes:
     compiler = shutil.which("cc")
     if compiler is None:
-        pytest.skip("no C compiler")
+        pytest.skip("there is no C compiler")
     with TemporaryDirectory() as folder:
         library = Path(folder, source.stem)
         common = ("-shared", "-fPIC", "-O1", "-w", "-ffp-contract=off", f"-I{_HERE}")

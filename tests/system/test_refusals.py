@@ -109,7 +109,7 @@ def test_bad_file_is_refused_in_one_line(
     arguments, endings = COMMANDS[command]
     for ending in endings:
         if ending == "parquet":
-            pytest.importorskip("pyarrow")
+            pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
         name = bad_file(kind, ending)
         shown = name if kind != "zero in name" else r"a\x00b"
         assert shown in refused(*(name if word == "?" else word for word in arguments))
