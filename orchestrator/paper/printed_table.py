@@ -14,7 +14,7 @@ from orchestrator.machine.workers import workers
 from orchestrator.paper.choices import (
     AGAINST_FIVE,
     END_TIMES,
-    FIVE,
+    FIVE_DEGREES,
     PD,
     PROPOSED,
     PUBLISHED,
@@ -248,7 +248,7 @@ def _options(found: Found) -> Iterator[list[str]]:
             yield [plain(choice.name), plain(option.text), *written, plain(option.against)]
         if choice.name == VEHICLE:
             score = f"{found.printed[-1].score:.2f}, of medians"
-            yield [plain(choice.name), plain(FIVE.text), "", score, plain(AGAINST_FIVE)]
+            yield [plain(choice.name), plain(FIVE_DEGREES.text), "", score, plain(AGAINST_FIVE)]
 
 
 def write_table(folder: Path, command: Sequence[str], force: bool = False) -> tuple[Path, Path]:

@@ -97,7 +97,7 @@ def file_name(name: str, taken: Collection[str] = ()) -> str:
     return plain
 
 
-def plain(names: Iterable[str], *taken: str) -> list[str]:
+def plain_names(names: Iterable[str], *taken: str) -> list[str]:
     """Names of files that need no encoding in a URI, of which some hosts know nothing.
 
     No two are the same, nor differ in case only: some file systems do not tell them apart.

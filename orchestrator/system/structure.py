@@ -12,7 +12,7 @@ from fmpy.model_description import ModelVariable
 
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
-from orchestrator.system.names import PortName, listed, plain, splits
+from orchestrator.system.names import PortName, listed, plain_names, splits
 from orchestrator.system.units import Linear, Mapped, Transformation, conversion, unit_of_port
 from orchestrator.system.values import INTEGERS, Value, type_of, typed, unit_of
 
@@ -123,7 +123,7 @@ class System:
     def fmus(self, *taken: str) -> dict[Path, str]:
         """All FMUs, each with a file name that no other has, nor any file that is taken."""
         fmus = sorted({component.fmu for component in self.components.values()})
-        return dict(zip(fmus, plain((fmu.name for fmu in fmus), *taken), strict=True))
+        return dict(zip(fmus, plain_names((fmu.name for fmu in fmus), *taken), strict=True))
 
     def open_inputs(self, component: str) -> list[str]:
         """Inputs of one component that nothing feeds, and for which no value is set."""

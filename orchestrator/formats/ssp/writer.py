@@ -11,7 +11,7 @@ from zipfile import ZipFile, ZipInfo
 
 from orchestrator.formats.ssp import LEFT_OPEN, OMS, OSP, SSC, SSD, SSV, STRUCTURE
 from orchestrator.system.component import Component
-from orchestrator.system.names import PortName, file_name, plain
+from orchestrator.system.names import PortName, file_name, plain_names
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import BASES, Linear, Mapped
 from orchestrator.system.values import items_of, literal, type_of
@@ -63,7 +63,7 @@ def _sources(system: System) -> dict[Path, str]:
 def _parameter_sources(system: System) -> dict[str, str]:
     """Where the archive has the parameter set of each component that has one."""
     having = [name for name in system.components if system.parameters_of(name)]
-    names = plain(f"{name}.ssv" for name in having)
+    names = plain_names(f"{name}.ssv" for name in having)
     return {name: f"parameters/{file}" for name, file in zip(having, names, strict=True)}
 
 

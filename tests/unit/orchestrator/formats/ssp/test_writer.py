@@ -16,7 +16,7 @@ from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.system.component import read_component
-from orchestrator.system.names import PortName, plain
+from orchestrator.system.names import PortName, plain_names
 from orchestrator.system.structure import System, unfed_inputs
 from support.archives import (
     archive,
@@ -171,9 +171,9 @@ def test_fmus_of_one_name_stay_apart(tmp_path: Path):
 
 
 def test_plain_names_are_distinct_and_kept_where_they_can_be():
-    assert plain(["M.fmu", "m.fmu", "2_M.fmu", "M.fmu"]) == [
+    assert plain_names(["M.fmu", "m.fmu", "2_M.fmu", "M.fmu"]) == [
         "M.fmu", "1_m.fmu", "2_M.fmu", "3_M.fmu",
     ]  # fmt: skip
-    assert plain(["2_M.fmu", "M.fmu", "M.fmu", "ä b", "x"], "X") == [
+    assert plain_names(["2_M.fmu", "M.fmu", "M.fmu", "ä b", "x"], "X") == [
         "2_M.fmu", "M.fmu", "3_M.fmu", "__b", "4_x",
     ]  # fmt: skip
