@@ -1,4 +1,7 @@
-"""What may give numbers that are not meant: known before a run, or seen in it."""
+"""What may give numbers that are not meant: known before a run, or seen in it.
+
+Among the former: which velocities reach a controller that is to do without.
+"""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ from support.status_table import (
 FMI3 = "FMI 3.0"
 
 #: A row and a column.
-Cell = tuple[tuple[str, str], str]
+Place = tuple[tuple[str, str], str]
 
 _NOT_UTF_8 = b"ta\xffnh"
 
@@ -51,7 +51,7 @@ CREATIONS: dict[str, dict[str, Any]] = {
 }
 
 
-def trials(folder: Path, other: Path, kind: str = PYTHON) -> Callable[[Cell], str]:
+def trials(folder: Path, other: Path, kind: str = PYTHON) -> Callable[[Place], str]:
     """Prepare a process for trials on an FMU.
 
     Args:
@@ -67,7 +67,7 @@ def trials(folder: Path, other: Path, kind: str = PYTHON) -> Callable[[Cell], st
     library = load(folder)
     company = company_of(library, load(other))
 
-    def trial(cell: Cell) -> str:
+    def trial(cell: Place) -> str:
         (function, case), state = cell
         try:
             if function == CREATION:
