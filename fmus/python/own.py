@@ -1,8 +1,8 @@
 """A component of the user's own as an FMU: `python -m fmus.python.own SCRIPT --out DIR`.
 
 The script holds a slave of PythonFMU, plain or on the base of this package. Its FMU is sealed like
-those of the bundle: built again after a change, it runs the changed code in the same process, and
-modules that lie beside the script are in it.
+the ones of the bundle: built again after a change, it runs the changed code in the same process,
+and modules that lie beside the script are in it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Panels in rows, and those of several figures: path, tracking errors, commands with their limits.
+"""Figures of panels, and panels that several figures have: path, tracking errors, commands.
 
 What no run has the signals for is left out, with a note.
 """
