@@ -185,13 +185,13 @@ def universal(libraries: Sequence[bytes]) -> bytes:
     """
     head, body = _FAT.pack(_MAGIC_FAT, len(libraries)), b""
     begin = _aligned(_FAT.size + len(libraries) * _ENTRY.size)
-    for library in libraries:
-        magic, processor, model = _THIN.unpack_from(library)
+    for content in libraries:
+        magic, processor, model = _THIN.unpack_from(content)
         if magic != _MAGIC_64:
             raise ValueError("not a 64-bit Mach-O file")
         start = _aligned(begin + len(body))
-        head += _ENTRY.pack(processor, model, start, len(library), _ALIGNMENT)
-        body = body.ljust(start - begin, b"\0") + library
+        head += _ENTRY.pack(processor, model, start, len(content), _ALIGNMENT)
+        body = body.ljust(start - begin, b"\0") + content
     return head.ljust(begin, b"\0") + body
 
 

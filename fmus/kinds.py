@@ -15,7 +15,7 @@ KINDS = PYTHON, NATIVE = "python", "native"
 #: Packages besides ours whose code is in the FMUs of each kind.
 CONTAINED: Mapping[str, Sequence[str]] = {PYTHON: ("pythonfmu",), NATIVE: ()}
 
-#: How FMI 3.0 and the zig compiler call a machine. From that version of glibc on, all have it.
+#: What FMI 3.0 and the zig compiler call a machine; with the oldest glibc that libraries run on.
 TARGETS = {
     "x86_64-linux": "x86_64-linux-gnu.2.17",
     "aarch64-linux": "aarch64-linux-gnu.2.17",

@@ -42,10 +42,8 @@ settings.register_profile("attack", settings.get_profile("search"), max_examples
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
-
 #: What a reason says beside the name of what is missing.
 _MISSING = re.compile(r"^(there is |there are )?no | (is|are) not installed$")
-
 
 #: Where pytest's cache keeps what was skipped.
 _SKIPPED = "auv-fmu/skipped"

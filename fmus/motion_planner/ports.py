@@ -10,7 +10,6 @@ from fmus.ports.vehicle import CONTROL_POINT, VEHICLE, reference
 
 DESCRIPTION = "Motion planner: helical reference with velocity and acceleration"
 
-
 _NU0 = parameters("nu0", NU_D0, NU_WITHOUT_ROLL, "Initial velocity in the body frame")
 
 PARAMETERS = ParameterSet(

@@ -116,6 +116,8 @@ def _structure(ports: Sequence[Port]) -> Element:
     return structure
 
 
+# Terminals
+
 #: All members of an input have to come from somewhere. Not all of an output's need to go there:
 #: a controller takes only the angles of the posture. Each terminal's rule is its own.
 _MATCHING_RULE = {"input": "plug", "output": "bus"}

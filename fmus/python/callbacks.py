@@ -22,6 +22,20 @@ from fmus.python.loading import ANSWER, MISSING, has_loader, place
 #: Types that can be read as numbers: hosts read all outputs with fmi2GetReal.
 _NUMBERS = ("Real", "Integer", "Boolean")
 
+#: Modes of an instance.
+INSTANTIATED, INITIALISING, STEPPING, TERMINATED = MODES = (
+    "instantiated",
+    "initialising",
+    "stepping",
+    "terminated",
+)
+
+#: Different messages that an instance logs: a host may step on after a refusal for ever.
+MOST_MESSAGES = 100
+
+#: Characters of a message: some hosts have a buffer of 1 or 2 kB for them.
+LONGEST_MESSAGE = 500
+
 
 class Store:
     """Values of all ports.
@@ -91,20 +105,6 @@ class Store:
         if port.causality == "input":
             return self.inputs[self.input_references.index(reference)]
         return self.outputs[self.output_references.index(reference)]
-
-
-INSTANTIATED, INITIALISING, STEPPING, TERMINATED = MODES = (
-    "instantiated",
-    "initialising",
-    "stepping",
-    "terminated",
-)
-
-#: Different messages that an instance logs: a host may step on after a refusal for ever.
-MOST_MESSAGES = 100
-
-#: Characters of a message: some hosts have a buffer of 1 or 2 kB for them.
-LONGEST_MESSAGE = 500
 
 
 class Callbacks(Fmi2Slave):  # type: ignore[misc]

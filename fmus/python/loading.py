@@ -36,6 +36,27 @@ ANSWER = "answer"
 #: What is answered in the place of values that could not be had.
 MISSING: dict[str, Any] = {"Real": 0.0, "Integer": 0, "Boolean": False, "String": ""}
 
+#: The same, by the callback that is asked for them.
+_INSTEAD = {f"get_{kind.lower()}": value for kind, value in MISSING.items()}
+
+#: Callbacks that are kept from raising; a step answers for itself.
+_CALLS = (
+    "setup_experiment",
+    "enter_initialization_mode",
+    "exit_initialization_mode",
+    "terminate",
+    *(f"set_{kind.lower()}" for kind in MISSING),
+    *_INSTEAD,
+)
+
+#: What sealing has put after the name of every module in the FMU; empty: this is not in one.
+_SEAL = "".join(re.findall(r"_[0-9a-f]{12}$", __name__.partition(".")[0]))
+
+#: Packages that are in an FMU beside the user's script.
+_OURS = tuple(f"{package}{_SEAL}" for package in ("fmus", "auv_fmu", "pythonfmu"))
+
+Slave = TypeVar("Slave", bound=type)
+
 
 def settle(slave: type, module: dict[str, Any], found: dict[str, Any]) -> None:
     """To be called by the script of a slave, as its last statement, when all is imported.
@@ -116,26 +137,6 @@ def _release_interpreter(resources: Path) -> None:
             continue
 
 
-Slave = TypeVar("Slave", bound=type)
-
-#: What sealing has put after the name of every module in the FMU; empty: this is not in one.
-_SEAL = "".join(re.findall(r"_[0-9a-f]{12}$", __name__.partition(".")[0]))
-
-#: Packages that are in an FMU beside the user's script.
-_OURS = tuple(f"{package}{_SEAL}" for package in ("fmus", "auv_fmu", "pythonfmu"))
-
-_MISSING = {f"get_{kind.lower()}": value for kind, value in MISSING.items()}
-
-_CALLS = (
-    "setup_experiment",
-    "enter_initialization_mode",
-    "exit_initialization_mode",
-    "terminate",
-    *(f"set_{kind.lower()}" for kind in MISSING),
-    *_MISSING,
-)
-
-
 def place(error: BaseException) -> str:
     """Where in a user's script an error was raised, as `script.py:12: `; empty: in none."""
     if not _SEAL:
@@ -182,7 +183,7 @@ def _catching(method: Callable[..., Any], name: str) -> Callable[..., Any]:
             self._raised = True
             if has_loader(self.resources):
                 self.log("", Fmi2Status.error, ANSWER)
-            return [_MISSING[name]] * len(arguments[0]) if name in _MISSING else None
+            return [_INSTEAD[name]] * len(arguments[0]) if name in _INSTEAD else None
 
     return call
 

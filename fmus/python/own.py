@@ -1,8 +1,8 @@
 """A component of the user's own as an FMU: `python -m fmus.python.own SCRIPT --out DIR`.
 
 The script holds a slave of PythonFMU, plain or on the base of this package. Its FMU is sealed like
-those of the bundle: built again after a change, it runs the changed code in the same process, and
-modules that lie beside the script are in it.
+the ones of the bundle: built again after a change, it runs the changed code in the same process,
+and modules that lie beside the script are in it.
 """
 
 from __future__ import annotations
@@ -18,8 +18,7 @@ from fmus.python.packaging import LOADERS, best_loader, fmu_entries, seal
 
 #: The script of the FMU, with a slave that may raise.
 _SCRIPT = """\
-from fmus.python.loading import settle
-from fmus.python.loading import caught
+from fmus.python.loading import caught, settle
 from {module} import {component}
 
 settle(caught({component}), globals(), locals())

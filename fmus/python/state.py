@@ -20,6 +20,16 @@ from fmus.python.callbacks import INSTANTIATED, MODES, STEPPING, Store
 
 _SCALARS = (float, int, bool, str, type(None))
 
+#: Key of what speaks against bytes or a snapshot: PythonFMU asks for them where nothing can be
+#: reported, so they are refused when they are set.
+_UNUSABLE = "unusable"
+
+#: Difference of what was computed from the same numbers on two machines.
+_ROUNDING = 1e-9
+
+#: Key of the checksum in the bytes of a state.
+_CHECKSUM = "checksum"
+
 
 def measuring(kind: type) -> Callable[[Any], float]:
     """A function that gives the Euclidean norm of all floats of a state: NaN if one is NaN.
@@ -127,17 +137,6 @@ class Snapshot(TypedDict):
     state: Any  #: NamedTuple of the component, None before the initialisation
     hidden: Any  #: what the component keeps outside its state
     fault: bool
-
-
-#: Key of what speaks against bytes or a snapshot: PythonFMU asks for them where nothing can be
-#: reported, so they are refused when they are set.
-_UNUSABLE = "unusable"
-
-#: Difference of what was computed from the same numbers on two machines.
-_ROUNDING = 1e-9
-
-#: Key of the checksum in the bytes of a state.
-_CHECKSUM = "checksum"
 
 
 def unusable(why: str) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Panels in rows, and those of several figures: path, tracking errors, commands with their limits.
+"""Figures of panels, and panels that several figures have: path, tracking errors, commands.
 
 What no run has the signals for is left out, with a note.
 """
@@ -45,6 +45,30 @@ from orchestrator.vehicle.signals import (
 
 #: Room for a heading [in].
 _HEADING = 0.3
+
+#: An axis of a path is at least this share of the longest: a straight line lies in a box.
+_FLATTEST = 0.3
+
+#: Where limits of the actuators are in sight: when a command comes up to this share of them.
+_NEAR = 0.5
+
+#: Commands are cut off at this multiple of the limits, with a word.
+_BEYOND = 1.5
+
+#: Zero crossings reach far down in a logarithmic scale, and say nothing below this [m].
+_SMALLEST_ERROR = 1e-5
+
+#: The second of two runs: thin and solid, for dashes of a signal that swings are a smear.
+_THICK, _THIN = 1.4, 0.8
+
+#: Of the events of a run, so many are marked; names of those after this share stand before them.
+_MOST_MARKS, _LATE = 20, 0.6
+
+#: What a line of text needs of the height of a panel.
+_ROOM = 0.25
+
+#: Peaks from here on are written with an exponent [N, N.m].
+_MANY = 1e6
 
 
 class Cell:
@@ -135,31 +159,6 @@ def _left_out(panel: Panel, runs: Sequence[Drawn]) -> list[str]:
         for label, names in missing.items()
         if names
     ]
-
-
-#: An axis of a path is at least this share of the longest: a straight line lies in a box.
-_FLATTEST = 0.3
-
-#: Where limits of the actuators are in sight: when a command comes up to this share of them.
-_NEAR = 0.5
-
-#: Commands are cut off at this multiple of the limits, with a word.
-_BEYOND = 1.5
-
-#: Zero crossings reach far down in a logarithmic scale, and say nothing below this [m].
-_SMALLEST_ERROR = 1e-5
-
-#: The second of two runs: thin and solid, for dashes of a signal that swings are a smear.
-_THICK, _THIN = 1.4, 0.8
-
-#: Of the events of a run, so many are marked; names of those after this share stand before them.
-_MOST_MARKS, _LATE = 20, 0.6
-
-#: What a line of text needs of the height of a panel.
-_ROOM = 0.25
-
-#: Peaks from here on are written with an exponent [N, N.m].
-_MANY = 1e6
 
 
 def _path(cell: Cell, runs: Sequence[Drawn]) -> None:

@@ -42,6 +42,9 @@ from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import AXES, STANDARD, Loop, Needs, suffixes, true_control_point
 
+#: Seconds before a bar appears on a terminal.
+_PATIENCE = 2.0
+
 
 def _all_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
     axes = cell.axes()
@@ -191,10 +194,6 @@ def overlay(heading: str, runs: Sequence[Drawn]) -> Figure:
     if figure is None:
         raise InputError(f"no figure: the runs have no {missing[0]}")
     return figure
-
-
-#: Seconds before a bar appears on a terminal.
-_PATIENCE = 2.0
 
 
 def check_figure(kind: str) -> None:

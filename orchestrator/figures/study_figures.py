@@ -51,7 +51,6 @@ _DARK, _NOTHING = 0.6, 0.05
 #: More lines or panels than this show nothing.
 _MOST_PARTS = 12
 
-
 #: Room for a heading, and for a legend or the names of axes [in].
 _HEADING, _NAMES = 0.3, 0.45
 

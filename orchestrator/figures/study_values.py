@@ -21,6 +21,13 @@ Columns: TypeAlias = Mapping[str, np.ndarray]
 #: Columns that are texts.
 SCENARIO, FAILURE = "scenario", "failure"
 
+#: Up to so many different values have a bin each.
+_GRID = 40
+
+#: An axis is logarithmic if its values are positive, and a large one, larger than this share of
+#: them, is so many times a small one.
+_LARGE, _WIDE = 0.95, 10.0
+
 _NORM = re.compile(r"\|(.+)\|")
 _UNIT = re.compile(r" \[([^\]]*)\]$")
 
@@ -188,14 +195,6 @@ def _factors(value: str) -> list[str]:
 
 def _is_nan(value: Any) -> bool:
     return isinstance(value, float) and isnan(value)
-
-
-#: Up to so many different values have a bin each.
-_GRID = 40
-
-#: An axis is logarithmic if its values are positive, and a large one, larger than this share of
-#: them, is so many times a small one.
-_LARGE, _WIDE = 0.95, 10.0
 
 
 @dataclass(frozen=True)

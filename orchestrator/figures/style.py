@@ -63,7 +63,6 @@ _GREEK = {
 _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SYMBOL = re.compile(rf"(?<![\w\\.])({'|'.join(_GREEK)}|[A-Za-z])_([A-Za-z0-9]+)(?!\w)")
 
-
 #: What figures are written as.
 FORMATS = ("png", "svg")
 

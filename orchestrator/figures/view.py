@@ -1,4 +1,7 @@
-"""One page to turn a run around and play it: the path in space, beside it signals over time."""
+"""One page to turn a run around and play it: the path in space, beside it signals over time.
+
+The body of the vehicle that it shows is the one in films, too.
+"""
 
 from __future__ import annotations
 
@@ -26,6 +29,23 @@ from orchestrator.vehicle.signals import (
     true_control_point,
 )
 
+_PAGE = Path(__file__).with_name("view.html")
+
+#: Instants at which the vehicle is shown.
+_FRAMES = 1000
+
+#: Times into which a line is divided, of each of which it keeps the smallest and largest value.
+_DIVISIONS = 700
+
+#: Length of the drawn vehicle as a share of the largest extent of the scene, and times ell.
+_SHARE, _LENGTH = 0.18, 2.0
+
+#: Height of a panel of the series, and of the gaps between them [px].
+_PANEL, _GAP, _MARGIN = 150, 26, 40
+
+#: Digits of numbers in the page: more than a screen resolves.
+_DIGITS = 6
+
 #: Distance behind the nose and radius of the rings of the hull, as shares of its length.
 _RINGS = (
     (0.0, 0.0),
@@ -37,11 +57,11 @@ _RINGS = (
     (1, 0.02),
 )
 
+#: Sides of the hull.
 _SIDES = 12
 
 #: Corners of the upper fin, as shares of the length behind the nose and above the axis.
 _FIN = ((0.74, 0.05), (0.84, 0.22), (0.94, 0.22), (0.94, 0.03))
-
 
 #: Axes of the paper's words, whose z is up, in axes whose z is down; in the earth and in the body.
 Z_UP = np.array([1.0, -1.0, -1.0])
@@ -86,24 +106,6 @@ def body() -> Body:
         triangles += [(n, n + 1, n + 2), (n, n + 2, n + 3)]
         parts += [2 if i else 1] * 2
     return Body(np.array(points), np.array(triangles), np.array(parts))
-
-
-_PAGE = Path(__file__).with_name("view.html")
-
-#: Instants at which the vehicle is shown.
-_FRAMES = 1000
-
-#: Times into which a line is divided, of each of which it keeps the smallest and largest value.
-_DIVISIONS = 700
-
-#: Length of the drawn vehicle as a share of the largest extent of the scene, and times ell.
-_SHARE, _LENGTH = 0.18, 2.0
-
-#: Height of a panel of the series, and of the gaps between them [px].
-_PANEL, _GAP, _MARGIN = 150, 26, 40
-
-#: Digits of numbers in the page: more than a screen resolves.
-_DIGITS = 6
 
 
 class _Lines(NamedTuple):

@@ -19,6 +19,18 @@ _WHOLE = 20_000
 #: Times into which a longer run is divided, at least, and less than twice as many at most.
 _DIVISIONS = 200
 
+#: A signal chatters if it turns around at more than this share of its rows ...
+_TURNS = 0.2
+
+#: ... by more than this share of its range.
+_NEGLIGIBLE = 1e-3
+
+#: A mean is taken over this share of a run.
+_WINDOW = 0.01
+
+#: Times and values of a signal, linear in the rows of the table that it is taken from.
+Signal = Callable[[Table], tuple[np.ndarray, np.ndarray]]
+
 
 class _Division(NamedTuple):
     """What is kept of a part of a run.
@@ -133,20 +145,6 @@ class VisibleRows(Table):
         watched = pairs[:, 1, self._watched]
         found = {0, len(pairs) - 1, *watched.argmin(axis=0), *watched.argmax(axis=0)}
         return pairs[sorted(found)]
-
-
-#: A signal chatters if it turns around at more than this share of its rows ...
-_TURNS = 0.2
-
-#: ... by more than this share of its range.
-_NEGLIGIBLE = 1e-3
-
-#: A mean is taken over this share of a run.
-_WINDOW = 0.01
-
-
-#: Times and values of a signal, linear in the rows of the table that it is taken from.
-Signal = Callable[[Table], tuple[np.ndarray, np.ndarray]]
 
 
 def draw_signal(axes: Axes, table: Table, signal: Signal, **line: Any) -> bool:

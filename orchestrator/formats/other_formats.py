@@ -28,7 +28,7 @@ from orchestrator.system.values import Value, literal, type_of, typed
 _TAKEN = ("2.0",)
 
 #: What libcosim calls its file, and takes where that does not say it: a step [s], and an algorithm.
-STRUCTURE = "OspSystemStructure.xml"
+OSP_STRUCTURE = "OspSystemStructure.xml"
 _STEP, _ALGORITHM = 0.1, "fixedStep"
 
 #: A step that differs less from a multiple of the communication step is that multiple.
@@ -71,7 +71,7 @@ def write_osp(system: System, folder: Path) -> list[Path]:
     ):
         SubElement(root, tag).text = text
     simulators = SubElement(root, "Simulators")
-    fmus = system.fmus(STRUCTURE)
+    fmus = system.fmus(OSP_STRUCTURE)
     for fmu, name in fmus.items():
         shutil.copyfile(fmu, folder / name)
     for name, component in system.components.items():
@@ -90,7 +90,7 @@ def write_osp(system: System, folder: Path) -> list[Path]:
         for end in (connection.source, connection.target):
             SubElement(element, "Variable", simulator=end.component, name=end.port)
     ElementTree.indent(root)
-    path = folder / STRUCTURE
+    path = folder / OSP_STRUCTURE
     path.write_bytes(ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True))
     return [path, *(folder / name for name in fmus.values())]
 
@@ -106,7 +106,7 @@ def read_osp(path: Path, findings: Findings | None = None) -> System:
         InputError: the file is missing, broken, or uses what this master cannot do.
 
     """
-    path = path / STRUCTURE if is_folder(path) else path
+    path = path / OSP_STRUCTURE if is_folder(path) else path
     archive = Archive(path, Findings() if findings is None else findings)
     root = _root(path)
     components = _components(archive, root)
@@ -139,11 +139,11 @@ def _root(path: Path) -> Element:
     try:
         root = ElementTree.fromstring(path.read_bytes())
     except Exception as error:
-        raise InputError(f"{path}: not a readable {STRUCTURE}: {reason(error)}") from error
+        raise InputError(f"{path}: not a readable {OSP_STRUCTURE}: {reason(error)}") from error
     for element in root.iter():
         element.tag = element.tag.rpartition("}")[2]
-    if root.tag != Path(STRUCTURE).stem:
-        raise InputError(f"{path}: not a readable {STRUCTURE}: it describes a <{root.tag}>")
+    if root.tag != Path(OSP_STRUCTURE).stem:
+        raise InputError(f"{path}: not a readable {OSP_STRUCTURE}: it describes a <{root.tag}>")
     return root
 
 

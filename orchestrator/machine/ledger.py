@@ -145,7 +145,7 @@ class Ledger:
         for path in sorted(self.unfinished.rglob("*")):
             to_disk(path)
             if path.is_file():
-                new[path.relative_to(self.unfinished).as_posix()] = digest_of(path)
+                new[path.relative_to(self.unfinished).as_posix()] = sha256_of(path)
         to_disk(self.unfinished)
         leaving = sorted(set(old) & self._files.keys() - new.keys())
         if not new and not leaving:
@@ -312,11 +312,11 @@ def is_changed(path: Path) -> bool:
         if content is None:
             return True
         if digests := {part[name] for part in content[1:3] if name in part}:
-            return digest_of(located(path)) not in digests
+            return sha256_of(located(path)) not in digests
     return False
 
 
-def digest_of(path: Path) -> str:
+def sha256_of(path: Path) -> str:
     """SHA-256 of a file."""
     with path.open("rb") as file:
         return file_digest(file, "sha256").hexdigest()
@@ -324,7 +324,7 @@ def digest_of(path: Path) -> str:
 
 def _digest_in(folder: Path, name: str) -> str | None:
     """The digest of a file in a folder; None: there is none, or a link leads to it."""
-    return digest_of(folder / name) if _is_plain(folder, name) else None
+    return sha256_of(folder / name) if _is_plain(folder, name) else None
 
 
 def _is_plain(folder: Path, name: str) -> bool:

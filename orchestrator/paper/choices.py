@@ -83,6 +83,7 @@ _WAVES, _SIGN = Disturbance(), "(2): the minus of tau_w"
 #: What the reference's surge force drives it at, straight on [m/s].
 _UNDER_WAY = TAU_D[0] / Vehicle().d11
 
+#: Name of the choice that runs with five degrees of freedom have one option of.
 VEHICLE = "vehicle"
 
 #: Choices that a run depends on.
@@ -180,11 +181,11 @@ OF_RUNS = (
 
 #: The vehicle of (1) and (2), and what it contradicts. From 30 m away it passes the pole of (1),
 #: and no single run says what it gives then.
-FIVE, AGAINST_FIVE = Option("five degrees of freedom", {"plant.roll": False}), "4.1: 6-DOF"
+FIVE_DEGREES, AGAINST_FIVE = Option("five degrees of freedom", {"plant.roll": False}), "4.1: 6-DOF"
 
 #: What a run of five depends on, of what contradicts nothing else.
 OF_RUNS_OF_FIVE = tuple(
-    choice._replace(options=(FIVE,))
+    choice._replace(options=(FIVE_DEGREES,))
     if choice.name == VEHICLE
     else choice._replace(options=tuple(each for each in choice.options if not each.against))
     for choice in OF_RUNS

@@ -35,6 +35,9 @@ STEPS = (STEP, 0.01, 0.005, 0.002)
 #: Values of lambda to show the effect of [m/s]; section 4.1 has the second.
 LAMBDAS = (0.5, 1.0, 1.5, 2.1, 3.0, 4.0)
 
+#: Names of the actuators' signals in figures.
+_SIGNALS = tuple(rf"$\tau_{k}$" for k in ACTUATORS)
+
 _PRINTED = replace(FIVE, parameters={"controller.printed_jacobian": True})
 _JACOBI, _JACOBI_PD = (replace(run, order="jacobi") for run in (FIVE, FIVE_PD))
 _NOISY = tuple(Request("fig4", {"plant.noise.std": level}) for level in NOISE_LEVELS)
@@ -113,10 +116,6 @@ def show_effect(name: str, kept_runs: Sequence[KeptRun], folder: Path) -> str:
         shown = found.show(*kept_runs)
         save(shown.figure, folder / f"{name}.png")
     return f"{shown.text}\n\n{picture(found.title, f'{folder.name}/{name}.png')}"
-
-
-#: Names of the actuators' signals in figures.
-_SIGNALS = tuple(rf"$\tau_{k}$" for k in ACTUATORS)
 
 
 def _draw_lines(

@@ -14,7 +14,7 @@ from orchestrator.machine.workers import workers
 from orchestrator.paper.choices import (
     AGAINST_FIVE,
     END_TIMES,
-    FIVE,
+    FIVE_DEGREES,
     PD,
     PROPOSED,
     PUBLISHED,
@@ -34,9 +34,12 @@ from orchestrator.paper.variants import (
     all_variants,
 )
 from orchestrator.runs.folder import replaced
-from orchestrator.runs.record import RECORDED, Stopwatch, write_files
+from orchestrator.runs.record import RECORDED, Stopwatch, write_content
 from orchestrator.vehicle.indices import REACHED
 from orchestrator.vehicle.signals import ACTUATORS, AXES
+
+#: The files.
+_NAMES = _TEXT, _VARIANTS = "table.md", "variants.csv"
 
 #: The score is told of so much less and more than T_f [s], for e_f moves with the waves.
 _AROUND = 10
@@ -245,11 +248,7 @@ def _options(found: Found) -> Iterator[list[str]]:
             yield [plain(choice.name), plain(option.text), *written, plain(option.against)]
         if choice.name == VEHICLE:
             score = f"{found.printed[-1].score:.2f}, of medians"
-            yield [plain(choice.name), plain(FIVE.text), "", score, plain(AGAINST_FIVE)]
-
-
-#: The files.
-_NAMES = _TEXT, _VARIANTS = "table.md", "variants.csv"
+            yield [plain(choice.name), plain(FIVE_DEGREES.text), "", score, plain(AGAINST_FIVE)]
 
 
 def write_table(folder: Path, command: Sequence[str], force: bool = False) -> tuple[Path, Path]:
@@ -276,7 +275,7 @@ def write_table(folder: Path, command: Sequence[str], force: bool = False) -> tu
         (unfinished / _TEXT).write_text(text, encoding="utf-8")
         write_variants(unfinished / _VARIANTS, found)
         content = {"command": list(command), **clock.times()}
-        write_files(unfinished, content, (*RECORDED, "numba"))
+        write_content(unfinished, content, (*RECORDED, "numba"))
     return folder / _TEXT, folder / _VARIANTS
 
 

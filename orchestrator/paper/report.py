@@ -29,7 +29,7 @@ from orchestrator.paper.sections import (
 from orchestrator.paper.variants import all_variants
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.folder import inner, replaced
-from orchestrator.runs.record import RECORDED, Stopwatch, write_files
+from orchestrator.runs.record import RECORDED, Stopwatch, write_content
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.proof import gain_check
 
@@ -122,7 +122,7 @@ def write_report(
             **clock.times(),
             "runs": [f"auv-fmu run {label}" for label in kept_runs.labels],
         }
-        write_files(unfinished, record)
+        write_content(unfinished, record)
     kept_runs.forget_others()
     return folder / _PAGE, folder / _MARKDOWN
 

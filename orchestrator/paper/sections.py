@@ -27,11 +27,16 @@ from orchestrator.studies.study import Study, ready_studies
 from orchestrator.studies.study_file import read_study
 from orchestrator.studies.sweep import Means, swept
 from orchestrator.system.names import file_name, port_name
-from orchestrator.vehicle.indices import metrics as indices
-from orchestrator.vehicle.indices import of_vehicles
+from orchestrator.vehicle.indices import metrics, of_vehicles
 
 #: The parameter that decides whether a run has a twin without noise.
 _NOISE = "plant.noise.std"
+
+#: What the report says in place of studies.
+_WITHOUT = (
+    f"Not in this report: {', '.join(ready_studies())}, each 10,000 runs or more. "
+    "`auv-fmu report --studies` makes them, or what is missing of them."
+)
 
 
 @dataclass(frozen=True)
@@ -204,15 +209,15 @@ def written(
         yield "\n".join(_ours(scenario))
 
 
-def _indices(metrics: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
-    for index in indices():
-        if any(index.name in values for values in metrics):
+def _indices(runs: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
+    for index in metrics():
+        if any(index.name in values for values in runs):
             units = [printed_unit(unit) for unit in index.units.values()]
             cells = (
                 values_with_units(np.atleast_1d(values[index.name]).tolist(), units)
                 if index.name in values
                 else ""
-                for values in metrics
+                for values in runs
             )
             members = f" ({index.members})" * (len(index.units) > 1)
             yield [f"{index.label}{members}", *cells]
@@ -226,12 +231,6 @@ def _ours(scenario: Scenario) -> Iterator[str]:
         is_short = value is not None and not isinstance(value, Mapping)
         stated = f"{name} = {json.dumps(value, default=str)}" if is_short else name
         yield f"- `{stated}`: {plain(why)}"
-
-
-_WITHOUT = (
-    f"Not in this report: {', '.join(ready_studies())}, each 10,000 runs or more. "
-    "`auv-fmu report --studies` makes them, or what is missing of them."
-)
 
 
 def make_studies(

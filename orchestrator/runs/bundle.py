@@ -27,7 +27,7 @@ from orchestrator.machine.cache import folder_of, keep, kept, users_folder
 from orchestrator.machine.children import run_module
 from orchestrator.machine.disk import claimed, process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
-from orchestrator.machine.ledger import digest_of
+from orchestrator.machine.ledger import sha256_of
 from orchestrator.runs.folder import replaced
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import WRITABLE
@@ -90,7 +90,7 @@ def build(
         archive = unfinished / _ARCHIVE
         archive.write_bytes(ssp_bytes(closed_loop(unfinished, versions=WRITABLE)))
         files = [*sorted(unfinished.glob("*.fmu")), archive]
-        digests = {path.name: digest_of(path) for path in files}
+        digests = {path.name: sha256_of(path) for path in files}
         # As `sha256sum --check` reads them.
         lines = "".join(f"{digest}  {name}\n" for name, digest in digests.items())
         (unfinished / _CHECKSUMS).write_bytes(lines.encode())

@@ -12,9 +12,8 @@ from typing import TypeVar
 
 from fmus.kinds import FMI_VERSIONS, PYTHON
 from orchestrator.figures.run_figures import check_figure
-from orchestrator.formats.other_formats import STRUCTURE as OSP
-from orchestrator.formats.other_formats import read_osp
-from orchestrator.formats.ssp import STRUCTURE as SSD
+from orchestrator.formats.other_formats import OSP_STRUCTURE, read_osp
+from orchestrator.formats.ssp import STRUCTURE
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.user_files import is_folder
@@ -100,7 +99,7 @@ def loaded(
         check_brings_its_own(name, kind, fmi)
         system = read_ssp(path, variant, findings) if read is read_ssp else read(path, findings)
         whole = path.resolve()
-        named = whole.parent if path.name in (SSD, OSP) else whole
+        named = whole.parent if path.name in (STRUCTURE, OSP_STRUCTURE) else whole
         return Scenario(named.stem, title=path.name or named.name), system
     scenario = read_scenario(name)
     check_figure(scenario.figure)
@@ -145,7 +144,8 @@ def _reader(path: Path) -> Callable[..., System] | None:
     """What reads a file or folder; None: it is a scenario."""
     if path.suffix in _READERS or str(path) in names() or not is_folder(path):
         return _READERS.get(path.suffix)
-    return read_osp if (path / OSP).is_file() and not (path / SSD).is_file() else read_ssp
+    is_osp = (path / OSP_STRUCTURE).is_file() and not (path / STRUCTURE).is_file()
+    return read_osp if is_osp else read_ssp
 
 
 def left_behind(scenario: Scenario) -> str | None:

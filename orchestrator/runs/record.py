@@ -112,7 +112,7 @@ def write_record(
             for component in prepared.system.components.values()
         },
     }
-    write_files(folder, content)
+    write_content(folder, content)
 
 
 def content_of(header: Header, ending: Ending, loops: Sequence[Loop]) -> dict[str, object]:
@@ -131,7 +131,7 @@ def content_of(header: Header, ending: Ending, loops: Sequence[Loop]) -> dict[st
     }
 
 
-def write_files(
+def write_content(
     folder: Path, content: Mapping[str, object], packages: Sequence[str] = RECORDED
 ) -> None:
     """Write a record, with versions, the platform, and the names of all files beside it."""
@@ -326,7 +326,7 @@ def checkpoints_of(
     return found
 
 
-def leave(
+def leave_checkpoints(
     kept: Sequence[Checkpoints], is_whole: bool, say: Callable[[str], None] = lambda _: None
 ) -> None:
     """Remove checkpoints that are not needed any more, or say where they are.

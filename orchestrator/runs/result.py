@@ -27,7 +27,7 @@ from orchestrator.runs.record import (
     FILES,
     Stopwatch,
     checkpoints_of,
-    leave,
+    leave_checkpoints,
     write_metrics,
     write_record,
 )
@@ -293,7 +293,7 @@ def simulate(
     with _checkpoints(prepared, checkpoint, checkpoint_every, resume) as kept:
         result.resumed_at = next((checkpoints.time for checkpoints in kept), None)
         ending = prepared.run([*observers, *kept], kept)
-        leave(kept, ending.failure is None)
+        leave_checkpoints(kept, ending.failure is None)
     for number in ending.signals:
         # Held back while the FMUs computed; now it does what it does elsewhere.
         signal.raise_signal(number)

@@ -41,7 +41,7 @@ from orchestrator.runs.record import (
     FILES,
     Stopwatch,
     checkpoints_of,
-    leave,
+    leave_checkpoints,
     write_metrics,
     write_record,
 )
@@ -177,7 +177,7 @@ def run_into(
         _write_ends(done, command, clock)
         place = place_of(unfinished, folder)
     is_whole = len(done) == len(runs) and all(run.ending.failure is None for run in done)
-    leave(kept, is_whole, say)
+    leave_checkpoints(kept, is_whole, say)
     return [
         Finished(place, run.prepared.scenario.name, run.metrics, run.ending, run.notes)
         for run in done

@@ -29,6 +29,7 @@ from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 #: What a message calls a file that cannot be read.
 _WHAT = "not a scenario"
 
+#: Scenarios that come with the bundle.
 FOLDER = Path(__file__).parent / "scenarios"
 
 #: What is run besides the scenarios that come with the bundle.

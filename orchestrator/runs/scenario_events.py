@@ -107,7 +107,7 @@ def _condition(text: str, system: System) -> Condition:
             f'when = {text!r}: write a signal, < or >, and a number: "plant.eta.z > 5"'
         )
     name, comparison, number = match.groups()
-    [signal] = _ports(system, name, ("input", "output"), alone=True)
+    [signal] = _ports(system, name, ("input", "output"), single=True)
     try:
         return Condition(signal, comparison, finite(number, f"when = {text!r}:"))
     except ValueError as error:
@@ -118,7 +118,7 @@ def _condition(text: str, system: System) -> Condition:
 
 
 def _ports(
-    system: System, text: str, causalities: Sequence[str], alone: bool = False
+    system: System, text: str, causalities: Sequence[str], single: bool = False
 ) -> list[PortName]:
     """The port of a name, or the ports of a group.
 
@@ -126,14 +126,14 @@ def _ports(
         system: that has them.
         text: `component.port` or `component.group`.
         causalities: that they may have.
-        alone: whether one is wanted, and no group.
+        single: whether a port is wanted, and no group.
 
     Raises:
         InputError: there is none.
 
     """
     port = system.named(port_name(text))
-    if not system.has(port) and not alone:
+    if not system.has(port) and not single:
         for component, group in splits(text):
             if component in system.components:
                 members = [
@@ -263,6 +263,7 @@ def _reset(names: Any, system: System) -> Action:
     return Reset(tuple(_things(names)))
 
 
+#: What an event can do, by the key of its table.
 ACTIONS: Mapping[str, Callable[[Any, System], Action]] = {
     "set": _set,
     "override": lambda values, system: Alter("override", _altered(values, system, _value)),

@@ -42,7 +42,6 @@ FATAL = "every process that made it died"
 #: What this process makes runs with, if it is a worker of this machine.
 _engine: list[Engine] = []
 
-
 #: How long a block has taken [s], and the outcomes of its runs, or of the first of them where all
 #: took too long.
 Answer = tuple[float, list[Outcome]]

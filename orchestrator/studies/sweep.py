@@ -180,7 +180,7 @@ def check_installed(needed: Sequence[str] = _NEEDED) -> None:
     """Check that the packages are there that studies need.
 
     Raises:
-        InputError: it is not.
+        InputError: one of them is not.
 
     """
     missing = [package for package in needed if find_spec(package) is None]

@@ -1,4 +1,7 @@
-"""What may give numbers that are not meant: known before a run, or seen in it."""
+"""What may give numbers that are not meant: known before a run, or seen in it.
+
+Among the former: which velocities reach a controller that is to do without.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +24,9 @@ _SAME = 1e-6
 
 #: h p beyond which a mode of Euler's scheme changes its sign in every step, and grows.
 _REVERSES, _GROWS = 1.0, 2.0
+
+#: Units of a velocity at a port.
+_VELOCITY_UNITS = {"m/s", "rad/s"}
 
 
 def watched(loop: Loop) -> tuple[str, str]:
@@ -70,10 +76,10 @@ def _differing(system: System, loop: Loop) -> str | None:
     texts, others = [], set()
     for text in (loop.ell, *loop.vehicle_parameters, *loop.limits):
         name = system.named(port_name(text))
-        true, held = _parameter(system, name), dict[float, list[str]]()
+        true, held = _real_parameter(system, name), dict[float, list[str]]()
         for other in (loop.controller, loop.planner):
             same = PortName(other, name.port)
-            value = _parameter(system, same)
+            value = _real_parameter(system, same)
             if true is not None and value is not None and value != true:
                 held.setdefault(value, []).append(str(same))
                 others.add(other)
@@ -85,7 +91,7 @@ def _differing(system: System, loop: Loop) -> str | None:
     return f"{'; '.join(texts)}: {' and '.join(sorted(others))} {made} set for another vehicle"
 
 
-def _parameter(system: System, name: PortName) -> float | None:
+def _real_parameter(system: System, name: PortName) -> float | None:
     """The value of a parameter that is a number; None: there is none of the name."""
     if not system.has(name):
         return None
@@ -166,10 +172,6 @@ def _of_the_reference(table: Table, name: str, other: Table, loop: Loop) -> list
         f"its reference {loop.planner}.y_d is up to {apart:.3g} m away from that of {name}: the "
         "two runs follow different paths"
     ]
-
-
-#: Units of a velocity at a port.
-_VELOCITY_UNITS = {"m/s", "rad/s"}
 
 
 def velocities_reaching(system: System, component: str = STANDARD.controller) -> list[str]:

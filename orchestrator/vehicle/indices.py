@@ -34,6 +34,9 @@ from orchestrator.vehicle.signals import STANDARD, Loop, Needs
 #: An error of tracking that counts as having reached the reference [m].
 REACHED = 1.0
 
+#: Where metrics.json has the indices of each of several vehicles.
+VEHICLES = "vehicles"
+
 
 class Index(NamedTuple):
     """An index: what it is called, what it is of, and what makes it.
@@ -365,10 +368,6 @@ class Metrics(Indices):
             reaching = velocities_reaching(system, loop.controller)
             content["velocities_reaching_controller"] = reaching
         return content
-
-
-#: Where metrics.json has the indices of each of several vehicles.
-VEHICLES = "vehicles"
 
 
 def of_vehicles(content: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:

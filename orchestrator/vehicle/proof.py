@@ -50,6 +50,15 @@ wrong in the paper"; so has docs/paper.md."""
 _PAPER = """\
 These are the paper's own gains: as printed they miss (30), and (31) in any unit of speed."""
 
+#: Columns of :func:`certificates`.
+CERTIFICATE_COLUMNS = (
+    "time",
+    "V_without_theta",
+    *(f"r_1.{k}" for k in AXES),
+    *(f"r_2.{k}" for k in AXES),
+    *(f"saturation_margin.{k}" for k in ACTUATORS),
+)
+
 
 def theorem_of(system: System, loop: Loop = STANDARD) -> Theorem:
     """The theorem for the parameters of a loop.
@@ -151,15 +160,6 @@ def _sampling(system: System, loop: Loop) -> list[str]:
         f"{rate:.4g} 1/s,",
         f"h p = {h * rate:.3g}: it changes its sign in every step above 1, and grows above 2.",
     ]
-
-
-CERTIFICATE_COLUMNS = (
-    "time",
-    "V_without_theta",
-    *(f"r_1.{k}" for k in AXES),
-    *(f"r_2.{k}" for k in AXES),
-    *(f"saturation_margin.{k}" for k in ACTUATORS),
-)
 
 
 def missing_for_certificates(table: Table, loop: Loop = STANDARD) -> list[str]:

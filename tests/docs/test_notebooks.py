@@ -8,10 +8,10 @@ import pytest
 
 from support.markdown import DOCS
 
-nbformat = pytest.importorskip("nbformat")
-nbclient = pytest.importorskip("nbclient")
-pytest.importorskip("ipykernel")
-pytest.importorskip("pandas")
+nbformat = pytest.importorskip("nbformat", reason="needs the extra `docs`")
+nbclient = pytest.importorskip("nbclient", reason="needs the extra `docs`")
+pytest.importorskip("ipykernel", reason="needs the extra `docs`")
+pytest.importorskip("pandas", reason="needs the extra `docs`")
 
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
 

@@ -28,7 +28,7 @@ REPETITIONS = 8
 needs_compiler = pytest.mark.skipif(loader_compiler() is None, reason="there is no C compiler")
 needs_libpython = pytest.mark.skipif(
     not LIBPYTHON.name.endswith(".so.1.0") or not LIBPYTHON.is_file(),
-    reason="no shared library of Python",
+    reason="there is no shared library of Python",
 )
 pytestmark = needs_compiler
 

@@ -26,14 +26,14 @@ from support.status_table import (
     without_an_instance,
     without_the_loader,
 )
-from support.trials import CREATIONS, FMI3, Cell, trials
+from support.trials import CREATIONS, FMI3, Place, trials
 from support.worker import Lost, Worker
 
 #: Longest time for a trial, on a slow machine [s].
 PATIENCE = 60.0
 
 #: By name: what the test of a cell is called.
-CELLS: dict[str, Cell] = {
+CELLS: dict[str, Place] = {
     **{f"{row} - {state}": (key, state) for key, row in rows().items() for state in row.cells},
     **{f"{CREATION}: {case}": ((CREATION, case), "") for case in creations()},
     **{f"on {what}": ((WITHOUT_AN_INSTANCE, what), "") for what in without_an_instance()},
@@ -87,12 +87,12 @@ ALL = [
 @pytest.fixture(scope="module")
 def workers(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Callable[[str, str], Worker[Cell, str]]]:
+) -> Iterator[Callable[[str, str], Worker[Place, str]]]:
     """Processes that try cells, one for each kind and component."""
     with ExitStack() as stack:
 
         @cache
-        def worker(kind: str, name: str) -> Worker[Cell, str]:
+        def worker(kind: str, name: str) -> Worker[Place, str]:
             another = NAMES[NAMES.index(name) - 1]
             fmus = request.getfixturevalue({**FIXTURES, FMI3: "dist3"}[kind])
             folders = unpacked(fmus, tmp_path_factory.mktemp("status"), name, another)
@@ -102,7 +102,7 @@ def workers(
 
 
 @pytest.fixture(scope="module")
-def plain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Worker[Cell, str]]:
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Worker[Place, str]]:
     """The same for an FMU without the native loader."""
     folder = tmp_path_factory.mktemp("plain")
     bundle.build(folder, "plain")
@@ -110,25 +110,25 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Worker[Cell, str
         yield process
 
 
-def hold(worker: Worker[Cell, str], cell: Cell) -> None:
+def hold(worker: Worker[Place, str], cell: Place) -> None:
     wrong = worker.ask(cell, PATIENCE)
     assert not isinstance(wrong, Lost), f"the process is lost: {wrong.why}"
     assert wrong == ""
 
 
 @pytest.mark.parametrize(("kind", "name", "cell"), ALL)
-def test_cell(workers: Callable[[str, str], Worker[Cell, str]], kind: str, name: str, cell: str):
+def test_cell(workers: Callable[[str, str], Worker[Place, str]], kind: str, name: str, cell: str):
     hold(workers(kind, name), CELLS[cell])
 
 
 @pytest.mark.parametrize("cell", [c for c in OF_THE_SLAVE if has_call(PLAIN, OF_THE_SLAVE[c][0])])
-def test_cell_of_a_plain_fmu(plain: Worker[Cell, str], cell: str):
+def test_cell_of_a_plain_fmu(plain: Worker[Place, str], cell: str):
     hold(plain, OF_THE_SLAVE[cell])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("key", without_the_loader(), ids=": ".join)
-def test_what_is_said_of_a_plain_fmu(plain: Worker[Cell, str], key: tuple[str, str]):
+def test_what_is_said_of_a_plain_fmu(plain: Worker[Place, str], key: tuple[str, str]):
     wrong = plain.ask((key, "stepping"), PATIENCE)
     expected = without_the_loader()[key]
     if isinstance(wrong, Lost):

@@ -68,7 +68,7 @@ def place(folder: Path, platform: str, ending: str) -> c_host.LibraryOf:
     return library
 
 
-@pytest.mark.skipif(NM is None, reason="there is no nm")
+@pytest.mark.skipif(NM is None, reason="nm is not installed")
 @pytest.mark.parametrize("name", NAMES)
 def test_library_needs_the_c_library_and_its_mathematics_alone(unpacked: Path, name: str):
     library = place(unpacked, "linux64", ".so")(Component(name, Path(name), None, ""))
@@ -139,7 +139,7 @@ def arm(unpacked: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 @needs_zig
-@pytest.mark.skipif(WINE is None, reason="there is no wine")
+@pytest.mark.skipif(WINE is None, reason="wine is not installed")
 @each_scenario
 def test_windows_gives_the_same_but_for_rounding(native: Path, windows: Path, scenario: str):
     """Its C library has another sine."""
@@ -152,7 +152,7 @@ def test_windows_gives_the_same_but_for_rounding(native: Path, windows: Path, sc
 
 @pytest.mark.slow
 @needs_zig
-@pytest.mark.skipif(QEMU is None, reason="there is no qemu-aarch64")
+@pytest.mark.skipif(QEMU is None, reason="qemu-aarch64 is not installed")
 @pytest.mark.skipif(not ARM_LIBRARIES.is_dir(), reason="there is no C library for ARM")
 @each_scenario
 def test_arm_gives_the_same_bit_for_bit(native: Path, arm: Path, scenario: str):
@@ -162,7 +162,7 @@ def test_arm_gives_the_same_bit_for_bit(native: Path, arm: Path, scenario: str):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(CMAKE is None, reason="there is no cmake")
+@pytest.mark.skipif(CMAKE is None, reason="cmake is not installed")
 def test_fmpy_builds_the_same_from_the_sources_alone(native: Path, tmp_path: Path):
     for name in NAMES:
         folder = Path(fmpy.extract(native / f"{name}.fmu", tmp_path / name))

@@ -39,7 +39,7 @@ from orchestrator import Result, simulate
 from orchestrator.commands.main import main as auv_fmu
 from orchestrator.exchange import verify
 from orchestrator.formats.ssp.writer import ssp_bytes
-from orchestrator.machine import user_files as unpacking
+from orchestrator.machine import user_files
 from orchestrator.machine.disk import _process_folder
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Exchange
@@ -314,7 +314,7 @@ def _stop(_: int, __: FrameType | None) -> None:
 
 def _forget() -> None:
     """Unpack archives anew."""
-    for kept in (unpacking._folders, unpacking._digests, unpacking._wholes):
+    for kept in (user_files._folders, user_files._digests, user_files._wholes):
         kept.clear()
 
 

@@ -30,7 +30,7 @@ def kinds() -> Iterator[dict[str, files.Kind]]:
 @pytest.mark.parametrize("name", [*NAMES[:5], *slow(*NAMES[5:])])
 def test_mutated_files_are_taken_or_refused_in_one_line(kinds, name: str):
     if name not in kinds:
-        pytest.skip("needs plotly")
+        pytest.skip("needs the extra `view`")
     for seed in range(TABLES if name == "table" else RUNS):
         content = kinds[name].mutate(kinds[name].valid, Random(f"{name} {seed}"))
         try:

@@ -57,7 +57,6 @@ stop_time = 0.1
 plant.eta0.z = [1.0, 2.0, 3.0]
 """
 
-
 #: Commands that write into `{out}`, and read what is `{here}`.
 COMMANDS = {
     "run": [*RUN, "--out", "{out}"],

@@ -13,7 +13,6 @@ GLOSSARY = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
 TERMS = re.findall(r"^\| (.+?) \| (.+?) \| `([\w./-]+)`(?: `(\w+)`)? \|$", GLOSSARY, re.MULTILINE)
 RETIRED = re.findall(r"^\| `(\w+)` \| .+ \|$", GLOSSARY, re.MULTILINE)
 
-
 HOUSE = runpy.run_path(str(ROOT / "tools" / "house.py"))
 
 

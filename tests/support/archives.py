@@ -1,4 +1,4 @@
-"""SSP archives of FMUs that are descriptions alone: what is read, and never run."""
+"""SSP archives of FMUs that are only descriptions: what is read, and never run."""
 
 from __future__ import annotations
 

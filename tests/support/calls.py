@@ -12,7 +12,6 @@ from ctypes import (
     byref,
     c_char_p,
     c_double,
-    c_int,
     c_size_t,
     c_uint,
     c_void_p,
@@ -27,6 +26,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from support import states
 from support.raw import (
+    C_TYPES,
     KINDS,
     LAST_SUCCESSFUL_TIME_KIND,
     OF_MODEL_EXCHANGE,
@@ -56,7 +56,6 @@ MODEL_EXCHANGE_FUNCTIONS = tuple(f"fmi2{name}" for name in OF_MODEL_EXCHANGE)
 #: More than this many internal steps are taken for a mistake.
 MOST_INTERNAL_STEPS = 1_000_000
 
-_C_TYPES = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
 _MISSING: dict[str, Any] = {"Real": 0.0, "Integer": 0, "Boolean": 0, "String": b""}
 
 
@@ -599,7 +598,7 @@ def _make_values(host: Host, call: Call, saved: Saved) -> Status:
     if kind == "String":
         values = [_encoded(value) for value in values]
     references = (c_uint * n)(*[item.reference for item in items] * times)
-    array = (_C_TYPES[kind] * n)(*(values if action == "Set" else ()))
+    array = (C_TYPES[kind] * n)(*(values if action == "Set" else ()))
     status = host.call(
         call.function,
         None if null in ("references", "both") else references,

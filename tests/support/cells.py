@@ -196,7 +196,7 @@ class Trial:
         return refused and not self.host.library.answers and not self.row.is_unsound
 
     def _check_what_is_set(self, call: Call, before: Mapping[str, object]) -> bool:
-        """Whether the call is one that changes values, and has changed those alone."""
+        """Whether the call is one that changes values, and has changed only those."""
         if not call.function.startswith("fmi2Set") or "items" not in call.arguments:
             return False
         if self.cell.answer.changes_nothing:

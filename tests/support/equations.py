@@ -39,7 +39,6 @@ OUT const char *restarted(void) { return MODEL_RESTARTED; }
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-Wno-unused-function")
 
-
 #: Bytes of what is said of an error, as in arithmetic.h.
 WHY = 512
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from zlib import crc32
 
 from pythonfmu import FmuBuilder
 
-from orchestrator.system.component import read_component
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
-from support.small_fmus import description, unknown, variable, write
+from orchestrator.system.structure import System
+from support.small_fmus import connected, constants, description, unknown, variable, write
 
 _SOURCE = Path(__file__).with_name("foreign.c")
 
@@ -27,17 +24,8 @@ _DESCRIPTION = description(
     (unknown(2, ""),),
 )
 
-
-def _names(enumeration: str) -> dict[str, int]:
-    """The values of an enumeration in the C source by their names."""
-    found = re.search(rf"enum {{\s*({enumeration}\b[^}}]*)}}", _SOURCE.read_text(encoding="utf-8"))
-    assert found is not None
-    return {name.strip(): i for i, name in enumerate(found[1].rstrip(", \n").split(","))}
-
-
 #: When it misbehaves, and how.
-PHASES, ACTS = _names("ENTER"), _names("BEHAVE")
-
+PHASES, ACTS = constants(_SOURCE, "ENTER"), constants(_SOURCE, "BEHAVE")
 
 _SLAVE = """
 import builtins, json, os, sys
@@ -73,16 +61,8 @@ def build_slave(folder: Path, act: str) -> Path:
 
 def foreign_system(fmu: Path, act: str = "BEHAVE", phase: str = "STEP", at: float = 0.1) -> System:
     """Two instances of the FMU in C, of which the first feeds the second and misbehaves."""
-    components = {name: read_component(name, fmu) for name in ("bad", "good")}
-    connection = Connection(PortName("bad", "y"), PortName("good", "u"))
-    return System("foreign", components, (connection,)).with_parameters(
-        {
-            PortName("bad", "act"): ACTS[act],
-            PortName("bad", "phase"): PHASES[phase],
-            PortName("bad", "at"): at,
-            PortName("bad", "u"): 0.0,
-        }
-    )
+    values = {"bad.act": ACTS[act], "bad.phase": PHASES[phase], "bad.at": at, "bad.u": 0.0}
+    return connected("foreign", {"bad": fmu, "good": fmu}, {"good.u": "bad.y"}, values)
 
 
 def build_c_fmu(folder: Path) -> Path:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,11 +10,17 @@ from typing import NamedTuple
 from hypothesis import strategies as st
 
 from orchestrator.master.hooks.events import Alter, Event
-from orchestrator.system.component import read_component
-from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import Linear, Mapped
-from support.small_fmus import description, enumeration, unknown, variable, write
+from support.small_fmus import (
+    connected,
+    constants,
+    description,
+    enumeration,
+    unknown,
+    variable,
+    write,
+)
 
 _SOURCE = Path(__file__).with_name("mixed.c")
 
@@ -23,21 +28,7 @@ _SOURCE = Path(__file__).with_name("mixed.c")
 KINDS = ("Real", "Integer", "Enumeration", "Boolean")
 _MOST = 4
 
-
-def _constants(first: str) -> dict[str, int]:
-    """The values of an enumeration in the C source, by their names."""
-    found = re.search(rf"enum {{\s*({first}\b[^}}]*)}}", _SOURCE.read_text(encoding="utf-8"))
-    assert found is not None
-    values, value = {}, 0
-    for entry in found[1].split(","):
-        name, _, given = entry.partition("=")
-        value = int(given or value)
-        values[name.strip()] = value
-        value += 1
-    return values
-
-
-_PLACES, CALLS, ACTS = _constants("PORTS"), _constants("SET"), _constants("BEHAVE")
+_PLACES, CALLS, ACTS = (constants(_SOURCE, first) for first in ("PORTS", "SET", "BEHAVE"))
 _PARAMETERS = {name: _PLACES[name.upper()] for name in ("at", "act", "call", "milliseconds")}
 
 
@@ -108,16 +99,8 @@ def system_of(
         parameters: by `component.parameter`.
 
     """
-    components = {
-        name: read_component(name, build(folder, shape)) for name, shape in shapes.items()
-    }
-    wires = tuple(Connection(_port(a), _port(b)) for b, a in (connections or {}).items())
-    values = {_port(name): value for name, value in (parameters or {}).items()}
-    return System("mixed", components, wires).with_parameters(values)
-
-
-def _port(text: str) -> PortName:
-    return PortName(*text.split(".", 1))
+    fmus = {name: build(folder, shape) for name, shape in shapes.items()}
+    return connected("mixed", fmus, connections, parameters)
 
 
 #: Factors and values up to the largest there are.

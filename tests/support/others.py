@@ -8,11 +8,9 @@ from typing import Any
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.observers.table import Table
-from orchestrator.system.component import read_component
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from support.runs import run_table
-from support.small_fmus import description, enumeration, unknown, variable, write
+from support.small_fmus import connected, description, enumeration, unknown, variable, write
 
 _SOURCE = Path(__file__).with_name("others.c")
 
@@ -70,12 +68,7 @@ def build(
 
 def system_of(fmu: Path, names: str = "a", wires: dict[str, str] | None = None) -> System:
     """Instances of an FMU with names of one letter, and what feeds what, by the targets."""
-    connections = [
-        Connection(PortName(*source.split(".")), PortName(*target.split(".")))
-        for target, source in (wires or {}).items()
-    ]
-    components = {name: read_component(name, fmu) for name in names}
-    return System("others", components, tuple(connections))
+    return connected("others", dict.fromkeys(names, fmu), wires)
 
 
 def run(

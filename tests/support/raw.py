@@ -107,7 +107,8 @@ class Callbacks(Structure):
 #: What every process has: calloc and free.
 _LIBC = CDLL(None)
 
-_C_TYPES = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
+#: Types of C for the types of FMI 2.0.
+C_TYPES = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
 
 
 class Variable(NamedTuple):
@@ -229,7 +230,7 @@ class _Arrays:
         self.names = [variable.name for variable in variables]
         self.n = c_size_t(len(variables))
         self.references = (c_uint * len(variables))(*(v.reference for v in variables))
-        self.values = (_C_TYPES[kind] * len(variables))()
+        self.values = (C_TYPES[kind] * len(variables))()
 
 
 class Host:
@@ -313,12 +314,12 @@ class Host:
     def set(self, kind: str, references: Sequence[int], values: Sequence[Any]) -> Status:
         n = len(references)
         return self.call(
-            f"fmi2Set{kind}", (c_uint * n)(*references), c_size_t(n), (_C_TYPES[kind] * n)(*values)
+            f"fmi2Set{kind}", (c_uint * n)(*references), c_size_t(n), (C_TYPES[kind] * n)(*values)
         )
 
     def get(self, kind: str, references: Sequence[int]) -> tuple[Status, list[Any]]:
         n = len(references)
-        values = (_C_TYPES[kind] * n)()
+        values = (C_TYPES[kind] * n)()
         status = self.call(f"fmi2Get{kind}", (c_uint * n)(*references), c_size_t(n), values)
         return status, list(values)
 

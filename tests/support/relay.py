@@ -1,14 +1,12 @@
-"""Systems of small FMUs in C."""
+"""An FMU in C that gives its input on, in proportion and integrated, and systems of it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
 
-from orchestrator.system.component import read_component
-from orchestrator.system.names import port_name
-from orchestrator.system.structure import Connection, System
-from support.small_fmus import description, unknown, variable, write
+from orchestrator.system.structure import System
+from support.small_fmus import connected, description, unknown, variable, write
 
 _SOURCE = Path(__file__).with_name("relay.c")
 
@@ -57,8 +55,4 @@ def system_of(
         others: further attributes of the system.
 
     """
-    components = {name: read_component(name, fmu) for name, fmu in fmus.items()}
-    connections = tuple(Connection(port_name(s), port_name(t)) for t, s in (wires or {}).items())
-    values = {port_name(name): value for name, value in (parameters or {}).items()}
-    system = System("relays", components, connections, **others)  # type: ignore[arg-type]
-    return system.with_parameters(values)
+    return connected("relays", fmus, wires, parameters, **others)

@@ -1,4 +1,4 @@
-"""Runs in memory."""
+"""Runs in memory: of a system or a scenario, and what tests ask of them."""
 
 from __future__ import annotations
 

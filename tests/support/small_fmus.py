@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 from zipfile import ZipFile
 
 import pytest
+
+from orchestrator.system.component import read_component
+from orchestrator.system.names import port_name
+from orchestrator.system.structure import Connection, System
+from orchestrator.system.values import Value
 
 _HERE = Path(__file__).parent
 
@@ -62,6 +69,19 @@ def enumeration(name: str, items: Mapping[str, int]) -> str:
     return f'<SimpleType name="{name}"><Enumeration>{listed}</Enumeration></SimpleType>'
 
 
+def constants(source: Path, first: str) -> dict[str, int]:
+    """The constants of the enumeration in a C source that begins with one, by their names."""
+    found = re.search(rf"enum {{\s*({first}\b[^}}]*)}}", source.read_text(encoding="utf-8"))
+    assert found is not None
+    values, value = {}, 0
+    for entry in found[1].rstrip(", \n").split(","):
+        name, _, given = entry.partition("=")
+        value = int(given or value)
+        values[name.strip()] = value
+        value += 1
+    return values
+
+
 def description(
     identifier: str,
     variables: Iterable[str],
@@ -96,13 +116,36 @@ def description(
 def _library_of(source: Path, *options: str) -> bytes:
     compiler = shutil.which("cc")
     if compiler is None:
-        pytest.skip("no C compiler")
+        pytest.skip("there is no C compiler")
     with TemporaryDirectory() as folder:
         library = Path(folder, source.stem)
         common = ("-shared", "-fPIC", "-O1", "-w", "-ffp-contract=off", f"-I{_HERE}")
         files = (source, _HERE / "defaults.c", "-lm")
         subprocess.run([compiler, *common, *options, "-o", library, *files], check=True)
         return library.read_bytes()
+
+
+def connected(
+    name: str,
+    fmus: Mapping[str, Path],
+    wires: Mapping[str, str] | None = None,
+    parameters: Mapping[str, Value] | None = None,
+    **others: Any,
+) -> System:
+    """A system of FMUs.
+
+    Args:
+        name: of the system.
+        fmus: by the names of the components, in their order.
+        wires: sources by targets.
+        parameters: by `component.parameter`.
+        others: further attributes of the system.
+
+    """
+    components = {component: read_component(component, fmu) for component, fmu in fmus.items()}
+    connections = tuple(Connection(port_name(s), port_name(t)) for t, s in (wires or {}).items())
+    values = {port_name(parameter): value for parameter, value in (parameters or {}).items()}
+    return System(name, components, connections, **others).with_parameters(values)
 
 
 def write(

@@ -141,6 +141,6 @@ def names_in_fmi3() -> dict[str, str]:
 
 @cache
 def fmi3_rows() -> dict[tuple[str, str], str]:
-    """What FMI 3.0 alone has: the answers, by function and case."""
+    """What only FMI 3.0 has: the answers, by function and case."""
     _, own = _tables_of_fmi3()
     return {(function, case): answer for function, case, answer in own.rows}

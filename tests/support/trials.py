@@ -21,7 +21,7 @@ from support.status_table import CREATION, WITHOUT_AN_INSTANCE, creations, witho
 FMI3 = "FMI 3.0"
 
 #: A row and a column.
-Cell = tuple[tuple[str, str], str]
+Place = tuple[tuple[str, str], str]
 
 _NOT_UTF_8 = b"ta\xffnh"
 
@@ -46,7 +46,7 @@ CREATIONS: dict[str, dict[str, Any]] = {
 }
 
 
-def trials(folder: Path, other: Path, kind: str = PYTHON) -> Callable[[Cell], str]:
+def trials(folder: Path, other: Path, kind: str = PYTHON) -> Callable[[Place], str]:
     """Prepare a process for trials on an FMU.
 
     Args:
@@ -62,7 +62,7 @@ def trials(folder: Path, other: Path, kind: str = PYTHON) -> Callable[[Cell], st
     library = load(folder)
     company = company_of(library, load(other))
 
-    def trial(cell: Cell) -> str:
+    def trial(cell: Place) -> str:
         (function, case), state = cell
         try:
             if function == CREATION:

@@ -17,7 +17,7 @@ from orchestrator.paper.choices import (
 )
 from orchestrator.paper.variants import Found, Sensitivity
 
-#: A choice of both controllers, and one of the proposed alone.
+#: A choice of both controllers, and one of the proposed controller only.
 SEA = Choice("sea", (Option("calm"), Option("rough", against="4.1: calm")))
 OBSERVER = Choice("observer", (Option("slow"), Option("fast")), of_proposed=True)
 

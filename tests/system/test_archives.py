@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.formats.ssp.reader import read_ssp
-from orchestrator.machine import user_files as unpacking
+from orchestrator.machine import user_files
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
 from orchestrator.system.component import read_component
@@ -101,9 +101,9 @@ def test_archive_that_tools_unpack_differently_is_refused(dist, tmp_path, name):
 
 def test_bomb_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """A megabyte of zeros, a thousand files, a long description: each beyond a bound set lower."""
-    monkeypatch.setattr(unpacking, "_MOST_BYTES", 500_000)
-    monkeypatch.setattr(unpacking, "_MOST_FILES", 100)
-    monkeypatch.setattr(unpacking, "_MOST_OF_A_DESCRIPTION", 1000)
+    monkeypatch.setattr(user_files, "_MOST_BYTES", 500_000)
+    monkeypatch.setattr(user_files, "_MOST_FILES", 100)
+    monkeypatch.setattr(user_files, "_MOST_OF_A_DESCRIPTION", 1000)
     many = {str(i): b"" for i in range(1000)}
     for content, why in (
         ({"zeros": bytes(1_000_000)}, "unpacks to more than 500,000 bytes"),
@@ -112,7 +112,7 @@ def test_bomb_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         ({"d/" * 2000 + "x": b""}, r"holds d/…, 2,000 folders deep, more than 100$"),
     ):
         with pytest.raises(InputError, match=why):
-            unpacking.unpacked(zipped(tmp_path / "bomb.fmu", content))
+            user_files.unpacked(zipped(tmp_path / "bomb.fmu", content))
 
 
 def test_bombs_in_an_archive_are_one_bomb(dist: Path, tmp_path: Path, monkeypatch):
@@ -126,7 +126,7 @@ def test_bombs_in_an_archive_are_one_bomb(dist: Path, tmp_path: Path, monkeypatc
     content = {STRUCTURE: described(system(components)).encode(), **parts}
     archive = zipped(tmp_path / "bomb.ssp", content)
     size = sum(len(part) for part in content.values())
-    monkeypatch.setattr(unpacking, "_MOST_BYTES", size + 5_000_000)
+    monkeypatch.setattr(user_files, "_MOST_BYTES", size + 5_000_000)
     before = sum(path.stat().st_size for path in process_folder().rglob("*"))
     with pytest.raises(InputError) as error:
         read_ssp(archive)
@@ -135,12 +135,12 @@ def test_bombs_in_an_archive_are_one_bomb(dist: Path, tmp_path: Path, monkeypatc
     after = sum(path.stat().st_size for path in process_folder().rglob("*"))
     assert after - before <= 2 * size + 5_000_000
     # Another archive has a bound of its own, and all of them have one.
-    unpacking.unpacked(zipped(tmp_path / "alone.fmu", {"zeros": bytes(size + 4_000_000)}))
-    monkeypatch.setattr(unpacking, "_MOST_OF_A_PROCESS", 1000)
+    user_files.unpacked(zipped(tmp_path / "alone.fmu", {"zeros": bytes(size + 4_000_000)}))
+    monkeypatch.setattr(user_files, "_MOST_OF_A_PROCESS", 1000)
     with pytest.raises(
         InputError, match=r"all archives of this process to [\d,]+, more than 1,000"
     ):
-        unpacking.unpacked(zipped(tmp_path / "more.fmu", {"a": b"x"}))
+        user_files.unpacked(zipped(tmp_path / "more.fmu", {"a": b"x"}))
 
 
 def test_archive_that_cannot_be_unpacked_leaves_nothing(dist: Path, tmp_path: Path):

@@ -30,7 +30,7 @@ from orchestrator.system.structure import System
 from support.runs import prepared
 from support.texts import tells
 
-pytest.importorskip("numba", reason="needs numba: the extra `studies`")
+pytest.importorskip("numba", reason="needs the extra `studies`")
 
 KIND = "native"
 

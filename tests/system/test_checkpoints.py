@@ -70,7 +70,6 @@ def states(out: str) -> dict[str, object]:
 
 CHECKPOINTS = ["--checkpoint-every", "0.3"]
 
-
 LEFT = ["fig4", "--stop-time", "1", "--no-figures"]
 
 
@@ -103,7 +102,7 @@ def left(one_left: Path) -> None:
 def test_a_run_that_is_killed_and_resumed_is_one_that_was_not(scenario, options, then):
     """Twice killed: after its second checkpoint, and after the next but one."""
     if "parquet" in options:
-        pytest.importorskip("pyarrow")
+        pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
     arguments = [scenario, "--stop-time", "2", "--no-figures", *options]
     assert run(*arguments, out="whole") == 0
     killed_after(2, *arguments, *CHECKPOINTS, out="killed")

@@ -14,7 +14,7 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.formats.other_formats import STRUCTURE, write_osp
+from orchestrator.formats.other_formats import OSP_STRUCTURE, write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
 from support.archives import archive, component, described, fmu, system, variable
@@ -85,7 +85,7 @@ def osp(tmp_path: Path) -> Path:
         one.mkdir()
     shutil.copy(relay(tmp_path), folder / "relay.fmu")
     shutil.copy(relay(tmp_path), beside / "relay one.fmu")
-    (folder / STRUCTURE).write_text(OSP, encoding="utf-8")
+    (folder / OSP_STRUCTURE).write_text(OSP, encoding="utf-8")
     return folder
 
 
@@ -103,7 +103,7 @@ def outputs_of_libcosim(folder: Path, *names: str) -> np.ndarray:
 def test_osp_file_gives_the_numbers_of_libcosim(osp: Path):
     expected = outputs_of_libcosim(osp, "a", "b", "c")
     with pytest.warns(UserWarning, match=r"b\.u: .*a\.y; "):
-        result = simulate(osp / STRUCTURE, stop_time=STEPS * STEP, order="jacobi")
+        result = simulate(osp / OSP_STRUCTURE, stop_time=STEPS * STEP, order="jacobi")
     assert result.failure is None
     ours = [result[f"{name}.{port}"][1:] for name in "abc" for port in "gy"]
     assert np.array_equal(np.column_stack(ours), expected)
@@ -144,7 +144,7 @@ def test_what_is_written_for_libcosim_is_read_again(dist: Path, tmp_path: Path):
 )  # fmt: skip
 def test_what_of_an_osp_file_cannot_be_run_is_said_by_name(osp: Path, old, new, why):
     assert old in OSP
-    (osp / STRUCTURE).write_text(OSP.replace(old, new), encoding="utf-8")
+    (osp / OSP_STRUCTURE).write_text(OSP.replace(old, new), encoding="utf-8")
     with pytest.raises(InputError) as error:
         load(osp)
     assert mentions(str(error.value), why) and "\n" not in str(error.value)
@@ -158,7 +158,7 @@ def test_what_of_an_osp_file_cannot_be_run_is_said_by_name(osp: Path, old, new, 
     ],
 )
 def test_what_of_an_osp_file_changes_is_a_warning(osp: Path, old, new, why):
-    (osp / STRUCTURE).write_text(OSP.replace(old, new), encoding="utf-8")
+    (osp / OSP_STRUCTURE).write_text(OSP.replace(old, new), encoding="utf-8")
     with pytest.warns(UserWarning, match=why):
         assert load(osp).steps["b"] == 2 * STEP
 
@@ -168,7 +168,7 @@ def test_units_of_an_osp_file_are_not_converted(tmp_path: Path):
         fmu(tmp_path / f"{name}.fmu", variable("u", "input", unit=unit),
             variable("y", "output", unit=unit))  # fmt: skip
     wire = '<Variable simulator="m" name="y"/><Variable simulator="mm" name="u"/>'
-    (tmp_path / STRUCTURE).write_text(
+    (tmp_path / OSP_STRUCTURE).write_text(
         '<OspSystemStructure version="0.1"><Simulators><Simulator name="m" source="m.fmu"/>'
         '<Simulator name="mm" source="mm.fmu"/></Simulators><Connections><VariableConnection>'
         f"{wire}</VariableConnection></Connections></OspSystemStructure>",

@@ -89,7 +89,7 @@ def test_files_hold_texts_and_give_the_numbers_beside_them_again(workplace, form
     said = 'one, "two"\nthree'
     [archive] = write_ssp(with_values(system_of(build(workplace)), {"said": said}), workplace)
     if form == "parquet":
-        pytest.importorskip("pyarrow")
+        pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
     command = f"run {archive} --stop-time 0.3 --step 0.1 --no-figures --out r --format {form}"
     assert main(command.split()) == 0
     if form == "csv":
@@ -267,7 +267,7 @@ def test_a_mode_that_an_fmu_takes_on_is_its_own(tmp_path, way):
 def test_the_mode_of_who_simulates_is_left_as_it_was(tmp_path):
     c, upward = ctypes.CDLL(None), 0x800
     if platform.machine() != "x86_64":
-        pytest.skip("knows the number of one processor's mode")
+        pytest.skip("the number of the floating-point mode is that of x86-64")
     system = system_of(build(tmp_path))
     expected = run(system)
     c.fesetround(upward)

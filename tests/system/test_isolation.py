@@ -329,7 +329,7 @@ def test_rows_are_kept_whatever_an_fmu_does_to_the_process(
 ):
     """Into a folder that is named from the current one."""
     if form == "parquet":
-        pytest.importorskip("pyarrow")
+        pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
     process = run(archives, act, "--format", form, *options, folder=workplace / "temporary")
     assert len(process.communicate()[1].splitlines()) <= 1
     closed = act == "CLOSES_FILES" and options == ["--isolate"]

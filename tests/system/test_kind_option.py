@@ -162,7 +162,10 @@ def test_export_with_fmi_3_is_an_ssp_2(workplace: Path, capsys):
     assert said.count("\n") == 1
 
 
-@pytest.mark.skipif(find_spec("fmu_manipulation_toolbox") is None, reason="no FMU toolbox")
+@pytest.mark.skipif(
+    find_spec("fmu_manipulation_toolbox") is None,
+    reason="fmu_manipulation_toolbox is not installed",
+)
 def test_container_takes_fmus_of_either_version(workplace: Path):
     for fmi in FMI_VERSIONS:
         options = ["--kind", "native", "--fmi", fmi, "--format", "container", "--out", fmi]

@@ -52,7 +52,7 @@ def test_record_that_does_not_name_a_table_is_not_its_record(results, tmp_path):
 
 
 def test_parameter_of_a_wrong_kind_is_told(results, tmp_path, capsys):
-    pytest.importorskip("plotly")
+    pytest.importorskip("plotly", reason="needs the extra `view`")
     (tmp_path / "result.csv").write_bytes((results / "quiet" / "result.csv").read_bytes())
     record = json.loads((results / "quiet" / "run.json").read_text())
     record["parameters"]["plant.ell"] = "long"
@@ -72,7 +72,7 @@ def test_animation_is_written_with_step_and_order(tmp_path):
 
 
 def test_view_stands_by_itself_and_is_light(results, capsys):
-    pytest.importorskip("plotly")
+    pytest.importorskip("plotly", reason="needs the extra `view`")
     capsys.readouterr()
     assert main(["view", str(results / "noisy")]) == 0
     page = results / "noisy" / "view.html"
@@ -84,10 +84,10 @@ def test_view_stands_by_itself_and_is_light(results, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium")
+@pytest.mark.skipif(BROWSER is None, reason="Chromium is not installed")
 def test_view_plays_in_a_browser(results, tmp_path):
     """Opened with #play, time moves on; nothing is said on the console."""
-    pytest.importorskip("plotly")
+    pytest.importorskip("plotly", reason="needs the extra `view`")
     page = tmp_path / "view.html"
     assert main(["view", str(results / "noisy"), "--out", str(page)]) == 0
     process = subprocess.run(

@@ -68,7 +68,7 @@ RUN = ["run", "fig4", "--no-figures", "--stop-time"]
 def test_full_disk_ends_a_run_early_and_keeps_the_rows(workplace, capsys, ending, loop):
     """There is room for some thousand of a million."""
     if ending == "parquet":
-        pytest.importorskip("pyarrow")
+        pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
     with small_disk(workplace / "disk", 14_000_000) as disk:
         out = ["--out", str(disk / "r"), "--format", ending, "--loop", loop]
         assert main([*RUN, "0.1", *out]) == 0

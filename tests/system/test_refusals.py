@@ -109,7 +109,7 @@ def test_bad_file_is_refused_in_one_line(
     arguments, endings = COMMANDS[command]
     for ending in endings:
         if ending == "parquet":
-            pytest.importorskip("pyarrow")
+            pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
         name = bad_file(kind, ending)
         shown = name if kind != "zero in name" else r"a\x00b"
         assert shown in refused(*(name if word == "?" else word for word in arguments))
@@ -134,7 +134,7 @@ def test_bad_file_is_refused_in_one_line(
 def test_number_that_makes_no_sense_is_refused(workplace, refused, arguments, number):
     *command, option = arguments
     if (option, number) in GOOD:
-        pytest.skip("is one")
+        pytest.skip("the option takes this number")
     assert refused(*command, f"{option}={number}")
 
 

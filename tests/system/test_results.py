@@ -71,7 +71,7 @@ def test_our_own_table_is_verified_with_the_step_of_its_scenario(capsys):
 
 
 def test_parquet_holds_the_same_numbers():
-    pytest.importorskip("pyarrow")
+    pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
     assert main(["run", "fig4", "--stop-time", "1", "--no-figures"]) == 0
     text = rows("results/fig4/result.csv")
     assert main(["run", "fig4", "--stop-time", "1", "--no-figures", "--format", "parquet"]) == 0

@@ -10,8 +10,7 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.machine import children
-from orchestrator.machine import user_files as unpacking
+from orchestrator.machine import children, user_files
 from orchestrator.machine.errors import InputError
 from orchestrator.master.fmi import binary
 from support.relay import relay
@@ -86,8 +85,8 @@ VALUES = {"u": 0.3, "v": 0.1, "a": 1.1}
 
 def forget() -> None:
     """Forget what was unpacked, as another process has."""
-    unpacking._folders.clear()
-    unpacking._digests.clear()
+    user_files._folders.clear()
+    user_files._digests.clear()
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -10,7 +10,7 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.paper import printed_table as table
+from orchestrator.paper import printed_table
 from orchestrator.paper.choices import OF_RUNS, OF_RUNS_OF_FIVE, PD, PROPOSED, PUBLISHED, Choice
 from orchestrator.paper.measures import approach_of
 from orchestrator.paper.printed_table import NUMBERS
@@ -116,7 +116,7 @@ def test_five_degrees_of_freedom_are_medians_over_starts_with_a_band(found):
 
 
 def test_the_command_leaves_table_variants_and_record(found, monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(table, "all_variants", lambda crew: found)
+    monkeypatch.setattr(printed_table, "all_variants", lambda crew: found)
     assert main(["table", "--out", str(tmp_path)]) == 0
     assert capsys.readouterr().out.splitlines() == [
         str(tmp_path / name) for name in ("table.md", "variants.csv")

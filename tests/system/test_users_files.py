@@ -69,7 +69,7 @@ def test_a_companion_of_any_name_has_a_folder_of_its_own(stem):
 
 def test_somebody_elses_result_is_read_and_no_more(capsys):
     """It brings hidden folders, links, and a record that names the user's files."""
-    pytest.importorskip("plotly")
+    pytest.importorskip("plotly", reason="needs the extra `view`")
     assert main(RUN) == 0
     for path in Path("r").glob(".*"):
         path.unlink()

@@ -139,7 +139,7 @@ def test_each_vehicle_is_drawn(results):
 
 
 def test_each_vehicle_has_a_page(results, capsys):
-    pytest.importorskip("plotly")
+    pytest.importorskip("plotly", reason="needs the extra `view`")
     assert main(["view", str(results / "two")]) == 0
     pages = [results / "two" / f"view-{name}.html" for name in ("plant", "tow")]
     assert capsys.readouterr().out.split() == list(map(str, pages))
@@ -154,7 +154,7 @@ def test_theorem_and_indices_are_said_of_each(results, capsys):
 
 
 def test_a_study_has_columns_of_each(results, tmp_path):
-    pytest.importorskip("pyarrow", reason="needs the extra studies")
+    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     from orchestrator import sweep  # noqa: PLC0415
 
     study = {

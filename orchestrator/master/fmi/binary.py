@@ -22,7 +22,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave, fmi2Error, fmi2Status
 from fmpy.model_description import read_build_description
 
-from orchestrator.machine import cache as user_cache
+from orchestrator.machine import cache
 from orchestrator.machine.children import compiler, made_library
 from orchestrator.machine.disk import claimed
 from orchestrator.machine.errors import InputError, reason
@@ -196,12 +196,12 @@ def make_binary(component: Component, folder: Path) -> None:
         return
     key = _key(component)
     try:
-        with claimed(user_cache.folder_of(_CATEGORY), wait=True):
-            kept = user_cache.kept(_CATEGORY, key)
+        with claimed(cache.folder_of(_CATEGORY), wait=True):
+            kept = cache.kept(_CATEGORY, key)
             content = next(iter(kept.values())) if kept else _compiled(component, sources)
             if not kept:
                 with suppress(OSError):
-                    user_cache.keep(_CATEGORY, key, {binary.name: content})
+                    cache.keep(_CATEGORY, key, {binary.name: content})
         binary.parent.mkdir(parents=True, exist_ok=True)
         # Other processes may be about to load it.
         new = binary.with_name(f"{binary.name}.{os.getpid()}")
@@ -358,7 +358,7 @@ def _check_compiler(component: Component) -> None:
         InputError: there is no compiler.
 
     """
-    if compiler() is None and not user_cache.kept(_CATEGORY, _key(component)):
+    if compiler() is None and not cache.kept(_CATEGORY, _key(component)):
         raise InputError(
             f"{component.fmu}: has no binary for this machine, {fmpy.platform}, and must be "
             "compiled: install gcc or clang, or `pip install ziglang`"

@@ -27,7 +27,6 @@ from orchestrator.vehicle.signals import AXES, DIRECTIONS, STANDARD
 #: The controller's part of the loop; `.compilation` puts another one here before it compiles.
 law: Law = LAWS[Gains]
 
-
 #: Of the rows, after the time: the names of their columns.
 COLUMNS: tuple[str, ...] = (
     *STANDARD.posture,

@@ -15,7 +15,6 @@ from support.strategies import speeds, vectors
 
 three = vectors(speeds, 3)
 
-
 ORIGIN = (0.0, 0.0, 0.0)
 
 

@@ -207,7 +207,7 @@ def test_other_library_is_refused(other: bytes):
         universal([thin("x86_64", 100), other])
 
 
-@pytest.mark.skipif(shutil.which("file") is None, reason="there is no command `file`")
+@pytest.mark.skipif(shutil.which("file") is None, reason="file is not installed")
 def test_command_file_knows_it(tmp_path: Path):
     path = tmp_path / "library"
     path.write_bytes(universal([thin(name, 100) for name in PROCESSORS]))

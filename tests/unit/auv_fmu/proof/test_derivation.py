@@ -2,7 +2,7 @@
 
 import pytest
 
-sp = pytest.importorskip("sympy", reason="sympy is in the extra test")
+sp = pytest.importorskip("sympy", reason="needs the extra `test`")
 
 
 @pytest.mark.slow

@@ -86,7 +86,6 @@ REASONS = {
     "state refused: '0' is no float": from_json(start_time="0"),
 }
 
-
 #: What is discarded; all else fails.
 DISCARDED = ("an output", "must be finite", "negative")
 

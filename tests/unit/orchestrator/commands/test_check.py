@@ -1,3 +1,5 @@
+"""All that is wrong with a file is said at once, and what is only surprising with it."""
+
 from __future__ import annotations
 
 from pathlib import Path

@@ -83,7 +83,7 @@ def test_front_is_what_nothing_else_beats():
 
 
 def test_influence_knows_more_less_and_nothing():
-    pytest.importorskip("scipy", reason="needs the extra studies")
+    pytest.importorskip("scipy", reason="needs the extra `studies`")
     runs = columns()
     runs["final_error.x"] = -np.exp(runs["disturbance.A_d"] / 10)
     show = ["peak_command.u", "final_error.x", "largest_drift"]

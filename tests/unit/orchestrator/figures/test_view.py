@@ -15,7 +15,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.signals import STANDARD
 from support.tables import loop_table
 
-pytest.importorskip("plotly")
+pytest.importorskip("plotly", reason="needs the extra `view`")
 
 
 def data_of(text):

@@ -48,7 +48,8 @@ def test_tables_of_other_tools_are_read(tmp_path: Path, text: str):
 
 
 def test_parquet_of_other_tools_is_read_where_it_holds_numbers(tmp_path: Path):
-    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    arrow = pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
+    parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra `parquet`")
     path = tmp_path / "other.parquet"
     parquet.write_table(arrow.table({"time": [0, 1], "a.b": [True, None]}), path)
     np.testing.assert_array_equal(np.vstack(list(read_rows(path))), [[0, 1], [1, np.nan]])

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.machine.errors import InputError
-from orchestrator.master import plan as module
+from orchestrator.master import plan
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.events import Event, Stop
@@ -324,7 +324,7 @@ def test_zero_has_a_sign():
 
 def test_another_version_is_another_run(monkeypatch):
     before = base().identity
-    monkeypatch.setattr(module, "version", lambda package: "another")
+    monkeypatch.setattr(plan, "version", lambda package: "another")
     assert {name.split()[-1] for name, _ in before.items() - base().identity.items()} == {
-        *module.PACKAGES
+        *plan.PACKAGES
     }

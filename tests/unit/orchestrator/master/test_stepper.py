@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.machine import cache as user_cache
 from orchestrator.machine import children
+from orchestrator.machine.cache import keep
 from orchestrator.machine.errors import InputError
 from orchestrator.master import loop, stepper
 from orchestrator.master.experiment import Experiment
@@ -38,7 +38,7 @@ def no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(children, "find_spec", lambda _: None)
 
 
-needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 
 
 def steps(n: int) -> Experiment:
@@ -109,7 +109,7 @@ def test_a_library_without_the_function_is_no_library(cache, tmp_path):
     source.write_text("int other(void) { return 0; }")
     other = tmp_path / "other.so"
     subprocess.run(["cc", "-shared", "-o", other, source], check=True)
-    user_cache.keep("loop", stepper._key(), {"stepper.so": other.read_bytes()})
+    keep("loop", stepper._key(), {"stepper.so": other.read_bytes()})
     assert stepper.kept() is None
     assert stepper.made().advance
 
@@ -157,14 +157,14 @@ def test_processes_that_compile_at_once_do_so_once(tmp_path, cache):
 @pytest.mark.parametrize("command", ["gcc", "clang"])
 def test_compilers_have_nothing_to_say(tmp_path, command):
     if shutil.which(command) is None:
-        pytest.skip(f"no {command}")
+        pytest.skip(f"{command} is not installed")
     arguments = [*stepper._FLAGS, *STRICT, stepper._SOURCE, "-o", tmp_path / "library"]
     subprocess.run([command, *arguments], check=True)
 
 
 @pytest.mark.slow
 def test_zig_compiles_it_where_there_is_no_other(tmp_path, cache, monkeypatch):
-    pytest.importorskip("ziglang")
+    pytest.importorskip("ziglang", reason="ziglang is not installed")
     monkeypatch.setattr(children.shutil, "which", lambda _: None)
     with pytest.raises(InputError):
         stepper.made(in_no_time=True)

@@ -10,7 +10,7 @@ import pytest
 from orchestrator.paper import choices
 from orchestrator.paper.choices import (
     END_TIMES,
-    FIVE,
+    FIVE_DEGREES,
     FORMULAS,
     OF_RUNS,
     OF_RUNS_OF_FIVE,
@@ -293,7 +293,10 @@ def test_runs_are_all_combinations_and_ours_comes_first():
 
 def scenarios_and_options():
     for scenario in (PROPOSED, PD):
-        for choice in (*OF_RUNS, *(each for each in OF_RUNS_OF_FIVE if each.options == (FIVE,))):
+        for choice in (
+            *OF_RUNS,
+            *(each for each in OF_RUNS_OF_FIVE if each.options == (FIVE_DEGREES,)),
+        ):
             for option in choices.options_of(choice, scenario):
                 if option.parameters:
                     yield pytest.param(scenario, option, id=f"{scenario}-{option.text}")

@@ -149,7 +149,7 @@ def test_saved_result_is_that_of_the_command_line(result, tmp_path):
 
 
 def test_dataframe_has_the_time_as_its_index(result):
-    pytest.importorskip("pandas")
+    pytest.importorskip("pandas", reason="needs the extra `docs`")
     frame = result.to_dataframe()
     assert list(frame.columns) == list(result.columns)
     assert np.array_equal(frame.index, result.time)

@@ -16,7 +16,7 @@ from orchestrator.studies.space import Space
 from orchestrator.studies.study import MOST_RUNS
 from orchestrator.studies.study_file import study_of
 
-qmc = pytest.importorskip("scipy.stats.qmc", reason="needs scipy: the extra `studies`")
+qmc = pytest.importorskip("scipy.stats.qmc", reason="needs the extra `studies`")
 
 
 def space(**content: Any) -> Space:

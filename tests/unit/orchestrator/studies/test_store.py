@@ -19,7 +19,7 @@ from orchestrator.studies.store import StudyResult, read_record, store
 from orchestrator.vehicle.indices import index_columns
 from support.machine import contents, eventually
 
-parquet = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow: the extra `studies`")
+parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra `studies`")
 
 RECORD = {"study": "mine", "runs": 4, "made_of": {"points": "1234", "scenario": ("fig4",)}}
 

@@ -259,7 +259,7 @@ def test_study_holds_the_proposed_controller_against_pd_ten_thousand_times(name)
     assert study.title
     assert study.engine == BATCH
     assert study.remark.count("\n\n") == 1, "two paragraphs"
-    pytest.importorskip("scipy", reason="needs scipy: the extra `studies`")
+    pytest.importorskip("scipy", reason="needs the extra `studies`")
     space = Space(study, {scenario: loaded(scenario) for scenario in study.scenario})
     assert len(space) >= 10_000
     first, second = space[0], space[1]

@@ -129,7 +129,7 @@ def test_closed_loop_has_all_of_them():
 
 def test_a_new_index_is_one_entry(monkeypatch, tmp_path):
     """It is in metrics.json, in the table of a study, and in the labels of its figures."""
-    pytest.importorskip("pyarrow", reason="needs the extra studies")
+    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     depth = Index(
         "largest_depth",
         "largest depth",

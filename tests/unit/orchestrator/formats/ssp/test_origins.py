@@ -10,7 +10,7 @@ from unittest.mock import patch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestrator.formats.ssp import reader as reading
+from orchestrator.formats.ssp import reader
 from orchestrator.formats.ssp.hierarchy import Node
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.system.names import PortName
@@ -42,7 +42,7 @@ TRANSFORMATIONS = (
 units = st.sampled_from(["", "m", "mm", "km", "K", "furlong"])
 
 
-class OneByOne(reading._Ports):
+class OneByOne(reader._Ports):
     """Each port followed upstream by itself, and its way transformed from its beginning."""
 
     def __init__(self, archive, leaves, segments, given) -> None:
@@ -59,7 +59,7 @@ class OneByOne(reading._Ports):
                     archive.problem(error)
         lost = [str(node) for node in given if node not in used]
         if lost:
-            archive.note(f"values that are given to {reading.listed(lost)} reach no component")
+            archive.note(f"values that are given to {reader.listed(lost)} reach no component")
 
     def _follow(self, port, node, leaf, segments, used) -> None:
         nodes, ways = [node], []
@@ -99,15 +99,15 @@ class OneByOne(reading._Ports):
                     whole = chained(first, carried(known.unit or value.unit, i))
                 except InputError as error:
                     raise InputError(f"{start}: {error}") from None
-                self._set(port, leaf, reading._Arrival(start, whole=whole))
+                self._set(port, leaf, reader._Arrival(start, whole=whole))
                 return
 
 
-def read(path: Path, ports: type[reading._Ports]):
+def read(path: Path, ports: type[reader._Ports]):
     """What is read of an archive, right or wrong."""
     findings = Findings()
-    with patch.object(reading, "_Ports", ports), findings.collecting():
-        found = reading.read_ssp(path, findings=findings)
+    with patch.object(reader, "_Ports", ports), findings.collecting():
+        found = reader.read_ssp(path, findings=findings)
         return found.connections, found.parameters, sorted(findings.notes)
     return findings.problems, sorted(findings.notes)
 
@@ -150,7 +150,7 @@ def test_ports_get_what_each_gets_that_is_followed_by_itself(description: str, u
             *(variable(f"y{i}", "output", unit=unit) for i in range(2)),
         )
         path = archive(Path(folder, "x.ssp"), description, {"a.fmu": one})
-        assert read(path, reading._Ports) == read(path, OneByOne)
+        assert read(path, reader._Ports) == read(path, OneByOne)
 
 
 def test_long_way_to_many_ports_is_gone_once(tmp_path: Path):
@@ -168,7 +168,7 @@ def test_long_way_to_many_ports_is_gone_once(tmp_path: Path):
     text = described(
         system(component("a"), "".join(routes), "".join(connector(c, "inout") for c in chain))
     )
-    found = reading.read_ssp(archive(tmp_path / "x.ssp", text, {"a.fmu": one}))
+    found = reader.read_ssp(archive(tmp_path / "x.ssp", text, {"a.fmu": one}))
     assert found.connections == tuple(
         Connection(PortName("a", "y"), PortName("a", f"u{i}")) for i in range(n)
     )

@@ -93,7 +93,6 @@ def test_an_fmu_without_a_state_is_named(tmp_path: Path):
 
 ROWS = np.random.default_rng(1).normal(size=(10_000, 3))
 
-
 ID = "0123456789abcdef" * 2
 
 

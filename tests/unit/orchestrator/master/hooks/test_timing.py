@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.hooks import timing as real_time
+from orchestrator.master.hooks import timing
 from orchestrator.master.hooks.hook import NEVER
 from orchestrator.master.hooks.timing import Lateness, RealTime
 
@@ -20,8 +20,8 @@ class World:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now, self.told = 1000.0, 0
-        monkeypatch.setattr(real_time, "monotonic", lambda: self.now)
-        monkeypatch.setattr(real_time, "sleep", self._sleep)
+        monkeypatch.setattr(timing, "monotonic", lambda: self.now)
+        monkeypatch.setattr(timing, "sleep", self._sleep)
 
     def _sleep(self, seconds: float) -> None:
         self.now += seconds

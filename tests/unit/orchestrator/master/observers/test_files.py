@@ -16,7 +16,7 @@ from orchestrator.master.observers.observer import Ending, Header
 @pytest.mark.parametrize("ending", FORMATS)
 def test_what_is_written_is_read_again_exactly(tmp_path: Path, ending: str):
     if ending == "parquet":
-        pytest.importorskip("pyarrow")
+        pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
     path = tmp_path / f"result.{ending}"
     rows = np.random.default_rng(1).normal(scale=1e3, size=(20_001, 4))
     rows[5] = [1e-310, -0.0, 1.7976931348623157e308, np.nextafter(1.0, 2.0)]
@@ -33,7 +33,7 @@ def test_what_is_written_is_read_again_exactly(tmp_path: Path, ending: str):
 
 def test_parquet_of_the_same_rows_is_the_same_file(tmp_path: Path):
     """However long its observer had to wait for them."""
-    pytest.importorskip("pyarrow")
+    pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
     rows = np.random.default_rng(1).normal(size=(20_000, 2))
     files = []
     for i, block in enumerate((512, 700, 20_000)):

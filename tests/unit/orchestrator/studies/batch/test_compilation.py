@@ -8,7 +8,7 @@ from types import ModuleType
 
 import pytest
 
-pytest.importorskip("numba", reason="needs numba: the extra `studies`")
+pytest.importorskip("numba", reason="needs the extra `studies`")
 
 from orchestrator.studies.batch.compilation import equations
 from orchestrator.studies.batch.kernel import flat
