@@ -23,7 +23,7 @@ import numpy as np
 from fmpy.ssp.simulation import simulate_ssp
 
 from orchestrator.exchange import c_host
-from orchestrator.formats.other_formats import write_container, write_osp
+from orchestrator.formats.osp_and_container import write_container, write_osp
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import PARAMETER_SET, write_ssp
 from orchestrator.machine.children import run_module

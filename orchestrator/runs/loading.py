@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from fmus.kinds import FMI_VERSIONS, PYTHON
 from orchestrator.figures.run_figures import check_figure
-from orchestrator.formats.other_formats import OSP_STRUCTURE, read_osp
+from orchestrator.formats.osp_and_container import OSP_STRUCTURE, read_osp
 from orchestrator.formats.ssp import STRUCTURE
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.machine.errors import Findings, InputError

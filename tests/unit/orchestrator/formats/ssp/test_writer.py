@@ -10,7 +10,7 @@ from zipfile import ZipFile
 import pytest
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
-from orchestrator.formats.other_formats import write_container, write_osp
+from orchestrator.formats.osp_and_container import write_container, write_osp
 from orchestrator.formats.ssp import OMS
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import write_ssp
