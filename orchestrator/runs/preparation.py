@@ -132,11 +132,11 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     """
     findings, values = Findings(request.strict), request.values
     system = system.with_parameters(values)
-    given, input_table = {*values, *scenario.parameters}, None
+    input_table = None
     if request.inputs is not None:
-        # On the command line a table wins over the scenario's parameters.
-        scenario, given = replace(scenario, inputs=Inputs(Path(request.inputs))), {*values}
+        scenario = replace(scenario, inputs=Inputs(Path(request.inputs), wins=True))
     if scenario.inputs is not None:
+        given = {*values} if scenario.inputs.wins else {*values, *scenario.parameters}
         with findings.collecting():
             system, input_table = read_inputs(scenario.inputs, system, given)
     if isinstance(request.events, str):
@@ -204,7 +204,6 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         coupling=scenario.coupling,
         events=shared_events(own or scenario.events, system),
         inputs=scenario.inputs or companion.inputs,
-        parameters=companion.parameters if request.inputs is None else {},
     )
     wanted = replace(request, parameters=shared, steps=steps, events=None, inputs=None)
     return [prepared, prepare(same, system, wanted)]

@@ -52,11 +52,13 @@ class Inputs:
     Attributes:
         file: with the table.
         between: what continuous Real inputs do between two rows, `linear` or `hold`.
+        wins: over the parameters of the scenario, as a table of the command line does.
 
     """
 
     file: Path
     between: str = "linear"
+    wins: bool = False
 
     @cached_property
     def content(self) -> tuple[list[PortName], np.ndarray]:
