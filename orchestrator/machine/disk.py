@@ -109,6 +109,13 @@ def to_disk(path: Path) -> None:
         os.close(descriptor)
 
 
+def is_still(descriptor: int, status: os.stat_result) -> bool:
+    """Whether a descriptor is the file that it was, not closed since nor taken by another one."""
+    with suppress(OSError):
+        return os.path.samestat(os.fstat(descriptor), status)
+    return False
+
+
 @contextmanager
 def claimed(path: Path, wait: bool = False) -> Iterator[None]:
     """Keep other processes from a file or folder.

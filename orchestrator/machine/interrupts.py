@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
+from orchestrator.machine.disk import is_still
+
 #: Ctrl-C, what a batch system sends, and the end of the terminal.
 _STOPS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
 
@@ -80,6 +82,7 @@ class Interrupts:
             yield
             return
         end_of_thread, end_of_signals = os.pipe()
+        status = os.fstat(end_of_signals)
         os.set_blocking(end_of_signals, False)
         before = signal.set_wakeup_fd(end_of_signals, warn_on_full_buffer=False)
         leaving = threading.Lock()
@@ -94,12 +97,12 @@ class Interrupts:
             # Not while it is giving up.
             leaving.acquire()
             signal.set_wakeup_fd(before)
-            # An FMU may have closed it.
-            with suppress(OSError):
+            # An FMU may have closed it: by now it may be another file.
+            if is_still(end_of_signals, status):
                 os.close(end_of_signals)
 
     def _count(self, numbers: int, give_up: Callable[[], None], leaving: threading.Lock) -> None:
-        n = 0
+        n, status = 0, os.fstat(numbers)
         with suppress(OSError):
             while number := os.read(numbers, 1):
                 n += number[0] in _STOPS
@@ -107,8 +110,7 @@ class Interrupts:
                     with suppress(Exception):
                         self.hand_over()
                     give_up()
-            # Unless an FMU has closed it: by now it may be another file.
-            if leaving.locked():
+            if is_still(numbers, status):
                 os.close(numbers)
 
     def take(self, number: int, _frame: Any) -> None:

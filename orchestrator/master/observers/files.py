@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Sequence
-from contextlib import suppress
 from importlib import import_module
 from io import BufferedWriter, RawIOBase, StringIO
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.formats.tables import ROWS, parquet
+from orchestrator.machine.disk import is_still
 from orchestrator.master.observers.observer import Ending, Header
 
 #: What Parquet needs at most: bytes of a value, and bytes that describe a column of the rows that
@@ -75,22 +75,16 @@ class _Output(RawIOBase):
         """Close it, if that is still to be done."""
         if not self.closed:
             super().close()
-            if self._is_open():
+            if is_still(self._descriptor, self._status):
                 os.close(self._descriptor)
 
     def _reopen(self) -> None:
         """Open it again if an FMU has closed it, or the owner of a file that an FMU has closed."""
-        if not self._is_open():
+        if not is_still(self._descriptor, self._status):
             self._descriptor = self._opened()
 
     def _opened(self, flags: int = 0) -> int:
         return os.open(self._path, os.O_WRONLY | getattr(os, "O_BINARY", 0) | flags, 0o666)
-
-    def _is_open(self) -> bool:
-        """Whether the descriptor is still the file's, not closed nor taken by another one."""
-        with suppress(OSError):
-            return os.path.samestat(os.fstat(self._descriptor), self._status)
-        return False
 
 
 class CsvLines:
