@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -24,6 +25,10 @@ _ENDS = [
 
 #: After so many signals, the user does not want to wait any more.
 _INSISTENCE = 3
+
+#: [s] What an FMU has from the first signal on to return from its step: several signals may come
+#: at once, from a key held down or from a batch system, and the machine may be busy.
+_PATIENCE = 2.0
 
 #: Exit status of a process that a signal has ended, less the number of the signal.
 _SIGNALLED = 128
@@ -74,6 +79,8 @@ class Interrupts:
     def insistence(self, give_up: Callable[[], None]) -> Iterator[None]:
         """Within the context, have the third signal end the process, whatever an FMU does.
 
+        It ends two seconds after the first signal, at the earliest.
+
         Args:
             give_up: ends the process, from another thread.
 
@@ -102,11 +109,16 @@ class Interrupts:
                 os.close(end_of_signals)
 
     def _count(self, numbers: int, give_up: Callable[[], None], leaving: threading.Lock) -> None:
-        n, status = 0, os.fstat(numbers)
+        stops: list[float] = []
+        status = os.fstat(numbers)
         with suppress(OSError):
             while number := os.read(numbers, 1):
-                n += number[0] in _STOPS
-                if n >= _INSISTENCE and leaving.acquire(blocking=False):
+                if number[0] in _STOPS:
+                    stops.append(time.monotonic())
+                if len(stops) < _INSISTENCE:
+                    continue
+                time.sleep(max(0.0, stops[0] + _PATIENCE - time.monotonic()))
+                if leaving.acquire(blocking=False):
                     with suppress(Exception):
                         self.hand_over()
                     give_up()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import time
 
 import pytest
 
@@ -83,6 +84,18 @@ def test_signals_before_and_after_are_no_insistence():
             os.kill(os.getpid(), signal.SIGINT)
         for _ in range(3):
             os.kill(os.getpid(), signal.SIGINT)
+    assert given_up == []
+
+
+def test_many_signals_at_once_leave_a_step_the_time_to_return():
+    given_up: list[str] = []
+    with (
+        held_interrupts() as interrupts,
+        interrupts.insistence(lambda: given_up.append("now")),
+    ):
+        for _ in range(20):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.01)
     assert given_up == []
 
 
