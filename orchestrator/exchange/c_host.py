@@ -120,7 +120,7 @@ def _plan(system: System, experiment: Experiment, library: LibraryOf) -> str:
     connections, *stepped = found
     return f"""\
 enum {{ FMUS = {len(fmus)}, COLUMNS = {len(columns)} }};
-static const double STEP = {experiment.step!r};
+static const double START = {experiment.start_time!r}, STEP = {experiment.step!r};
 static const char header[] = {_text(",".join(("time", *map(str, columns))))};
 static double row[COLUMNS];
 static const reference references[] = {_listed(references)};
