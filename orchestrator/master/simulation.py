@@ -78,8 +78,9 @@ def simulate(
                 _units(system, row.columns),
             )
         scheduled, gatherings = coupling.schedule()
-        if watched := coupling.delayed_ports():
-            observers = [*observers, Growth(watched)]
+        growth = Growth(coupling.delayed_ports())
+        if growth.ports:
+            observers, hooks = [*observers, growth], [*hooks, growth]
         with _told(header, observers, surroundings) as tell:
             blocks = Blocks(len(row.shown), observers, surroundings.ours)
             interrupts.hand_over = blocks.hand_over
@@ -93,6 +94,8 @@ def simulate(
             remark = None
             try:
                 failure = _advance(run, loop, Hooks(run), order, surroundings)
+                if failure and growth.found not in failure:
+                    failure += f"; {growth.found}"
             except NotKept as error:
                 # Rows that cannot be kept need not be computed.
                 failure = str(error)

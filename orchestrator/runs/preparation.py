@@ -159,7 +159,9 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     experiment = Experiment(stop_time, step, order, system.start_time or 0.0, coupling)
     plan = planned(system, experiment)
     with findings.collecting():
-        events = read_events(scenario.name, scenario.events, replace(system, step=step))
+        events = read_events(
+            scenario.name, scenario.events, replace(system, step=step), input_table
+        )
     findings.refuse()
     isolation = isolation_of(request.isolate, request.step_timeout)
     loop = chosen(request.loop, experiment, isolation)

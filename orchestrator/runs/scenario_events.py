@@ -20,6 +20,7 @@ from orchestrator.master.hooks.events import (
     Set,
     Stop,
 )
+from orchestrator.master.hooks.timing import InputTable
 from orchestrator.system.names import PortName, flattened, port_name, splits
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import Linear, Mapped
@@ -32,7 +33,10 @@ _CONDITION = re.compile(rf"(\S+)\s*({'|'.join(COMPARISONS)})\s*(\S+)")
 
 
 def read_events(
-    where: object, tables: Sequence[Mapping[str, Any]], system: System
+    where: object,
+    tables: Sequence[Mapping[str, Any]],
+    system: System,
+    input_table: InputTable | None = None,
 ) -> tuple[Event, ...]:
     """The events of a run.
 
@@ -40,15 +44,21 @@ def read_events(
         where: they are written, for messages.
         tables: as :func:`.scenario.check_events` has found them good.
         system: that they happen to.
+        input_table: that some of its inputs follow.
 
     Raises:
         InputError: an event cannot happen to this system.
 
     """
     findings, events = Findings(), []
+    followed = input_table.targets if input_table else ()
     for number, table in enumerate(tables, start=1):
         try:
-            events.append(_event(table, system))
+            event = _event(table, system)
+            for port, _ in event.action.inputs if isinstance(event.action, Set) else ():
+                if port in followed:
+                    raise InputError(f"{port} follows a table of inputs: override it")
+            events.append(event)
         except InputError as error:
             findings.problem(f"{where}: event {number}: {error}")
     findings.refuse()

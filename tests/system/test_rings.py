@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import permutations
+from math import isfinite, sin
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from orchestrator.master.fmi.instance import ComponentFailed
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.hook import Run
+from orchestrator.master.observers import observer
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
@@ -134,9 +136,19 @@ def test_fmus_that_compute_outputs_in_steps_only_are_delayed_and_one_line_says_s
 
 @pytest.mark.parametrize("k", [-2.0, 1.5, 6.0])
 @pytest.mark.parametrize("stop", [20.0, 200.0])
-def test_a_delayed_ring_that_grows_without_bound_ends_the_run(folder, k, stop):
-    ending = simulate(planned(ring(folder, k, 1.0), Experiment(stop, H, coupling="delay")))
-    assert "bound" in str(ending.failure)
+@pytest.mark.parametrize("patience", [0.0, 0.2])
+def test_a_delayed_ring_that_grows_without_bound_ends_the_run(
+    folder, k, stop, patience, monkeypatch
+):
+    """At the same step however fast the machine is: after 512, or before a value overflows."""
+    monkeypatch.setattr(observer, "_PATIENCE", patience)
+    table = Table()
+    ending = simulate(planned(ring(folder, k, 1.0), Experiment(stop, H, coupling="delay")), [table])
+    assert str(ending.failure).count("grows without bound") == 1
+    steps = value = 0
+    while isfinite(value := k * value + sin(H * steps)) and steps < min(512, stop / H):
+        steps += 1
+    assert len(table.rows) == 1 + steps
 
 
 @pytest.mark.parametrize("growth", [0.0, 0.3, -0.3])
