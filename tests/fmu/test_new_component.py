@@ -29,7 +29,6 @@ OTHER = "fmus.disturbance_generator"
 #: Tests of any component, and what they read.
 TESTS = (
     "tests/fmu/test_built_fmu.py",
-    "tests/unit/fmus/native/test_equations.py",
     "tests/unit/fmus/native/test_translator.py",
 )
 READ = ("tests/support", "tests/fuzz", "docs/status.md", "pyproject.toml", *TESTS)
