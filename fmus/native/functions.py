@@ -26,7 +26,7 @@ from fmus.native.program import (
     Structure,
     Untranslatable,
     c_name,
-    plain,
+    strip_sphinx_marks,
 )
 from fmus.ports.port import Refusal
 
@@ -334,7 +334,7 @@ def _annotated(lines: list[str], comment: str, indent: str) -> list[str]:
 def _comment(docstring: str | None) -> list[str]:
     if not docstring:
         return []
-    lines = plain(textwrap.dedent(docstring)).rstrip().splitlines()
+    lines = strip_sphinx_marks(textwrap.dedent(docstring)).rstrip().splitlines()
     if len(lines) == 1:
         return [f"/* {lines[0]} */"]
     return [f"/* {lines[0]}", *(f" * {line}".rstrip() for line in lines[1:]), " */"]

@@ -111,7 +111,7 @@ def declaration(shape: Structure) -> str:
         members = [f"{shape.parts[0][1].name} v[{len(members)}];"]
     lines = [f"    {line}" for line in members or ["char nothing; /* C has no empty structure */"]]
     text = inspect.cleandoc(shape.made.__doc__).splitlines()[0] if shape.made else ""
-    head = f"/* {plain(text)} */\n" if text else ""
+    head = f"/* {strip_sphinx_marks(text)} */\n" if text else ""
     return head + "\n".join(["typedef struct {", *lines, f"}} {shape.name};"])
 
 
@@ -120,11 +120,11 @@ def _comments(made: Any) -> dict[str, str]:
     if made is None:
         return {}
     found = re.findall(r"^    (\w+):.*#: (.*)$", inspect.getsource(made), re.MULTILINE)
-    return {f".{name}": f" /* {plain(text)} */" for name, text in found}
+    return {f".{name}": f" /* {strip_sphinx_marks(text)} */" for name, text in found}
 
 
-def plain(text: str) -> str:
-    """A text without the marks that Sphinx reads."""
+def strip_sphinx_marks(text: str) -> str:
+    """Take the marks that Sphinx reads out of a text."""
     return re.sub(r"(?::\w+:)?`+[~.]?([^`]*)`+", r"\1", text).replace("*/", "* /")
 
 

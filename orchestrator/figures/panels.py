@@ -25,9 +25,9 @@ from orchestrator.figures.style import (
     WIDTH,
     Drawn,
     earth_axes,
+    escape_math,
     having,
     heading,
-    plain,
     printed_unit,
     styled,
 )
@@ -173,7 +173,7 @@ def _path(cell: Cell, runs: Sequence[Drawn]) -> None:
     for i, (run, colour) in enumerate(shown):
         y = true_control_point(run.result, run.loop)
         paths.append(y)
-        label = plain(run.label) if len(shown) > 1 else "control point"
+        label = escape_math(run.label) if len(shown) > 1 else "control point"
         axes.plot(*y.T, color=colour, linewidth=_THIN if i else _THICK, label=label)
         # Rings around each other: vehicles that start together stay to be seen.
         axes.scatter(
@@ -228,7 +228,7 @@ def draw_lines(
         if twin is None:
             line: Any = {"color": COLOURS[i], "linestyle": STYLES[i], "label": label}
         else:
-            line = {"color": "black", "linewidth": 0.7, "label": None if i else plain(twin)}
+            line = {"color": "black", "linewidth": 0.7, "label": None if i else escape_math(twin)}
         axes.plot(time, column, **line)
 
 
@@ -278,7 +278,7 @@ def _mark_events(panels: Sequence[Axes], runs: Sequence[Drawn]) -> None:
             axes.axvline(time, color="0.35", linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
         is_late = time - start > _LATE * (end - start)
         panels[0].annotate(
-            plain(label), (time, 0), xycoords=panels[0].get_xaxis_transform(),
+            escape_math(label), (time, 0), xycoords=panels[0].get_xaxis_transform(),
             xytext=(-2 if is_late else 2, 2), textcoords="offset points",
             ha="right" if is_late else "left", va="bottom", fontsize="small",
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
@@ -314,7 +314,7 @@ def _errors(cell: Cell, runs: Sequence[Drawn], logarithmic: bool = False) -> Non
 
 def _line(i: int, run: Drawn, colour: str) -> dict[str, Any]:
     """Of the run a figure is about, and, thin upon it, of those it is compared with."""
-    return {"color": colour, "linewidth": _THIN if i else _THICK, "label": plain(run.label)}
+    return {"color": colour, "linewidth": _THIN if i else _THICK, "label": escape_math(run.label)}
 
 
 def draw_commands(
@@ -359,7 +359,7 @@ def _show_limits(axes: Axes, k: int, runs: Sequence[Drawn], limited: Drawn, unit
     axes.set_ylim(max(min(bottom, 1.2 * lower), _BEYOND * lower), _BEYOND * upper)
     for label, peak in peaks.items():
         if peak > _BEYOND * max(upper, -lower):
-            who = f"peak of {plain(label)}" if len(runs) > 1 else "peak"
+            who = f"peak of {escape_math(label)}" if len(runs) > 1 else "peak"
             number = f"{peak:,.0f}" if peak < _MANY else f"{peak:.2g}"
             words += f", {who} {number} {unit}"
     _say(axes, words, upper, axes.get_yaxis_transform(), "bottom")

@@ -13,7 +13,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from orchestrator.figures.panels import over_time
-from orchestrator.figures.style import COLOURS, STYLES, WIDTH, Drawn, plain, printed_unit, styled
+from orchestrator.figures.style import (
+    COLOURS,
+    STYLES,
+    WIDTH,
+    Drawn,
+    escape_math,
+    printed_unit,
+    styled,
+)
 from orchestrator.figures.visible import draw_signal
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.observer import matches, matching
@@ -125,7 +133,9 @@ def _draw_panel(
                 partial(_column, member),
                 color=COLOURS[colour],
                 linestyle=_style(i if len(runs) > 1 else j),
-                label=", ".join([parts[j]] * (len(members) > 1) + [plain(run)] * (len(runs) > 1)),
+                label=", ".join(
+                    [parts[j]] * (len(members) > 1) + [escape_math(run)] * (len(runs) > 1)
+                ),
             )
     name = group if len(members) > 1 else members[0]
     axes.set_ylabel(f"{name}\n[{unit}]" if unit else name)
@@ -142,7 +152,7 @@ def _draw_panel(
 
 def _line(label: str, colour: str, style: int) -> Line2D:
     """A line for a legend."""
-    return Line2D([], [], color=colour, linestyle=_style(style), label=plain(label))
+    return Line2D([], [], color=colour, linestyle=_style(style), label=escape_math(label))
 
 
 def _style(i: int) -> Any:

@@ -120,14 +120,14 @@ def printed_unit(unit: str) -> str:
     return re.sub(r"(?<=[A-Za-z])\d+", lambda power: power[0].translate(_RAISED), text)
 
 
-def plain(text: str) -> str:
-    """A text that matplotlib takes for text, and not for a formula."""
+def escape_math(text: str) -> str:
+    """Escape what matplotlib would take for a formula."""
     return text.replace("$", r"\$")
 
 
 def heading(title: str) -> str:
     """A title whose symbols such as A_f and theta_hat are set as such, and the rest as it is."""
-    return _SYMBOL.sub(_set, plain(title))
+    return _SYMBOL.sub(_set, escape_math(title))
 
 
 def _set(symbol: re.Match[str]) -> str:

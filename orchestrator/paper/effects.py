@@ -21,7 +21,7 @@ from orchestrator.figures.style import COLOURS, STYLES, WIDTH, Drawn, save, styl
 from orchestrator.paper.claims import FIVE, FIVE_PD, QUIET, SEVEN
 from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.measures import EFFORT_PD, EFFORT_PROPOSED
-from orchestrator.paper.page import actuator_values, numbers, picture, plain
+from orchestrator.paper.page import actuator_values, escape_markdown, numbers, picture
 from orchestrator.runs.request import Request
 from orchestrator.vehicle.proof import CERTIFICATE_COLUMNS, certificates
 from orchestrator.vehicle.signals import ACTUATORS, AXES, limits
@@ -110,7 +110,7 @@ def show_effect(name: str, kept_runs: Sequence[KeptRun], folder: Path) -> str:
     """
     for kept_run in kept_runs:
         if kept_run.failure is not None:
-            return f"A run ended early: {plain(kept_run.failure)}"
+            return f"A run ended early: {escape_markdown(kept_run.failure)}"
     [found] = [effect for effect in EFFECTS if effect.name == name]
     with styled():
         shown = found.show(*kept_runs)

@@ -20,7 +20,7 @@ from orchestrator.paper.choices import (
     PUBLISHED,
     VEHICLE,
 )
-from orchestrator.paper.page import numbers, plain, table
+from orchestrator.paper.page import escape_markdown, numbers, table
 from orchestrator.paper.variants import (
     FARTHEST,
     QUANTILES,
@@ -148,7 +148,7 @@ def _described(found: Sensitivity, variant: Variant) -> str:
     scores = found.scores[variant.options[:-1]]
     around = [i for i in (last - _AROUND, last + _AROUND) if 0 <= i < len(END_TIMES)]
     beside = " and ".join(f"{scores[i]:.2f} at {END_TIMES[i]:g} s" for i in around)
-    text = plain("; ".join((*words, f"{choice.name} = {option.text}")))
+    text = escape_markdown("; ".join((*words, f"{choice.name} = {option.text}")))
     return f"{text}; the score is {beside}"
 
 
@@ -178,7 +178,7 @@ def _reached(found: Found) -> str:
     texts = []
     for formula, name in enumerate(_FORMULAS):
         missed = [
-            plain(NUMBERS[scenario][i])
+            escape_markdown(NUMBERS[scenario][i])
             for scenario, published in PUBLISHED.items()
             for span in [found.six.span(scenario, True, formula)]
             for i in np.flatnonzero((published < span.low) | (published > span.high))
@@ -245,10 +245,11 @@ def _options(found: Found) -> Iterator[list[str]]:
         best = [six.best_with_each(axis, consistent) for consistent in (True, False)]
         for option, *scores in zip(choice.options, *best, strict=True):
             written = [f"{score:.2f}" if np.isfinite(score) else "" for score in scores]
-            yield [plain(choice.name), plain(option.text), *written, plain(option.against)]
+            yield [*map(escape_markdown, (choice.name, option.text, *written, option.against))]
         if choice.name == VEHICLE:
             score = f"{found.printed[-1].score:.2f}, of medians"
-            yield [plain(choice.name), plain(FIVE_DEGREES.text), "", score, plain(AGAINST_FIVE)]
+            row = (choice.name, FIVE_DEGREES.text, "", score, AGAINST_FIVE)
+            yield [*map(escape_markdown, row)]
 
 
 def write_table(folder: Path, command: Sequence[str], force: bool = False) -> tuple[Path, Path]:

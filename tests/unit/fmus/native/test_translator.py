@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from fmus.discovery import components
-from fmus.native.program import plain
+from fmus.native.program import strip_sphinx_marks
 from fmus.native.translator import tables, translated
 from fmus.ports.port import FAULT, H_MAX, Port
 from fmus.python.callbacks import explained
@@ -94,7 +94,7 @@ def test_each_function_has_its_docstring_above_it(package):
             if head:
                 first, *_ = (ast.get_docstring(node) or "").splitlines()
                 above = head[1].rpartition("\n\n")[2]
-                assert above.startswith(f"/* {plain(first)}"), node.name
+                assert above.startswith(f"/* {strip_sphinx_marks(first)}"), node.name
                 seen += 1
     assert seen > 0
 
