@@ -29,7 +29,7 @@ from orchestrator.formats.osp_and_container import write_osp
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
-from orchestrator.master.loop import chosen
+from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.table import Table
 from orchestrator.master.simulation import simulate
 from orchestrator.runs.bundle import build
@@ -60,7 +60,7 @@ def ours(system: System, order: str) -> tuple[Run, float]:
     def run(steps: int) -> float:
         request = Request(stop_time=steps * step, step=step, order=order)
         prepared, table = prepare(Scenario(system.name), system, request), Table()
-        loop = chosen("auto", prepared.experiment)
+        loop = choose_loop("auto", prepared.experiment)
         start = perf_counter()
         ending = simulate(prepared.plan, [table], loop=loop)
         seconds = perf_counter() - start

@@ -32,7 +32,7 @@ from auv_fmu.euler import STEP
 from orchestrator.exchange import c_host
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.loop import chosen
+from orchestrator.master.loop import choose_loop
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop as wired
 from orchestrator.system.structure import System
@@ -77,7 +77,7 @@ def straight_line(steps: int) -> float:
 
 def in_our_master(system: System, loop: str, order: str, steps: int) -> float:
     """Steps of a run whose rows are kept in memory, without its set-up."""
-    stepping = chosen(loop, Experiment(STEP, STEP, order))
+    stepping = choose_loop(loop, Experiment(STEP, STEP, order))
     # A set-up takes as long as thousands of compiled steps, and a larger table has other costs.
     times = MORE_COMPILED if loop == "compiled" else 1
     return sum(steps_time(system, steps, order, stepping) for _ in range(times)) / times

@@ -26,7 +26,7 @@ from orchestrator.figures.visible import VisibleRows
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.hook import NEVER, Hook, Run
-from orchestrator.master.loop import LOOPS, chosen
+from orchestrator.master.loop import LOOPS, choose_loop
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.observer import Observer, Selection
 from orchestrator.master.plan import planned
@@ -102,7 +102,7 @@ def main() -> None:
             planned(load("fig4", options.kind), experiment),
             observers,
             None,
-            chosen(options.loop, experiment),
+            choose_loop(options.loop, experiment),
             hooks,
         )
         sizes = {path.name: path.stat().st_size for path in folder.glob("checkpoint/*")}

@@ -21,7 +21,7 @@ from orchestrator.master.fmi.instance import Ended
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.hook import Run
 from orchestrator.master.schedule import Stage, step
-from orchestrator.master.stepper import kept, made, stepped
+from orchestrator.master.stepper import compile_stepper, load_stepper, step_compiled
 
 #: Loops that can be asked for; the first is the default.
 LOOPS = ("auto", "python", "compiled")
@@ -53,7 +53,7 @@ class Stepping(NamedTuple):
     steps: Steps
 
 
-def interpreted(run: Run) -> Iterator[None]:
+def step_interpreted(run: Run) -> Iterator[None]:
     """Make the steps in Python, and look after each."""
     values, shown, append = run.row.values, run.row.shown, run.blocks.append
     experiment, stages, steps = run.experiment, run.stages, run.experiment.rows - 1
@@ -79,11 +79,13 @@ def interpreted(run: Run) -> Iterator[None]:
 
 
 #: The loop that is always there.
-PYTHON_LOOP = Stepping("python", interpreted)
+PYTHON_LOOP = Stepping("python", step_interpreted)
 
 
-def chosen(wanted: str, experiment: Experiment, isolation: Isolation | None = None) -> Stepping:
-    """The loop for a run.
+def choose_loop(
+    wanted: str, experiment: Experiment, isolation: Isolation | None = None
+) -> Stepping:
+    """Choose the loop for a run.
 
     Args:
         wanted: one of :data:`LOOPS`.
@@ -99,21 +101,21 @@ def chosen(wanted: str, experiment: Experiment, isolation: Isolation | None = No
     if wanted == "compiled":
         if isolation:
             raise InputError("the compiled loop steps no isolated FMUs: leave one of the two out")
-        return _compiled(kept() or made())
+        return _compiled(load_stepper() or compile_stepper())
     if wanted == "auto" and not isolation and experiment.rows > _SET_UP:
-        if library := kept():
+        if library := load_stepper():
             return _compiled(library)
         if experiment.rows > _COMPILED:
             with suppress(InputError):
-                return _compiled(made(in_no_time=True))
+                return _compiled(compile_stepper(in_no_time=True))
     return PYTHON_LOOP
 
 
 def _compiled(library: CDLL) -> Stepping:
-    return Stepping("compiled", partial(stepped, library))
+    return Stepping("compiled", partial(step_compiled, library))
 
 
-def to_its_end(steps: Steps, run: Run) -> Iterator[None]:
+def make_steps(steps: Steps, run: Run) -> Iterator[None]:
     """Make the steps of a run, and its last row where a component ends it within a step.
 
     Yields:
@@ -129,7 +131,7 @@ def to_its_end(steps: Steps, run: Run) -> Iterator[None]:
     except Ended as end:
         if not end.time > run.time:
             raise
-        yield from to_its_end(partial(_finished, end=end), run)
+        yield from make_steps(partial(_finished, end=end), run)
 
 
 def _finished(run: Run, end: Ended) -> Iterator[None]:

@@ -17,7 +17,7 @@ from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.fmi.placement import placed
 from orchestrator.master.fmi.surroundings import Surroundings, default_mode
 from orchestrator.master.hooks.hook import Hook, Hooks, Run
-from orchestrator.master.loop import PYTHON_LOOP, Stepping, to_its_end
+from orchestrator.master.loop import PYTHON_LOOP, Stepping, make_steps
 from orchestrator.master.observers.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.plan import Plan
 from orchestrator.master.row import Overrides, Row
@@ -180,7 +180,7 @@ def _advance(
     blocks, failure = run.blocks, None
     try:
         hooks.act()
-        for _ in to_its_end(loop.steps, run):
+        for _ in make_steps(loop.steps, run):
             if run.made >= run.due:
                 hooks.act()
             if monotonic() > blocks.due:

@@ -23,7 +23,7 @@ from typing import Any
 from fmus.discovery import fingerprint
 from fmus.kinds import CONTAINED, FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.formats.ssp.writer import ssp_bytes
-from orchestrator.machine.cache import folder_of, keep, kept, users_folder
+from orchestrator.machine.cache import category_folder, read_cached, users_folder, write_cached
 from orchestrator.machine.children import run_module
 from orchestrator.machine.disk import claimed, process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
@@ -195,7 +195,7 @@ def current_fmus(kind: str = PYTHON, fmi: str = FMI_VERSIONS[0]) -> Path:
     if found := _kept(key):
         return found
     try:
-        with claimed(folder_of(_CATEGORY), wait=True):
+        with claimed(category_folder(_CATEGORY), wait=True):
             # Another process may have been first.
             return _kept(key) or _built(key, "--kind", kind, "--fmi", fmi)
     except OSError as error:
@@ -207,7 +207,7 @@ def current_fmus(kind: str = PYTHON, fmi: str = FMI_VERSIONS[0]) -> Path:
 
 def _kept(key: str) -> Path | None:
     """The folder of FMUs that were built earlier."""
-    return next((path.parent for path in kept(_CATEGORY, key)), None)
+    return next((path.parent for path in read_cached(_CATEGORY, key)), None)
 
 
 def _built(key: str, *options: str) -> Path:
@@ -215,7 +215,7 @@ def _built(key: str, *options: str) -> Path:
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
         run_fmus("build", Path(temporary), *options)
         files = {path.name: path.read_bytes() for path in sorted(Path(temporary).iterdir())}
-    return keep(_CATEGORY, key, files)[0].parent
+    return write_cached(_CATEGORY, key, files)[0].parent
 
 
 def new_controller(name: str, folder: Path | None = None, base: str = BASES[0]) -> list[Path]:

@@ -14,7 +14,7 @@ from orchestrator.master.fmi.isolated import Isolation, isolation_of
 from orchestrator.master.hooks.events import Alter, Event, Events, Set
 from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.hooks.timing import InputTable, Playback, check_factor
-from orchestrator.master.loop import PYTHON_LOOP, Stepping, chosen
+from orchestrator.master.loop import PYTHON_LOOP, Stepping, choose_loop
 from orchestrator.master.observers.observer import Ending, Observer
 from orchestrator.master.plan import Identity, Plan, identity, planned
 from orchestrator.master.simulation import simulate
@@ -162,7 +162,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
         events = read_events(scenario.name, scenario.events, replace(system, step=step))
     findings.refuse()
     isolation = isolation_of(request.isolate, request.step_timeout)
-    loop = chosen(request.loop, experiment, isolation)
+    loop = choose_loop(request.loop, experiment, isolation)
     if request.real_time is not None:
         check_factor(request.real_time)
     return Prepared(scenario, plan, isolation, loop, request.real_time, events, input_table)

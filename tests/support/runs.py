@@ -11,7 +11,7 @@ import numpy as np
 from orchestrator.master.experiment import Experiment, Order
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.hook import Hook
-from orchestrator.master.loop import chosen
+from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
@@ -48,7 +48,7 @@ def run_table(
 ) -> Table:
     """All rows of a run, however it ends."""
     table = Table()
-    how = chosen(loop, experiment, isolation)
+    how = choose_loop(loop, experiment, isolation)
     simulate(planned(system, experiment), [table], isolation, how, hooks)
     return table
 

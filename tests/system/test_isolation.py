@@ -22,7 +22,7 @@ from orchestrator.formats.tables import read_rows
 from orchestrator.machine.errors import InputError, StartError
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.loop import chosen
+from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
@@ -253,7 +253,7 @@ def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path, loop: s
     table = Waits()
     plan = planned(foreign_system(c_fmu, "SILENT_ERROR"), SHORT)
     talkative = foreign_system(c_fmu, "LOGS", at=0.0)
-    steps = chosen(loop, plan.experiment)
+    steps = choose_loop(loop, plan.experiment)
     thread = threading.Thread(target=simulate, args=(plan, [table], None, steps))
     thread.start()
     assert begun.wait(60.0)

@@ -23,7 +23,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import unpacked
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.binary import check_place
-from orchestrator.master.loop import chosen
+from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned, stages
 from orchestrator.master.simulation import simulate
@@ -126,7 +126,7 @@ class Impatient(Table):
 def test_interrupt_keeps_the_rows_and_does_not_reach_the_fmus(system: System, loop: str):
     """In a run that would take minutes."""
     result, experiment = Impatient(), Experiment(1e4, 0.02)
-    simulate(planned(system, experiment), [result], loop=chosen(loop, experiment))
+    simulate(planned(system, experiment), [result], loop=choose_loop(loop, experiment))
     assert result.failure is not None
     assert "interrupted at t =" in result.failure
     assert 1 < len(result) < 500_000

@@ -17,7 +17,7 @@ from orchestrator.master.hooks.hook import Run
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
 from orchestrator.master.simulation import simulate
-from orchestrator.master.stepper import made
+from orchestrator.master.stepper import compile_stepper
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from support.linear import QUARTER_TRUCK, SINE, TWO_MASSES, Model, Part, error, linear, system_of
@@ -66,7 +66,7 @@ def test_the_order_of_elements_does_not_matter(folder, names):
 @pytest.mark.parametrize("coupling", ["solve", "linear"])
 def test_both_loops_and_isolation_make_the_same_rows(folder, coupling):
     system, experiment = ring(folder, 0.5, 0.9), Experiment(2.0, H, coupling=coupling)
-    made()
+    compile_stepper()
     table, *others = (
         run(system, experiment),
         run(system, experiment, loop="compiled"),

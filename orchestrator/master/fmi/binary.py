@@ -23,7 +23,7 @@ from fmpy.fmi2 import FMU2Slave, fmi2Error, fmi2Status
 from fmpy.model_description import read_build_description
 
 from orchestrator.machine import cache
-from orchestrator.machine.children import compiler, made_library
+from orchestrator.machine.children import compile_library, find_compiler
 from orchestrator.machine.disk import claimed
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.fmi.surroundings import put_back, within
@@ -196,12 +196,12 @@ def make_binary(component: Component, folder: Path) -> None:
         return
     key = _key(component)
     try:
-        with claimed(cache.folder_of(_CATEGORY), wait=True):
-            kept = cache.kept(_CATEGORY, key)
+        with claimed(cache.category_folder(_CATEGORY), wait=True):
+            kept = cache.read_cached(_CATEGORY, key)
             content = next(iter(kept.values())) if kept else _compiled(component, sources)
             if not kept:
                 with suppress(OSError):
-                    cache.keep(_CATEGORY, key, {binary.name: content})
+                    cache.write_cached(_CATEGORY, key, {binary.name: content})
         binary.parent.mkdir(parents=True, exist_ok=True)
         # Other processes may be about to load it.
         new = binary.with_name(f"{binary.name}.{os.getpid()}")
@@ -358,7 +358,7 @@ def _check_compiler(component: Component) -> None:
         InputError: there is no compiler.
 
     """
-    if compiler() is None and not cache.kept(_CATEGORY, _key(component)):
+    if find_compiler() is None and not cache.read_cached(_CATEGORY, _key(component)):
         raise InputError(
             f"{component.fmu}: has no binary for this machine, {fmpy.platform}, and must be "
             "compiled: install gcc or clang, or `pip install ziglang`"
@@ -367,7 +367,7 @@ def _check_compiler(component: Component) -> None:
 
 def _compiled(component: Component, sources: Sources) -> bytes:
     _check_compiler(component)
-    run = compiler()
+    run = find_compiler()
     assert run is not None
     warnings.warn(
         f"{component.fmu.name} has no binary for this machine, {fmpy.platform}: its C sources are "
@@ -376,7 +376,7 @@ def _compiled(component: Component, sources: Sources) -> bytes:
     )
     cpp = ["-lstdc++"] * any(file.suffix != ".c" for file in sources.files)
     files = map(str, sources.files)
-    return made_library(
+    return compile_library(
         run, *_FLAGS, *sources.options, "-idirafter", str(_HEADERS), *files, "-lm", *cpp
     )
 

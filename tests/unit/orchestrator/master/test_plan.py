@@ -20,7 +20,7 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.events import Event, Stop
 from orchestrator.master.hooks.timing import InputTable
-from orchestrator.master.loop import chosen
+from orchestrator.master.loop import choose_loop
 from orchestrator.master.plan import delays, digest_of, gathered, planned, stages
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import Request
@@ -286,7 +286,7 @@ def made_in_another_way(run: Prepared, choice: Choice) -> Prepared:
         run,
         scenario=replace(run.scenario, name="another", title="Another", digest="1234"),
         isolation=choice.random.choice([None, Isolation(20.0)]),
-        loop=chosen(choice.random.choice(["python", "auto"]), run.experiment),
+        loop=choose_loop(choice.random.choice(["python", "auto"]), run.experiment),
         real_time=choice.random.choice([None, 1.0]),
     )
 

@@ -11,7 +11,7 @@ import pytest
 from orchestrator import simulate as run
 from orchestrator.figures.study_values import Values
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.loop import chosen
+from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import planned
@@ -122,7 +122,7 @@ def test_what_is_never_reached_is_not_there():
 def test_closed_loop_has_all_of_them():
     _, system = loaded("fig4", "native")
     experiment, observer = Experiment(4.0, 0.02), Indices()
-    simulate(planned(system, experiment), [observer], loop=chosen("auto", experiment))
+    simulate(planned(system, experiment), [observer], loop=choose_loop("auto", experiment))
     found = observer.values().keys()
     assert set(index_columns()) - {"time_to_reach"} <= found <= set(index_columns())
 
