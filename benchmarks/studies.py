@@ -31,7 +31,7 @@ from orchestrator.studies import blocks as blocks_module
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
 from orchestrator.studies.space import Space
-from orchestrator.studies.store import store
+from orchestrator.studies.store import open_store
 from orchestrator.studies.study_file import study_of
 from orchestrator.studies.sweep import making
 from orchestrator.vehicle.indices import index_columns
@@ -108,7 +108,7 @@ def keeping(n: int) -> tuple[float, float, float]:
     start = process_time()
     with (
         TemporaryDirectory(prefix="auvfmu") as folder,
-        store(Path(folder), {"made_of": {}}, space.indices) as unfinished,
+        open_store(Path(folder), {"made_of": {}}, space.indices) as unfinished,
     ):
         assert unfinished is not None
         with making(Idle(), (space[i] for i in range(n)), workers=1) as blocks:

@@ -12,7 +12,7 @@ from fmpy.validation import validate_fmu
 from orchestrator.commands.options import add_variant
 from orchestrator.commands.streams import BAD_INPUT, OK, show
 from orchestrator.machine.errors import Findings, InputError, reason
-from orchestrator.machine.user_files import unpacked
+from orchestrator.machine.user_files import unpack
 from orchestrator.master.fmi.binary import binary_of, check_binary
 from orchestrator.runs.loading import loaded
 from orchestrator.runs.preparation import SOME_TIME, prepare
@@ -152,7 +152,7 @@ def surprises(component: Component) -> Iterator[str]:
 
 def _flaws(fmu: Path) -> list[str]:
     """What the standard's schema and rules have against the description."""
-    if not (unpacked(fmu).folder / "modelDescription.xml").is_file():
+    if not (unpack(fmu).folder / "modelDescription.xml").is_file():
         # What reads the FMU says so.
         return []
     try:
@@ -164,7 +164,7 @@ def _flaws(fmu: Path) -> list[str]:
 def _dangling(fmu: Path) -> Iterator[str]:
     """References in the structure of the model to variables that do not exist."""
     try:
-        root = ElementTree.parse(unpacked(fmu).folder / "modelDescription.xml").getroot()
+        root = ElementTree.parse(unpack(fmu).folder / "modelDescription.xml").getroot()
     except (OSError, ElementTree.ParseError):
         return
     known = range(1, 1 + len(root.findall("ModelVariables/ScalarVariable")))

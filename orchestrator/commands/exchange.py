@@ -23,7 +23,7 @@ from orchestrator.formats.osp_and_container import write_container, write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, order_of
-from orchestrator.runs.folder import replaced
+from orchestrator.runs.folder import replace_files
 from orchestrator.runs.loading import left_behind, load
 from orchestrator.runs.preparation import DEFAULT_STEP, SOME_TIME, prepare
 from orchestrator.runs.request import Files, Request
@@ -131,7 +131,7 @@ def _export(options: argparse.Namespace) -> int:
     if left := left_behind(prepared.scenario):
         say(f"warning: {left}")
     folder = options.out or Path("exports", prepared.scenario.stem)
-    with replaced(folder, force=options.force) as unfinished:
+    with replace_files(folder, force=options.force) as unfinished:
         written = FORMATS[options.format](system, unfinished)
     for path in written:
         show(folder / path.relative_to(unfinished))

@@ -17,7 +17,7 @@ from orchestrator.figures.view import page
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.observer import Observer, Progress
-from orchestrator.runs.folder import VIEW, replaced
+from orchestrator.runs.folder import VIEW, replace_files
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.record import changed_files, read_record, read_result, table_in
 from orchestrator.runs.request import Files, Request
@@ -175,7 +175,7 @@ def _animate(options: argparse.Namespace) -> int:
 def _written(files: Sequence[Path], force: bool) -> Iterator[Path]:
     """A folder to write files into that then lie in theirs, whole or not at all; says where."""
     names = [file.name for file in files]
-    with replaced(files[0].parent, names, force=force) as unfinished:
+    with replace_files(files[0].parent, names, force=force) as unfinished:
         yield unfinished
     for file in files:
         show(file)

@@ -14,7 +14,7 @@ from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import names
 from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study
-from orchestrator.studies.sweep import Means, folder_of, swept
+from orchestrator.studies.sweep import Means, study_folder, swept
 
 
 def add_sweep(parser: argparse.ArgumentParser) -> None:
@@ -57,7 +57,7 @@ def add_table(parser: argparse.ArgumentParser) -> None:
 
 def _sweep(options: argparse.Namespace) -> int:
     study = read_study(options.study)
-    folder = folder_of(study, options.out)
+    folder = study_folder(study, options.out)
     try:
         result = swept(study, taken(Means, options), folder, options.command, say, progress=True)
     except KeyboardInterrupt:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.user_files import explained, lines_of
+from orchestrator.machine.user_files import explain_errors, open_lines
 
 #: Rows that are read at once, and that are written to Parquet at once.
 ROWS = 8192
@@ -36,11 +36,11 @@ def read_columns(path: Path) -> tuple[str, ...]:
         InputError: the file is no table of a run.
 
     """
-    with explained(path, _NO_RUN):
+    with explain_errors(path, _NO_RUN):
         if path.suffix == ".parquet":
             with parquet().ParquetFile(path) as file:
                 return _after_time(file.schema_arrow.names)
-        with lines_of(path) as lines:
+        with open_lines(path) as lines:
             return _after_time(next(csv.reader(lines), ()))
 
 
@@ -55,7 +55,7 @@ def read_rows(path: Path, strings: Collection[str] = ()) -> Iterator[np.ndarray]
         InputError: the file is no table of a run.
 
     """
-    with explained(path, _NO_RUN):
+    with explain_errors(path, _NO_RUN):
         if path.suffix == ".parquet":
             with parquet().ParquetFile(path) as file:
                 names = [name for name in file.schema_arrow.names if name not in strings]
@@ -63,7 +63,7 @@ def read_rows(path: Path, strings: Collection[str] = ()) -> Iterator[np.ndarray]
                     columns = [column.to_numpy(zero_copy_only=False) for column in batch.columns]
                     yield np.column_stack(columns).astype(float, copy=False)
             return
-        with lines_of(path) as lines:
+        with open_lines(path) as lines:
             header = ("time", *_after_time(next(csv.reader(lines), ())))
             texts = [place for place, name in enumerate(header) if name in strings]
             filled = (line for line in lines if line.strip())
@@ -97,7 +97,7 @@ def records(
             raised while the table was read.
 
     """
-    with explained(path, what), lines_of(path, newline="") as lines:
+    with explain_errors(path, what), open_lines(path, newline="") as lines:
         first = next(lines, "")
         marks = [mark for mark in SEPARATORS if mark in first] or [","]
         mark = next((m for m in marks if are_names(next(_reader([first], m)))), marks[0])

@@ -21,7 +21,7 @@ from tempfile import mkdtemp, mkstemp
 
 from platformdirs import user_cache_path
 
-from orchestrator.machine.disk import process_folder, to_disk
+from orchestrator.machine.disk import process_folder, sync_to_disk
 
 #: The folder of the digests, beside one for each category of what is kept.
 _DIGESTS = "digests"
@@ -88,7 +88,7 @@ def write_cached(category: str, key: str, files: Mapping[str, bytes]) -> list[Pa
         made.chmod(0o700)
         for name, content in files.items():
             _write(os.open(made / name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), content)
-        to_disk(made)
+        sync_to_disk(made)
         digests = {name: sha256(content).hexdigest() for name, content in files.items()}
         descriptor, record = mkstemp(".json", f"{category}-{key}-", root / _DIGESTS)
         try:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from orchestrator.machine import cache as user_cache
 from orchestrator.machine.children import compile_library, find_compiler, find_fast_compiler
-from orchestrator.machine.disk import claimed
+from orchestrator.machine.disk import hold_lock
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.fmi.instance import CALLS
 from orchestrator.master.fmi.transfer import CMember
@@ -173,7 +173,7 @@ def compile_stepper(in_no_time: bool = False) -> CDLL:
             "the compiled loop needs a C compiler: install gcc or clang, or `pip install ziglang`"
         )
     try:
-        with claimed(user_cache.category_folder(_CATEGORY), wait=True):
+        with hold_lock(user_cache.category_folder(_CATEGORY), wait=True):
             if library := load_stepper():
                 # Another process was first.
                 return library

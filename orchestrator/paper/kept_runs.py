@@ -18,7 +18,7 @@ from orchestrator.machine.ledger import Ledger
 from orchestrator.machine.workers import Workers
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import code_of, digest_of
-from orchestrator.runs.folder import opened
+from orchestrator.runs.folder import open_ledger
 from orchestrator.runs.preparation import Prepared, prepared_of
 from orchestrator.runs.record import content_of, ending_in, header_in, loops_in
 from orchestrator.runs.request import Request
@@ -93,7 +93,7 @@ class KeptRuns:
             KeyboardInterrupt: the user does not want to wait; runs that are finished are kept.
 
         """
-        with opened(self._folder, self._force) as ledger:
+        with open_ledger(self._folder, self._force) as ledger:
             self._make(runs, workers, ledger)
 
     def _make(self, runs: Iterable[Request], workers: Workers, ledger: Ledger) -> None:
@@ -124,7 +124,7 @@ class KeptRuns:
 
     def forget_others(self) -> None:
         """Remove from the folder what belongs to no run of this report."""
-        with opened(self._folder) as ledger:
+        with open_ledger(self._folder) as ledger:
             ledger.remove(set(ledger.files) - set(map(_file, self._keys.values())))
 
 

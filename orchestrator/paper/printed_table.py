@@ -33,7 +33,7 @@ from orchestrator.paper.variants import (
     Variant,
     all_variants,
 )
-from orchestrator.runs.folder import replaced
+from orchestrator.runs.folder import replace_files
 from orchestrator.runs.record import RECORDED, Stopwatch, write_content
 from orchestrator.vehicle.indices import REACHED
 from orchestrator.vehicle.signals import ACTUATORS, AXES
@@ -269,7 +269,7 @@ def write_table(folder: Path, command: Sequence[str], force: bool = False) -> tu
 
     """
     clock = Stopwatch()
-    with replaced(folder, (*_NAMES, RECORD), force=force) as unfinished:
+    with replace_files(folder, (*_NAMES, RECORD), force=force) as unfinished:
         with workers() as crew:
             found = all_variants(crew)
         text = f"# The printed table of section 4.2\n\n{section(found)}\n"

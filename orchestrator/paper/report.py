@@ -28,7 +28,7 @@ from orchestrator.paper.sections import (
 )
 from orchestrator.paper.variants import all_variants
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.folder import inner, replaced
+from orchestrator.runs.folder import inner_folder, replace_files
 from orchestrator.runs.record import RECORDED, Stopwatch, write_content
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.proof import gain_check
@@ -96,9 +96,9 @@ def write_report(
     # Built before there are processes that would each build them.
     fmus = current_fmus(kind)
     chapters = sections(scenarios, kind)
-    kept_runs = KeptRuns(inner(folder, _RUNS), stop_time, kind, force)
-    made = make_studies(ready, inner(folder, _STUDIES), kind, command, force)
-    with replaced(folder, (*_NAMES, RECORD), force=force) as unfinished:
+    kept_runs = KeptRuns(inner_folder(folder, _RUNS), stop_time, kind, force)
+    made = make_studies(ready, inner_folder(folder, _STUDIES), kind, command, force)
+    with replace_files(folder, (*_NAMES, RECORD), force=force) as unfinished:
         with workers() as crew:
             kept_runs.make(
                 [

@@ -19,7 +19,7 @@ from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.paper.kept_runs import KeptRun, KeptRuns
 from orchestrator.paper.page import escape_markdown, picture, table, values_with_units
-from orchestrator.runs.folder import inner
+from orchestrator.runs.folder import inner_folder
 from orchestrator.runs.preparation import Prepared, prepared_of, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario, read_scenario
@@ -253,7 +253,7 @@ def make_studies(
     """
     studies = [read_study(name) for name in names]
     for study in studies:
-        place = inner(folder, study.stem)
+        place = inner_folder(folder, study.stem)
         swept(study, Means(kind=kind, force=force), place, command, progress=True)
     return studies
 

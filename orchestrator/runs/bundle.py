@@ -25,10 +25,10 @@ from fmus.kinds import CONTAINED, FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.machine.cache import category_folder, read_cached, users_folder, write_cached
 from orchestrator.machine.children import run_module
-from orchestrator.machine.disk import claimed, process_folder
+from orchestrator.machine.disk import hold_lock, process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.machine.ledger import sha256_of
-from orchestrator.runs.folder import replaced
+from orchestrator.runs.folder import replace_files
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import WRITABLE
 
@@ -78,7 +78,7 @@ def build(
         InputError: the folder cannot be written, or the FMUs cannot be built.
 
     """
-    with replaced(folder, (_ARCHIVE, MANIFEST, _CHECKSUMS, _BILL), force=force) as unfinished:
+    with replace_files(folder, (_ARCHIVE, MANIFEST, _CHECKSUMS, _BILL), force=force) as unfinished:
         # What is up to date is taken along, and not written anew.
         for path in (*folder.glob("*.fmu"), folder / MANIFEST):
             if path.is_file():
@@ -195,7 +195,7 @@ def current_fmus(kind: str = PYTHON, fmi: str = FMI_VERSIONS[0]) -> Path:
     if found := _kept(key):
         return found
     try:
-        with claimed(category_folder(_CATEGORY), wait=True):
+        with hold_lock(category_folder(_CATEGORY), wait=True):
             # Another process may have been first.
             return _kept(key) or _built(key, "--kind", kind, "--fmi", fmi)
     except OSError as error:
@@ -242,7 +242,7 @@ def new_controller(name: str, folder: Path | None = None, base: str = BASES[0]) 
     }
     if folder.is_dir() and any(folder.iterdir()):
         raise InputError(f"{folder}: is not empty, and nothing in it is replaced")
-    with replaced(folder, contents) as unfinished:
+    with replace_files(folder, contents) as unfinished:
         for target, template in contents.items():
             text = (_TEMPLATES / template).read_text(encoding="utf-8")
             text = text.replace(_CLASS, class_name).replace(_MODULE, module)
@@ -275,7 +275,7 @@ def build_own(
     with TemporaryDirectory(dir=process_folder()) as temporary:
         [built] = run_fmus("python.own", Path(temporary), *options)
         place = script.parent if folder is None else folder
-        with replaced(place, [built.name], force=force) as unfinished:
+        with replace_files(place, [built.name], force=force) as unfinished:
             shutil.copyfile(built, unfinished / built.name)
     return place / built.name
 

@@ -21,8 +21,8 @@ from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.ledger import RECORD, is_changed, located
-from orchestrator.machine.user_files import explained, text_of
+from orchestrator.machine.ledger import RECORD, is_changed, locate
+from orchestrator.machine.user_files import explain_errors, read_text
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.binary import runs_python
 from orchestrator.master.hooks.checkpoint import Checkpoints, check_gives_states, interval_in
@@ -193,7 +193,7 @@ def read_result(
     file = table_in(path)
     record = read_record(file)
     texts = record.get("texts", [])
-    place = located(file)
+    place = locate(file)
     columns = tuple(name for name in read_columns(place) if name not in texts)
     blocks = read_rows(place, texts)
     first = next(blocks, None)
@@ -218,9 +218,9 @@ def table_in(path: Path) -> Path:
         InputError: there is none.
 
     """
-    with explained(path, "not the name of a result"):
+    with explain_errors(path, "not the name of a result"):
         for file in (path, *(path / name for name in TABLES)):
-            if located(file).is_file():
+            if locate(file).is_file():
                 return file
     raise InputError(f"{path}: holds no result.csv or result.parquet")
 
@@ -237,11 +237,11 @@ def read_record(table: Path) -> dict[str, Any]:
         InputError: it is broken.
 
     """
-    file = located(table.with_name(RECORD))
+    file = locate(table.with_name(RECORD))
     if not file.exists():
         return {}
-    with explained(file, _WHAT):
-        record = json.loads(text_of(file, _WHAT))
+    with explain_errors(file, _WHAT):
+        record = json.loads(read_text(file, _WHAT))
         try:
             if table.name not in record["files"]:
                 return {}

@@ -20,7 +20,7 @@ from orchestrator.master.loop import LOOPS
 from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Observer, Occurrence, Progress
 from orchestrator.master.observers.table import Table
-from orchestrator.runs.folder import locked, replaced
+from orchestrator.runs.folder import lock_folder, replace_files
 from orchestrator.runs.loading import check_brings_its_own, loaded, warned
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.record import (
@@ -173,7 +173,7 @@ class Result(Table):
         if format not in FORMATS:
             raise InputError(f"format {format!r}: use one of {', '.join(FORMATS)}")
         folder = Path(folder)
-        with replaced(folder, FILES, force=force) as unfinished:
+        with replace_files(folder, FILES, force=force) as unfinished:
             table = FORMATS[format](unfinished / f"result.{format}")
             table.begin(self.header)
             table.take(self.rows)
@@ -313,7 +313,7 @@ def _checkpoints(
     place = Path(folder)
     try:
         place.mkdir(parents=True, exist_ok=True)
-        with locked(place):
+        with lock_folder(place):
             yield checkpoints_of([prepared], [place], every, resume)
     except OSError as error:
         raise InputError(f"cannot write into {place}: {reason(error)}") from error

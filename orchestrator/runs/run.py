@@ -34,7 +34,7 @@ from orchestrator.master.observers.observer import (
     matches,
     matching,
 )
-from orchestrator.runs.folder import INCOMPLETE, inner, place_of, publish, replaced
+from orchestrator.runs.folder import INCOMPLETE, inner_folder, place_of, publish, replace_files
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.record import (
     CHECKPOINTS,
@@ -123,11 +123,11 @@ def run_into(
     ]
     with (
         held_interrupts() as interrupts,
-        replaced(folder, names, force=files.force, keep=lambda: bool(done)) as unfinished,
+        replace_files(folder, names, force=files.force, keep=lambda: bool(done)) as unfinished,
     ):
         kept = checkpoints_of(
             runs,
-            [inner(folder, CHECKPOINTS, *filter(None, [below])) for below in folders],
+            [inner_folder(folder, CHECKPOINTS, *filter(None, [below])) for below in folders],
             files.checkpoint_every,
             files.resume,
             files.force,

@@ -18,7 +18,7 @@ from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.vehicle import Vehicle
 from orchestrator.formats.tables import read_columns, read_rows, records
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.user_files import explained, names_in, path_of, text_of
+from orchestrator.machine.user_files import explain_errors, find_toml, names_in, read_text
 from orchestrator.master.experiment import Order
 from orchestrator.master.hooks.timing import InputTable
 from orchestrator.system.names import PortName, file_name, flattened, port_name
@@ -126,9 +126,9 @@ def read_scenario(name: str) -> Scenario:
         InputError: there is no such scenario, or its file has a mistake.
 
     """
-    path = path_of(name, FOLDER, "scenario", _OTHERS)
-    text = text_of(path, _WHAT)
-    with explained(path, _WHAT):
+    path = find_toml(name, FOLDER, "scenario", _OTHERS)
+    text = read_text(path, _WHAT)
+    with explain_errors(path, _WHAT):
         return _scenario(path, text)
 
 

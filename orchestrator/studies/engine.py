@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol
 
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.user_files import archive_of
+from orchestrator.machine.user_files import read_archive
 from orchestrator.master.experiment import ORDERS, Order
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, choose_loop
 from orchestrator.master.plan import code_of, planned
@@ -144,7 +144,7 @@ class FmuEngine:
 
         """
         archives = {
-            part.digest: archive_of(part.fmu, part.digest)
+            part.digest: read_archive(part.fmu, part.digest)
             for prepared in self._prepared.values()
             for part in prepared.system.components.values()
         }

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.user_files import names_in, text_of
+from orchestrator.machine.user_files import names_in, read_text
 from orchestrator.system.names import file_name
 
 #: What makes the runs; the first is the default.
@@ -134,5 +134,5 @@ def is_study(path: str) -> bool:
     if not path.endswith(".toml"):
         return False
     with suppress(InputError, ValueError, RecursionError):
-        return bool(_OWN & tomllib.loads(text_of(Path(path), WHAT)).keys())
+        return bool(_OWN & tomllib.loads(read_text(Path(path), WHAT)).keys())
     return False

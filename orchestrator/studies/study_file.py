@@ -18,7 +18,7 @@ from orchestrator.figures.study_figures import KINDS, FigureEntry
 from orchestrator.figures.study_values import SCENARIO, is_known
 from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
-from orchestrator.machine.user_files import explained, path_of, text_of
+from orchestrator.machine.user_files import explain_errors, find_toml, read_text
 from orchestrator.master.experiment import ORDERS
 from orchestrator.runs.loading import is_path
 from orchestrator.studies.study import (
@@ -202,9 +202,9 @@ def read_study(name: str) -> Study:
         InputError: there is no such study, or its file has a mistake.
 
     """
-    path = path_of(name, FOLDER, "study", "a .toml file")
-    text = text_of(path, WHAT)
-    with explained(path, WHAT):
+    path = find_toml(name, FOLDER, "study", "a .toml file")
+    text = read_text(path, WHAT)
+    with explain_errors(path, WHAT):
         return study_of(path.stem, tomllib.loads(text), path)
 
 

@@ -30,7 +30,7 @@ from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.blocks import Making, local
 from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
 from orchestrator.studies.space import Space
-from orchestrator.studies.store import Store, StudyResult, read_record, store
+from orchestrator.studies.store import Store, StudyResult, open_store, read_study_record
 from orchestrator.studies.study import BATCH, ENGINES, FMU, Study
 from orchestrator.studies.study_file import read_figures, read_study, study_of
 
@@ -119,10 +119,10 @@ def sweep(
     """
     plan = study_of(_NAMELESS, study) if isinstance(study, Mapping) else read_study(str(study))
     means = Means(engine, kind, loop, scheduler, workers, force)
-    return swept(plan, means, folder_of(plan, out), sys.argv, progress=progress)
+    return swept(plan, means, study_folder(plan, out), sys.argv, progress=progress)
 
 
-def folder_of(study: Study, out: str | Path | None) -> Path:
+def study_folder(study: Study, out: str | Path | None) -> Path:
     """Where a study goes."""
     return Path("results", study.stem) if out is None else Path(out)
 
@@ -158,7 +158,7 @@ def swept(
     )
     engine = _engine(means.engine or study.engine, space.prepared, means)
     record = _record(study, means, space, engine, [one for one, _ in systems.values()], command)
-    with store(folder, record, space.indices, means.force) as kept:
+    with open_store(folder, record, space.indices, means.force) as kept:
         kept.ledger.check(figure_files(plans))
         if not kept.is_done:
             if not len(kept) and (hint := faster(space, engine, means)):
@@ -166,7 +166,7 @@ def swept(
             name = study.name if progress else None
             _complete(kept, engine, space, means, name)
         result = StudyResult(folder)
-        kept.write_record({**read_record(folder), "failed": result.failed})
+        kept.write_record({**read_study_record(folder), "failed": result.failed})
         # All figures or, where one of them cannot be written, none.
         with kept.ledger.changing() as unfinished:
             legends = {name: scenario.legend for name, (scenario, _) in systems.items()}

@@ -20,7 +20,7 @@ from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.user_files import unpacked
+from orchestrator.machine.user_files import unpack
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.binary import check_place
 from orchestrator.master.loop import choose_loop
@@ -203,7 +203,7 @@ def test_a_temporary_folder_of_any_name_is_left_empty(dist: Path, tmp_path: Path
 
 
 def test_temporary_folder_that_would_crash_a_plain_fmu_is_refused(dist: Path, tmp_path: Path):
-    plain, system = unpacked(dist / "AuvPlant.fmu").folder, tmp_path / "a+b"
+    plain, system = unpack(dist / "AuvPlant.fmu").folder, tmp_path / "a+b"
     shutil.copytree(plain, system)
     check_place(system)
     for library in system.glob("binaries/*/*_pythonfmu.*"):

@@ -24,7 +24,7 @@ from fmpy.model_description import read_build_description
 
 from orchestrator.machine import cache
 from orchestrator.machine.children import compile_library, find_compiler
-from orchestrator.machine.disk import claimed
+from orchestrator.machine.disk import hold_lock
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.fmi.surroundings import put_back, within
 from orchestrator.system.component import Component
@@ -196,7 +196,7 @@ def make_binary(component: Component, folder: Path) -> None:
         return
     key = _key(component)
     try:
-        with claimed(cache.category_folder(_CATEGORY), wait=True):
+        with hold_lock(cache.category_folder(_CATEGORY), wait=True):
             kept = cache.read_cached(_CATEGORY, key)
             content = next(iter(kept.values())) if kept else _compiled(component, sources)
             if not kept:

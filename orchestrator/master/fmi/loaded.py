@@ -48,7 +48,7 @@ from orchestrator.master.fmi.transfer import (
     DoStepCallback,
     PortBlock,
     address_of,
-    text_of,
+    decode_text,
 )
 from orchestrator.system.component import Component
 from orchestrator.system.values import StringTable, Value
@@ -294,7 +294,7 @@ class LoadedInstance:
         value: Value | bytes | None
         (value,) = self._call(f"get{_fmi_type(variable)}", [variable.valueReference])
         if value is None or isinstance(value, bytes):
-            return text_of(value)
+            return decode_text(value)
         return bool(value) if variable.type == "Boolean" else value
 
     def _call(self, method: str, *arguments: Any, **named: Any) -> Any:

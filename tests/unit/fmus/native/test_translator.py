@@ -21,7 +21,7 @@ from fmus.discovery import components
 from fmus.native.program import strip_sphinx_marks
 from fmus.native.translator import tables, translated
 from fmus.ports.port import FAULT, H_MAX, Port
-from fmus.python.callbacks import explained
+from fmus.python.callbacks import describe_error
 from support.equations import (
     FLAGS,
     ROOT,
@@ -274,7 +274,7 @@ def raised(call: Any) -> tuple[str, list[str]]:
     try:
         return outcome(call())
     except Exception as error:
-        return explained(error)[: WHY - 1], []
+        return describe_error(error)[: WHY - 1], []
 
 
 @every

@@ -19,7 +19,7 @@ from orchestrator.master.simulation import simulate
 from orchestrator.runs.loading import loaded
 from orchestrator.studies.engine import FmuEngine
 from orchestrator.studies.space import Space
-from orchestrator.studies.store import StudyResult, store
+from orchestrator.studies.store import StudyResult, open_store
 from orchestrator.studies.study_file import study_of
 from orchestrator.system.names import PortName, port_name
 from orchestrator.vehicle import indices as table_of_indices
@@ -147,7 +147,7 @@ def test_a_new_index_is_one_entry(monkeypatch, tmp_path):
 
     study = {"scenario": "fig4", "stop_time": 1.0, "vary": {"plant.nu0.w": [1.0]}}
     space = Space(study_of("own", study), {"fig4": loaded("fig4", "native")})
-    with store(tmp_path, {"made_of": {}, "runs": 1}, space.indices) as kept:
+    with open_store(tmp_path, {"made_of": {}, "runs": 1}, space.indices) as kept:
         kept.add(list(FmuEngine(space.prepared).outcomes([space[0]])))
         kept.publish(space)
     made = StudyResult(tmp_path)
