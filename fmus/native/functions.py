@@ -30,7 +30,7 @@ from fmus.native.program import (
 )
 from fmus.ports.port import Refusal
 
-WIDTH = 98
+LINE_WIDTH = 98
 INDENT = "    "
 
 _STRINGS = re.compile(r'"(?:[^"\\]|\\.)*"')
@@ -50,7 +50,7 @@ def laid_out(text: str, indent: str) -> list[str]:
 
 
 def _lines(text: str, indent: str) -> list[str]:
-    if len(indent) + len(text) <= WIDTH:
+    if len(indent) + len(text) <= LINE_WIDTH:
         return [indent + text]
     start, end = _widest(text)
     # Inside of a short bracket there is nothing to gain.
@@ -70,7 +70,7 @@ def _lines(text: str, indent: str) -> list[str]:
 def _wrapped(text: str, indent: str) -> list[str]:
     """Lines that end after commas and before operators."""
     wrapper = textwrap.TextWrapper(
-        WIDTH,
+        LINE_WIDTH,
         initial_indent=indent,
         subsequent_indent=indent + INDENT,
         break_long_words=False,
@@ -326,7 +326,7 @@ def _alike(values: list[tuple[str, Code]]) -> Iterator[list[tuple[str, Code]]]:
 
 def _annotated(lines: list[str], comment: str, indent: str) -> list[str]:
     """Lines with a comment at the end, or before them."""
-    if len(lines) == 1 and len(lines[0]) + 1 + len(comment) <= WIDTH:
+    if len(lines) == 1 and len(lines[0]) + 1 + len(comment) <= LINE_WIDTH:
         return [f"{lines[0]} {comment}"]
     return [f"{indent}{comment}", *lines]
 

@@ -15,7 +15,7 @@ from orchestrator.machine.errors import Findings, InputError, reason
 from orchestrator.machine.user_files import unpack
 from orchestrator.master.fmi.binary import binary_of, check_binary
 from orchestrator.runs.loading import loaded
-from orchestrator.runs.preparation import SOME_TIME, prepare
+from orchestrator.runs.preparation import FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import impossible_paths
 from orchestrator.studies.study import is_study
@@ -96,7 +96,7 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
         request = Request()
         if scenario.stop_time is None and system.stop_time is None:
             to_know.append("names no stop time: a run wants --stop-time")
-            request = Request(stop_time=(system.start_time or 0.0) + SOME_TIME)
+            request = Request(stop_time=(system.start_time or 0.0) + FALLBACK_STOP_TIME)
         prepared = prepare(scenario, system, request)
         for text in impossible_paths(prepared.system):
             findings.problem(text)

@@ -25,12 +25,12 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, order_of
 from orchestrator.runs.folder import replace_files
 from orchestrator.runs.loading import left_behind, load
-from orchestrator.runs.preparation import DEFAULT_STEP, SOME_TIME, prepare
+from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Files, Request
 from orchestrator.system.structure import System
 
 #: Writers by the names of their formats.
-FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
+EXPORT_FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
     "ssp": write_ssp,
     "osp": write_osp,
     "container": write_container,
@@ -45,7 +45,7 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     add_system(parser)
     parser.add_argument(
         "--format",
-        choices=tuple(FORMATS),
+        choices=tuple(EXPORT_FORMATS),
         default="ssp",
         help="an SSP, libcosim's own folder, or one FMU (needs auv-fmu[hosts]); default: ssp",
     )
@@ -115,7 +115,7 @@ def _export(options: argparse.Namespace) -> int:
     ends = scenario.stop_time is not None or system.stop_time is not None
     request = Request(
         # What names no end is written without one.
-        stop_time=None if ends else (system.start_time or 0.0) + SOME_TIME,
+        stop_time=None if ends else (system.start_time or 0.0) + FALLBACK_STOP_TIME,
         step=options.step,
         parameters=assignments(options),
         strict=options.strict,
@@ -132,7 +132,7 @@ def _export(options: argparse.Namespace) -> int:
         say(f"warning: {left}")
     folder = options.out or Path("exports", prepared.scenario.stem)
     with replace_files(folder, force=options.force) as unfinished:
-        written = FORMATS[options.format](system, unfinished)
+        written = EXPORT_FORMATS[options.format](system, unfinished)
     for path in written:
         show(folder / path.relative_to(unfinished))
     return OK

@@ -20,9 +20,9 @@ from matplotlib.transforms import Transform
 from fmus.ports.quantities import TAU
 from orchestrator.figures.style import (
     COLOURS,
+    FIGURE_WIDTH,
     REFERENCE,
     STYLES,
-    WIDTH,
     Drawn,
     earth_axes,
     escape_math,
@@ -137,7 +137,7 @@ def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | Non
         return None, runs[0].lacks(panels[0].needs)
     heights = [max(panel.height for panel in row) for row in drawn]
     with styled():
-        figure = Figure(figsize=(WIDTH, sum(heights) + _HEADING * bool(title)))
+        figure = Figure(figsize=(FIGURE_WIDTH, sum(heights) + _HEADING * bool(title)))
         if title:
             figure.suptitle(heading(title), wrap=True)
         columns = lcm(*map(len, drawn))

@@ -15,8 +15,8 @@ from matplotlib.lines import Line2D
 from orchestrator.figures.panels import over_time
 from orchestrator.figures.style import (
     COLOURS,
+    FIGURE_WIDTH,
     STYLES,
-    WIDTH,
     Drawn,
     escape_math,
     printed_unit,
@@ -28,7 +28,7 @@ from orchestrator.master.observers.observer import matches, matching
 from orchestrator.master.observers.table import Table
 
 #: What is drawn where nothing is asked for, as far as it is there.
-DEFAULT = ("controller.e", "plant.tau", "controller.theta_hat")
+DEFAULT_PATTERNS = ("controller.e", "plant.tau", "controller.theta_hat")
 
 #: Height of a panel, of what stands above and below all of them, of a row of a legend [in].
 _PANEL, _MARGIN, _ROW = 1.9, 0.6, 0.2
@@ -51,7 +51,7 @@ class Plot(Figure):
 
 def wanted(columns: Sequence[str], patterns: Sequence[str]) -> list[str]:
     """The columns of a table that would be drawn."""
-    return [name for name in columns if any(matches(name, p) for p in patterns or DEFAULT)]
+    return [name for name in columns if any(matches(name, p) for p in patterns or DEFAULT_PATTERNS)]
 
 
 def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Figure:
@@ -70,7 +70,7 @@ def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Fig
         raise InputError(f"patterns are texts such as plant.y.*, not {list(patterns)!r}")
     names = list(dict.fromkeys(name for _, table in runs for name in table.columns))
     if not patterns:
-        patterns = [pattern for pattern in DEFAULT if wanted(names, [pattern])]
+        patterns = [pattern for pattern in DEFAULT_PATTERNS if wanted(names, [pattern])]
     if not patterns:
         groups = dict.fromkeys(map(group_of, names))
         raise InputError(f"name the columns to draw; there are {', '.join(groups)}")
@@ -81,7 +81,7 @@ def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Fig
         unit = "" if name.endswith("]") else printed_unit(units.get(name, ""))
         panels.setdefault((group_of(name), unit), []).append(name)
     with styled():
-        figure = Plot(figsize=(WIDTH, _MARGIN + _PANEL * len(panels)))
+        figure = Plot(figsize=(FIGURE_WIDTH, _MARGIN + _PANEL * len(panels)))
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         has_means = [
             _draw_panel(place, group, unit, members, runs)

@@ -30,7 +30,7 @@ from orchestrator.figures.panels import (
 )
 from orchestrator.figures.style import (
     COLOURS,
-    FORMATS,
+    FIGURE_FORMATS,
     Drawn,
     earth_axes,
     having,
@@ -221,7 +221,7 @@ def figure_files(kind: str, stem: str, loops: Sequence[Loop] = (STANDARD,)) -> l
         f"{stem}{vehicle}{suffix}.{ending}"
         for vehicle in suffixes(loops).values()
         for suffix in FIGURES[kind]
-        for ending in FORMATS
+        for ending in FIGURE_FORMATS
     ]
 
 
@@ -280,7 +280,7 @@ def _drawn(
         figure, left_out = compose(title, rows, runs)
         if figure is not None:
             try:
-                save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in FORMATS))
+                save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in FIGURE_FORMATS))
                 notes += left_out
             except InputError as error:
                 notes.append(f"{stem}{suffix} left out: {error}")

@@ -1,6 +1,6 @@
 """Figures of a study from its runs: a study file says which.
 
-A new one is a function and an entry of :data:`KINDS`.
+A new one is a function and an entry of :data:`FIGURE_KINDS`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,15 @@ from orchestrator.figures.study_values import (
     grouped,
     is_logarithmic,
 )
-from orchestrator.figures.style import COLOURS, FORMATS, STYLES, WIDTH, heading, save, styled
+from orchestrator.figures.style import (
+    COLOURS,
+    FIGURE_FORMATS,
+    FIGURE_WIDTH,
+    STYLES,
+    heading,
+    save,
+    styled,
+)
 from orchestrator.system.names import file_name
 
 #: Heights of a row of panels, of a panel by itself, and of a row of a matrix and what surrounds
@@ -92,7 +100,7 @@ def paneled(title: str, rows: int, columns: int, height: float, **how: Any) -> t
         The figure, and its axes in rows and columns.
 
     """
-    figure = Figure(figsize=(WIDTH, rows * height + _NAMES + _HEADING * bool(title)))
+    figure = Figure(figsize=(FIGURE_WIDTH, rows * height + _NAMES + _HEADING * bool(title)))
     if title:
         figure.suptitle(heading(title), wrap=True)
     return figure, figure.subplots(rows, columns, squeeze=False, **how)
@@ -300,7 +308,7 @@ def _correlation(x: np.ndarray, y: np.ndarray) -> float:
     return float(spearmanr(x[both], y[both]).statistic)
 
 
-class Kind(NamedTuple):
+class FigureKind(NamedTuple):
     """A kind of figure: what draws it, what it needs, and what it may have beside."""
 
     draw: Callable[[FigureEntry, str, Values], Figure]
@@ -309,17 +317,17 @@ class Kind(NamedTuple):
 
 
 #: The kinds of figures, by the names that study files have for them.
-KINDS: Mapping[str, Kind] = {
-    "bands": Kind(bands, ("x", "show"), ("by", "where", "limits")),
-    "maps": Kind(maps, ("x", "y", "show"), ("by", "where", "limits")),
-    "front": Kind(front, ("x", "y"), ("by", "where")),
-    "influence": Kind(influence, ("x", "show"), ("by", "where")),
+FIGURE_KINDS: Mapping[str, FigureKind] = {
+    "bands": FigureKind(bands, ("x", "show"), ("by", "where", "limits")),
+    "maps": FigureKind(maps, ("x", "y", "show"), ("by", "where", "limits")),
+    "front": FigureKind(front, ("x", "y"), ("by", "where")),
+    "influence": FigureKind(influence, ("x", "show"), ("by", "where")),
 }
 
 
 def figure_files(plans: Sequence[FigureEntry]) -> list[str]:
     """The files that :func:`draw_figures` may write."""
-    return [f"{file_name(plan.name)}.{ending}" for plan in plans for ending in FORMATS]
+    return [f"{file_name(plan.name)}.{ending}" for plan in plans for ending in FIGURE_FORMATS]
 
 
 def draw_figures(
@@ -353,5 +361,5 @@ def draw_figures(
             yield f"figure {plan.name} left out: by tells {parts} parts of the runs apart"
             continue
         with styled():
-            figure = KINDS[plan.kind].draw(plan, title, runs)
-        save(figure, *(folder / f"{file_name(plan.name)}.{ending}" for ending in FORMATS))
+            figure = FIGURE_KINDS[plan.kind].draw(plan, title, runs)
+        save(figure, *(folder / f"{file_name(plan.name)}.{ending}" for ending in FIGURE_FORMATS))

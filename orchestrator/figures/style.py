@@ -25,7 +25,7 @@ STYLES = ("-", "--", "-.", ":")
 REFERENCE = "#555555"
 
 #: Width of the page [in]: two columns of a journal, and a phone still shows its letters.
-WIDTH = 7.2
+FIGURE_WIDTH = 7.2
 
 SETTINGS: Any = {
     "axes.formatter.limits": (-3, 4),
@@ -64,7 +64,7 @@ _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SYMBOL = re.compile(rf"(?<![\w\\.])({'|'.join(_GREEK)}|[A-Za-z])_([A-Za-z0-9]+)(?!\w)")
 
 #: What figures are written as.
-FORMATS = ("png", "svg")
+FIGURE_FORMATS = ("png", "svg")
 
 #: What a file would say of its time and tool, by its ending.
 _NO_DATE: dict[str, Any] = {

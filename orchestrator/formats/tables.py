@@ -17,7 +17,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import explain_errors, open_lines
 
 #: Rows that are read at once, and that are written to Parquet at once.
-ROWS = 8192
+ROWS_AT_ONCE = 8192
 
 #: What separates the values of a row.
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
@@ -59,7 +59,7 @@ def read_rows(path: Path, strings: Collection[str] = ()) -> Iterator[np.ndarray]
         if path.suffix == ".parquet":
             with parquet().ParquetFile(path) as file:
                 names = [name for name in file.schema_arrow.names if name not in strings]
-                for batch in file.iter_batches(ROWS, columns=names):
+                for batch in file.iter_batches(ROWS_AT_ONCE, columns=names):
                     columns = [column.to_numpy(zero_copy_only=False) for column in batch.columns]
                     yield np.column_stack(columns).astype(float, copy=False)
             return
@@ -70,7 +70,7 @@ def read_rows(path: Path, strings: Collection[str] = ()) -> Iterator[np.ndarray]
             for first in filled:
                 rows = np.loadtxt(
                     chain([first], filled), delimiter=",", comments=None, quotechar='"', ndmin=2,
-                    max_rows=ROWS, converters=dict.fromkeys(texts, lambda _: 0.0) or None,
+                    max_rows=ROWS_AT_ONCE, converters=dict.fromkeys(texts, lambda _: 0.0) or None,
                 )  # fmt: skip
                 if rows.shape[1] != len(header):
                     raise ValueError(f"rows of {rows.shape[1]} values below {len(header)} names")

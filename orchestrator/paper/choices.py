@@ -84,7 +84,7 @@ _WAVES, _SIGN = Disturbance(), "(2): the minus of tau_w"
 _UNDER_WAY = TAU_D[0] / Vehicle().d11
 
 #: Name of the choice that runs with five degrees of freedom have one option of.
-VEHICLE = "vehicle"
+VEHICLE_CHOICE = "vehicle"
 
 #: Choices that a run depends on.
 OF_RUNS = (
@@ -126,7 +126,7 @@ OF_RUNS = (
         ),
     ),
     Choice(
-        VEHICLE,
+        VEHICLE_CHOICE,
         (
             Option("six degrees of freedom, 5 N·m rights the roll"),
             Option("six, nothing rights the roll", {"plant.righting.roll": 0.0}),
@@ -186,7 +186,7 @@ FIVE_DEGREES, AGAINST_FIVE = Option("five degrees of freedom", {"plant.roll": Fa
 #: What a run of five depends on, of what contradicts nothing else.
 OF_RUNS_OF_FIVE = tuple(
     choice._replace(options=(FIVE_DEGREES,))
-    if choice.name == VEHICLE
+    if choice.name == VEHICLE_CHOICE
     else choice._replace(options=tuple(each for each in choice.options if not each.against))
     for choice in OF_RUNS
 )

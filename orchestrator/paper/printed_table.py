@@ -18,11 +18,11 @@ from orchestrator.paper.choices import (
     PD,
     PROPOSED,
     PUBLISHED,
-    VEHICLE,
+    VEHICLE_CHOICE,
 )
 from orchestrator.paper.page import escape_markdown, numbers, table
 from orchestrator.paper.variants import (
-    FARTHEST,
+    FARTHEST_START,
     QUANTILES,
     SAME,
     SEARCHED,
@@ -34,7 +34,7 @@ from orchestrator.paper.variants import (
     all_variants,
 )
 from orchestrator.runs.folder import replace_files
-from orchestrator.runs.record import RECORDED, Stopwatch, write_content
+from orchestrator.runs.record import RECORDED_PACKAGES, Stopwatch, write_content
 from orchestrator.vehicle.indices import REACHED
 from orchestrator.vehicle.signals import ACTUATORS, AXES
 
@@ -158,7 +158,7 @@ def _starts(variants: Sequence[Variant]) -> str:
     still = [title for title in _TITLES if title not in told]
     text = (
         f"Each of these was made from {len(SHOWN)} more starts, moved by at most "
-        f"{1e6 * FARTHEST:g}e-6 m along each axis."
+        f"{1e6 * FARTHEST_START:g}e-6 m along each axis."
     )
     if told:
         low, _, high = (100 * quantile for quantile in QUANTILES)
@@ -246,7 +246,7 @@ def _options(found: Found) -> Iterator[list[str]]:
         for option, *scores in zip(choice.options, *best, strict=True):
             written = [f"{score:.2f}" if np.isfinite(score) else "" for score in scores]
             yield [*map(escape_markdown, (choice.name, option.text, *written, option.against))]
-        if choice.name == VEHICLE:
+        if choice.name == VEHICLE_CHOICE:
             score = f"{found.printed[-1].score:.2f}, of medians"
             row = (choice.name, FIVE_DEGREES.text, "", score, AGAINST_FIVE)
             yield [*map(escape_markdown, row)]
@@ -276,7 +276,7 @@ def write_table(folder: Path, command: Sequence[str], force: bool = False) -> tu
         (unfinished / _TEXT).write_text(text, encoding="utf-8")
         write_variants(unfinished / _VARIANTS, found)
         content = {"command": list(command), **clock.times()}
-        write_content(unfinished, content, (*RECORDED, "numba"))
+        write_content(unfinished, content, (*RECORDED_PACKAGES, "numba"))
     return folder / _TEXT, folder / _VARIANTS
 
 

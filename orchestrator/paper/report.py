@@ -29,7 +29,7 @@ from orchestrator.paper.sections import (
 from orchestrator.paper.variants import all_variants
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.folder import inner_folder, replace_files
-from orchestrator.runs.record import RECORDED, Stopwatch, write_content
+from orchestrator.runs.record import RECORDED_PACKAGES, Stopwatch, write_content
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.proof import gain_check
 
@@ -180,7 +180,7 @@ def _text(
     yield "## Readings"
     yield readings()
     yield "## Versions and commands"
-    versions = ", ".join(f"{package} {version(package)}" for package in RECORDED)
+    versions = ", ".join(f"{package} {version(package)}" for package in RECORDED_PACKAGES)
     yield f"Python {platform.python_version()}, {versions}. Written by `{shlex.join(command)}`."
     yield "Each of these commands makes a run of this report:"
     yield "```\n" + "\n".join(f"auv-fmu run {label}" for label in kept_runs.labels) + "\n```"

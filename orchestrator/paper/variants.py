@@ -36,7 +36,7 @@ from orchestrator.vehicle.indices import REACHED
 from orchestrator.vehicle.signals import AXES
 
 #: How far a start is moved along each axis, at most [m].
-FARTHEST = 1e-6
+FARTHEST_START = 1e-6
 
 #: Numbers of the starts that variants of five degrees of freedom are compared by, and of others
 #: from which every variant is made that is printed.
@@ -376,10 +376,10 @@ def quantiles_of(engine: BatchEngine, run: Point, starts: Sequence[int]) -> np.n
 
 
 def moved(engine: BatchEngine, run: Point, starts: Sequence[int]) -> Iterator[Point]:
-    """A run from starts that are moved by :data:`FARTHEST` at most, each by its number."""
+    """A run from starts that are moved by :data:`FARTHEST_START` at most, each by its number."""
     start = engine.setting(run).plant.eta0[: len(AXES)]
     for number in starts:
-        away = np.random.default_rng(number).uniform(-FARTHEST, FARTHEST, len(AXES))
+        away = np.random.default_rng(number).uniform(-FARTHEST_START, FARTHEST_START, len(AXES))
         values = zip(AXES, np.add(start, away).tolist(), strict=True)
         yield run._replace(
             parameters={**run.parameters, **{f"plant.eta0.{axis}": x for axis, x in values}}

@@ -45,7 +45,7 @@ _CATEGORY = "fmus"
 _TEMPLATES = Path(__file__).with_name("templates")
 
 #: What a script can stand on: plain PythonFMU, or the base that the bundle's components have.
-BASES = ("plain", "hardened")
+CONTROLLER_BASES = ("plain", "hardened")
 
 #: Names in the templates that give way to the user's own.
 _CLASS, _MODULE = "OwnController", "own_controller"
@@ -218,13 +218,15 @@ def _built(key: str, *options: str) -> Path:
     return write_cached(_CATEGORY, key, files)[0].parent
 
 
-def new_controller(name: str, folder: Path | None = None, base: str = BASES[0]) -> list[Path]:
+def new_controller(
+    name: str, folder: Path | None = None, base: str = CONTROLLER_BASES[0]
+) -> list[Path]:
     """Make a folder with a controller that runs in the closed loop.
 
     Args:
         name: of the controller, `MyLaw` or `my_law`.
         folder: made if it does not exist; None: one with the name, in the current folder.
-        base: one of :data:`BASES`.
+        base: one of :data:`CONTROLLER_BASES`.
 
     Returns:
         The script, the scenario, the README and the FMU.

@@ -35,7 +35,7 @@ CONTROLLER, PLANNER = STANDARD.controller, STANDARD.planner
 DEFAULT_STEP = STEP
 
 #: Stop time of a system that names none, where it is only checked or exported [s].
-SOME_TIME = 1.0
+FALLBACK_STOP_TIME = 1.0
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from orchestrator.machine.user_files import explain_errors, read_text
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.binary import runs_python
 from orchestrator.master.hooks.checkpoint import Checkpoints, check_gives_states, interval_in
-from orchestrator.master.observers.files import FORMATS
+from orchestrator.master.observers.files import TABLE_FORMATS
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.master.plan import PACKAGES, digest_of
 from orchestrator.runs.preparation import Prepared
@@ -37,17 +37,17 @@ from orchestrator.vehicle.signals import STANDARD, Loop
 METRICS = "metrics.json"
 
 #: The table of a run, in one format or the other, and all files that every run writes.
-TABLES = tuple(f"result.{ending}" for ending in FORMATS)
+TABLES = tuple(f"result.{ending}" for ending in TABLE_FORMATS)
 FILES = (*TABLES, METRICS, RECORD)
 
 #: The folder of checkpoints, within the folder of the result.
 CHECKPOINTS = "checkpoint"
 
 #: Packages whose versions a result depends on.
-RECORDED = (*PACKAGES, "matplotlib")
+RECORDED_PACKAGES = (*PACKAGES, "matplotlib")
 
 #: What a file is not that cannot be read.
-_WHAT = "not the record of a run"
+_NOT_A_RECORD = "not the record of a run"
 
 
 class Stopwatch:
@@ -132,7 +132,7 @@ def content_of(header: Header, ending: Ending, loops: Sequence[Loop]) -> dict[st
 
 
 def write_content(
-    folder: Path, content: Mapping[str, object], packages: Sequence[str] = RECORDED
+    folder: Path, content: Mapping[str, object], packages: Sequence[str] = RECORDED_PACKAGES
 ) -> None:
     """Write a record, with versions, the platform, and the names of all files beside it."""
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
@@ -240,8 +240,8 @@ def read_record(table: Path) -> dict[str, Any]:
     file = locate(table.with_name(RECORD))
     if not file.exists():
         return {}
-    with explain_errors(file, _WHAT):
-        record = json.loads(read_text(file, _WHAT))
+    with explain_errors(file, _NOT_A_RECORD):
+        record = json.loads(read_text(file, _NOT_A_RECORD))
         try:
             if table.name not in record["files"]:
                 return {}

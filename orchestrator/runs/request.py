@@ -16,7 +16,7 @@ from fmus.kinds import KINDS, PYTHON
 from orchestrator.master.experiment import COUPLINGS, ORDERS, Order, order_of, written_order
 from orchestrator.master.fmi.isolated import STEP_TIMEOUT
 from orchestrator.master.loop import LOOPS
-from orchestrator.master.observers.files import FORMATS
+from orchestrator.master.observers.files import TABLE_FORMATS
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.values import literal
 
@@ -204,7 +204,9 @@ class Files:
             metavar="outputs|all|PATTERN,...",
         ),
     ] = "all"
-    format: Annotated[str, CliOption("of the table; default: csv", choices=tuple(FORMATS))] = "csv"
+    format: Annotated[
+        str, CliOption("of the table; default: csv", choices=tuple(TABLE_FORMATS))
+    ] = "csv"
     no_figures: Annotated[bool, CliOption("draw none; default: draw", action="store_true")] = False
     checkpoint_every: Annotated[
         float | None,

@@ -17,7 +17,7 @@ from orchestrator.machine.errors import InputError, did_you_mean, reason
 from orchestrator.master.experiment import Order, written_order
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.loop import LOOPS
-from orchestrator.master.observers.files import FORMATS
+from orchestrator.master.observers.files import TABLE_FORMATS
 from orchestrator.master.observers.observer import Observer, Occurrence, Progress
 from orchestrator.master.observers.table import Table
 from orchestrator.runs.folder import lock_folder, replace_files
@@ -170,11 +170,11 @@ class Result(Table):
             ValueError: the folder cannot be written, or there is no such format.
 
         """
-        if format not in FORMATS:
-            raise InputError(f"format {format!r}: use one of {', '.join(FORMATS)}")
+        if format not in TABLE_FORMATS:
+            raise InputError(f"format {format!r}: use one of {', '.join(TABLE_FORMATS)}")
         folder = Path(folder)
         with replace_files(folder, FILES, force=force) as unfinished:
-            table = FORMATS[format](unfinished / f"result.{format}")
+            table = TABLE_FORMATS[format](unfinished / f"result.{format}")
             table.begin(self.header)
             table.take(self.rows)
             table.end(self.ending)

@@ -24,7 +24,7 @@ from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.hooks.timing import RealTime
-from orchestrator.master.observers.files import FORMATS
+from orchestrator.master.observers.files import TABLE_FORMATS
 from orchestrator.master.observers.observer import (
     Ending,
     Observer,
@@ -202,7 +202,7 @@ class _Running:
         # Without figures only the cautions look at what was seen.
         seen = watched if files.no_figures else Loop.drawn
         self.seen = VisibleRows({name for loop in loops for name in seen(loop)})
-        self._table = FORMATS[files.format](folder / f"result.{files.format}")
+        self._table = TABLE_FORMATS[files.format](folder / f"result.{files.format}")
         self.observers: list[Observer] = [
             Selection(self._table, files.interval, columns),
             *(

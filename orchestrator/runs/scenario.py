@@ -27,10 +27,10 @@ from orchestrator.system.values import finite, type_of, typed
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
 #: What a message calls a file that cannot be read.
-_WHAT = "not a scenario"
+_NOT_A_SCENARIO = "not a scenario"
 
 #: Scenarios that come with the bundle.
-FOLDER = Path(__file__).parent / "scenarios"
+SCENARIOS_FOLDER = Path(__file__).parent / "scenarios"
 
 #: What is run besides the scenarios that come with the bundle.
 _OTHERS = "a .toml, .ssp, .ssd or .fmu file, an OspSystemStructure.xml, or a folder with a .ssd"
@@ -116,7 +116,7 @@ class Scenario:
 
 def names() -> list[str]:
     """Scenarios that come with the bundle."""
-    return names_in(FOLDER)
+    return names_in(SCENARIOS_FOLDER)
 
 
 def read_scenario(name: str) -> Scenario:
@@ -126,9 +126,9 @@ def read_scenario(name: str) -> Scenario:
         InputError: there is no such scenario, or its file has a mistake.
 
     """
-    path = find_toml(name, FOLDER, "scenario", _OTHERS)
-    text = read_text(path, _WHAT)
-    with explain_errors(path, _WHAT):
+    path = find_toml(name, SCENARIOS_FOLDER, "scenario", _OTHERS)
+    text = read_text(path, _NOT_A_SCENARIO)
+    with explain_errors(path, _NOT_A_SCENARIO):
         return _scenario(path, text)
 
 

@@ -19,7 +19,7 @@ from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.engine import Point
 from orchestrator.studies.study import (
     LATIN_HYPERCUBE,
-    LOG,
+    LOG_SPACING,
     MOST_RUNS,
     SOBOL,
     STEP,
@@ -199,7 +199,7 @@ def between(limits: Range, share: float, whole: bool) -> float | int:
     low, high, spacing = limits
     if whole:
         low, high = min(low, high), max(low, high) + 1
-    value = low * (high / low) ** share if spacing == LOG else low + (high - low) * share
+    value = low * (high / low) ** share if spacing == LOG_SPACING else low + (high - low) * share
     return min(floor(value), int(high) - 1) if whole else value
 
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 #: The table of all runs, the record beside it, and what there is until all runs are done.
-TABLE, RECORD, _DATABASE = "runs.parquet", "study.json", "unfinished.sqlite"
+STUDY_TABLE, STUDY_RECORD, _DATABASE = "runs.parquet", "study.json", "unfinished.sqlite"
 
 #: Columns of the table before and after what varies and the indices.
 RUN, SCENARIO, FAILURE = "run", "scenario", "failure"
@@ -73,9 +73,9 @@ class Store:
         self.ledger, self._folder, self._indices = ledger, ledger.folder, indices
         self._path = self._folder / _DATABASE
         _check_same(ledger, record)
-        if not (self._folder / RECORD).exists():
+        if not (self._folder / STUDY_RECORD).exists():
             self.write_record(record)
-        self.is_done = (self._folder / TABLE).exists()
+        self.is_done = (self._folder / STUDY_TABLE).exists()
         if self.is_done:
             self._remove_database()
             return
@@ -120,7 +120,7 @@ class Store:
         with (
             explain_write_errors(self._folder),
             self.ledger.changing() as unfinished,
-            parquet.ParquetWriter(unfinished / TABLE, schema) as writer,
+            parquet.ParquetWriter(unfinished / STUDY_TABLE, schema) as writer,
         ):
             while block := list(islice(rows, _ROWS)):
                 writer.write_batch(_batch(arrow, schema, space, block))
@@ -130,11 +130,11 @@ class Store:
 
     def write_record(self, record: Mapping[str, Any]) -> None:
         """Write the record of the study, if it is another than before."""
-        path, text = self._folder / RECORD, _json(record) + "\n"
+        path, text = self._folder / STUDY_RECORD, _json(record) + "\n"
         if path.exists() and path.read_text(encoding="utf-8") == text:
             return
         with self.ledger.changing() as unfinished:
-            (unfinished / RECORD).write_text(text, encoding="utf-8")
+            (unfinished / STUDY_RECORD).write_text(text, encoding="utf-8")
 
     def _rows(self) -> Iterator[tuple[int, bytes, str | None]]:
         """All outcomes, by their numbers.
@@ -209,7 +209,7 @@ def open_store(
             except (InputError, sqlite3.Error):
                 if not force:
                     raise
-                for name in (RECORD, TABLE, *(f"{_DATABASE}{end}" for end in _ENDS)):
+                for name in (STUDY_RECORD, STUDY_TABLE, *(f"{_DATABASE}{end}" for end in _ENDS)):
                     if os.path.lexists(folder / name):
                         move_aside(folder / name)
                 found = Store(ledger, record, indices)
@@ -240,7 +240,7 @@ def read_study_record(folder: Path) -> dict[str, Any]:
         InputError: there is none.
 
     """
-    path = folder / RECORD
+    path = folder / STUDY_RECORD
     try:
         return dict(json.loads(locate(path).read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError, RecursionError) as error:
@@ -249,12 +249,12 @@ def read_study_record(folder: Path) -> dict[str, Any]:
 
 def _check_same(ledger: Ledger, record: Mapping[str, Any]) -> None:
     folder = ledger.folder
-    ledger.check((RECORD, TABLE))
+    ledger.check((STUDY_RECORD, STUDY_TABLE))
     if not _is_ours(folder / _DATABASE, ledger.identity):
         ledger.check(f"{_DATABASE}{end}" for end in _ENDS)
-    if not (folder / RECORD).exists():
-        if (folder / TABLE).exists() or (folder / _DATABASE).exists():
-            raise InputError(f"{folder}: has runs, but no {RECORD}; choose another folder")
+    if not (folder / STUDY_RECORD).exists():
+        if (folder / STUDY_TABLE).exists() or (folder / _DATABASE).exists():
+            raise InputError(f"{folder}: has runs, but no {STUDY_RECORD}; choose another folder")
         return
     before = dict(read_study_record(folder)["made_of"])
     # As it is read again: JSON knows no tuples.
@@ -321,7 +321,7 @@ class StudyResult(Mapping[str, np.ndarray]):
 
         """
         self.folder = folder
-        for path in (folder / TABLE, folder / RECORD):
+        for path in (folder / STUDY_TABLE, folder / STUDY_RECORD):
             if not locate(path).is_file():
                 raise InputError(f"{folder}: holds no study that is done: no {path.name}")
             if is_changed(path):
@@ -329,7 +329,7 @@ class StudyResult(Mapping[str, np.ndarray]):
 
     @cached_property
     def _table(self) -> Any:
-        path = self.folder / TABLE
+        path = self.folder / STUDY_TABLE
         try:
             table = import_module("pyarrow.parquet").read_table(locate(path))
         except (OSError, ValueError) as error:

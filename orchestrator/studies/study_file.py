@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
-from orchestrator.figures.study_figures import KINDS, FigureEntry
+from orchestrator.figures.study_figures import FIGURE_KINDS, FigureEntry
 from orchestrator.figures.study_values import SCENARIO, is_known
 from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
@@ -23,14 +23,14 @@ from orchestrator.master.experiment import ORDERS
 from orchestrator.runs.loading import is_path
 from orchestrator.studies.study import (
     ENGINES,
-    FOLDER,
-    LINEAR,
-    LOG,
+    LINEAR_SPACING,
+    LOG_SPACING,
     METHODS,
     MOST_RUNS,
+    NOT_A_STUDY,
     SPACINGS,
     STEP,
-    WHAT,
+    STUDIES_FOLDER,
     Range,
     Sample,
     StopTime,
@@ -112,8 +112,8 @@ class StopTimeTable(TomlTable):
 class FigureTable(TomlTable):
     """A figure: `[figures.NAME]`."""
 
-    kind: Annotated[str, OneOf(tuple(KINDS))] = needed(
-        "What it is.", " or ".join(f'"{kind}"' for kind in KINDS)
+    kind: Annotated[str, OneOf(tuple(FIGURE_KINDS))] = needed(
+        "What it is.", " or ".join(f'"{kind}"' for kind in FIGURE_KINDS)
     )
     x: Names = entry(
         "Value along the horizontal axis; of `bands` also several, a column of panels each; of "
@@ -130,7 +130,7 @@ class FigureTable(TomlTable):
 
     @model_validator(mode="after")
     def _has_what_its_kind_has(self) -> Self:
-        _, needs, may = KINDS[self.kind]
+        _, needs, may = FIGURE_KINDS[self.kind]
         if missing := [key for key in needs if not getattr(self, key)]:
             raise ValueError(f"lacks {' and '.join(missing)}")
         if more := self.model_fields_set - {"kind", *needs, *may}:
@@ -202,9 +202,9 @@ def read_study(name: str) -> Study:
         InputError: there is no such study, or its file has a mistake.
 
     """
-    path = find_toml(name, FOLDER, "study", "a .toml file")
-    text = read_text(path, WHAT)
-    with explain_errors(path, WHAT):
+    path = find_toml(name, STUDIES_FOLDER, "study", "a .toml file")
+    text = read_text(path, NOT_A_STUDY)
+    with explain_errors(path, NOT_A_STUDY):
         return study_of(path.stem, tomllib.loads(text), path)
 
 
@@ -258,7 +258,7 @@ def _values(where: str, value: Any) -> tuple[Any, ...]:
         raise InputError(f"{where}: write [values], or {{ from = 1.0, to = 10.0, n = 7 }}")
     GridTable.check(where, value)
     low, high, spacing = _range(where, value)
-    between = np.geomspace if spacing == LOG else np.linspace
+    between = np.geomspace if spacing == LOG_SPACING else np.linspace
     return tuple(between(low, high, value["n"]).tolist())
 
 
@@ -266,11 +266,11 @@ def _range(where: str, value: Any) -> Range:
     if isinstance(value, list) and len(value) == 2 and all(map(is_finite, value)):
         found = Range(*value)
     elif _is_range(value):
-        found = Range(value["from"], value["to"], value.get("spacing", LINEAR))
+        found = Range(value["from"], value["to"], value.get("spacing", LINEAR_SPACING))
     else:
         raise InputError(f"{where}: write [low, high], or {{ from = 1.0, to = 10.0 }}")
-    if found.spacing == LOG and not (found.low > 0.0 and found.high > 0.0):
-        raise InputError(f"{where}: spacing = {LOG!r} needs two positive ends")
+    if found.spacing == LOG_SPACING and not (found.low > 0.0 and found.high > 0.0):
+        raise InputError(f"{where}: spacing = {LOG_SPACING!r} needs two positive ends")
     return found
 
 
