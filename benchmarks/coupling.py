@@ -20,8 +20,8 @@ import numpy as np
 from orchestrator.master.experiment import COUPLINGS, Experiment
 from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan
 from orchestrator.master.stepper import compile_stepper
 from orchestrator.system.structure import System
 
@@ -43,7 +43,7 @@ def _time(system: System, step: float, coupling: str) -> float:
     def run(n: int) -> float:
         experiment = Experiment(n * step, step, coupling=coupling)
         begin = perf_counter()
-        simulate(planned(system, experiment), loop=choose_loop("compiled", experiment))
+        simulate_plan(make_plan(system, experiment), loop=choose_loop("compiled", experiment))
         return perf_counter() - begin
 
     return 1e6 * (run(_STEPS) - run(1)) / (_STEPS - 1)
@@ -89,7 +89,7 @@ def main() -> None:
                 errors = []
                 for h in steps:
                     table = Table()
-                    simulate(planned(system, Experiment(5.0, h, coupling=coupling)), [table])
+                    simulate_plan(make_plan(system, Experiment(5.0, h, coupling=coupling)), [table])
                     right = np.sin(table.time) / (1.0 - gain)
                     errors.append(float(np.abs(table["a.y1"] - right).max()))
                 stable = max(errors) < 1.0

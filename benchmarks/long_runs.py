@@ -29,8 +29,8 @@ from orchestrator.master.hooks.hook import NEVER, Hook, Run
 from orchestrator.master.loop import LOOPS, choose_loop
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.observer import Observer, Selection
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.proof import CertificatesFile
 
@@ -98,8 +98,8 @@ def main() -> None:
             checkpoints = Checkpoints(folder / "checkpoint", {}, options.checkpoint_every, False)
             observers.append(checkpoints)
             hooks.insert(0, checkpoints)
-        simulate(
-            planned(load("fig4", options.kind), experiment),
+        simulate_plan(
+            make_plan(load("fig4", options.kind), experiment),
             observers,
             None,
             choose_loop(options.loop, experiment),

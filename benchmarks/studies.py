@@ -24,7 +24,7 @@ from unittest.mock import patch
 
 from measuring import python
 
-from orchestrator.runs.loading import loaded
+from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
 from orchestrator.studies import blocks as blocks_module
@@ -91,7 +91,7 @@ def cost(engine: Engine, runs: Iterable[Point], workers: int) -> Cost:
 
 def prepared(kind: str) -> Prepared:
     """The scenario with FMUs of a kind."""
-    return prepare(*loaded(SCENARIO, kind), Request(kind=kind))
+    return prepare(*load_scenario(SCENARIO, kind), Request(kind=kind))
 
 
 def starts(n: int, stop_time: float) -> Space:
@@ -99,7 +99,7 @@ def starts(n: int, stop_time: float) -> Space:
     ranges = {"plant.eta0.y": [-10.0, 10.0], "plant.eta0.z": [-10.0, 10.0]}
     sample = {"method": "random", "n": n, "seed": 1, "range": ranges}
     study = study_of("starts", {"scenario": SCENARIO, "stop_time": stop_time, "sample": sample})
-    return Space(study, {SCENARIO: loaded(SCENARIO)})
+    return Space(study, {SCENARIO: load_scenario(SCENARIO)})
 
 
 def keeping(n: int) -> tuple[float, float, float]:
@@ -146,7 +146,7 @@ def main() -> None:
     engines: dict[str, Callable[[], Engine]] = {
         "FMUs in Python": lambda: FmuEngine({SCENARIO: prepared("python")}),
         "FMUs in C": lambda: FmuEngine({SCENARIO: prepared("native")}),
-        "equations": lambda: BatchEngine({SCENARIO: loaded(SCENARIO)[1]}),
+        "equations": lambda: BatchEngine({SCENARIO: load_scenario(SCENARIO)[1]}),
     }
     costs = {}
     for name, make in engines.items():

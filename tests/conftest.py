@@ -109,7 +109,7 @@ def _built(shared: Path, kind: str, fmi: str = FMI_VERSIONS[0]) -> Path:
         if not folder.exists():
             fmus = bundle.current_fmus(kind, fmi)
             patch.setattr(bundle, "run_fmus", partial(_copy, fmus))
-            bundle.build(folder, kind=kind, fmi=fmi)
+            bundle.build_bundle(folder, kind=kind, fmi=fmi)
     return folder
 
 

@@ -81,7 +81,7 @@ def structure(items: list[Shape], name: str | None = None) -> Structure:
     return Structure(name or joined, tuple((f".m{i}", item) for i, item in enumerate(items)))
 
 
-def numbers(shape: Shape) -> int:
+def count_numbers(shape: Shape) -> int:
     """How many numbers a shape holds.
 
     Raises:
@@ -89,17 +89,17 @@ def numbers(shape: Shape) -> int:
 
     """
     if isinstance(shape, Structure):
-        return sum(numbers(part) for _, part in shape.parts)
+        return sum(count_numbers(part) for _, part in shape.parts)
     if shape != DOUBLE:
         raise TypeError(f"{shape.name} among numbers")
     return 1
 
 
-def inner(shape: Shape) -> Iterator[Structure]:
+def inner_structures(shape: Shape) -> Iterator[Structure]:
     """The structures that a structure needs, and itself after them."""
     if isinstance(shape, Structure):
         for _, part in shape.parts:
-            yield from inner(part)
+            yield from inner_structures(part)
         yield shape
 
 
@@ -174,7 +174,7 @@ class Program:
 
     def defined(self, shape: Shape) -> Shape:
         """The shape, whose structures are defined."""
-        for part in inner(shape):
+        for part in inner_structures(shape):
             text = declaration(part)
             if self.structures.setdefault(part.name, text) != text:
                 raise Untranslatable(f"two structures have the name {part.name}")

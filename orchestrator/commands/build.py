@@ -84,7 +84,7 @@ def _build(options: argparse.Namespace) -> int:
         show(build_own(options.script, options.out, options.loader, force=options.force))
         return OK
     folder = options.out or DEFAULT_FOLDERS[options.kind]
-    written = bundle.build(
+    written = bundle.build_bundle(
         folder,
         options.loader,
         kind=options.kind,

@@ -14,7 +14,7 @@ from orchestrator.commands.streams import BAD_INPUT, OK, show
 from orchestrator.machine.errors import Findings, InputError, reason
 from orchestrator.machine.user_files import unpack
 from orchestrator.master.fmi.binary import binary_of, check_binary
-from orchestrator.runs.loading import loaded
+from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import impossible_paths
@@ -89,7 +89,7 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
     """Look at a system as a whole, then at its components; returns what is to be known of it."""
     to_know: list[str] = []
     with findings.collecting():
-        scenario, system = loaded(options.file, variant=options.variant, findings=findings)
+        scenario, system = load_scenario(options.file, variant=options.variant, findings=findings)
         for name, component in system.components.items():
             known = (*_binary(component, findings), *surprises(component))
             to_know += [f"{name}: {text}" for text in known]

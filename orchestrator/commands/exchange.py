@@ -14,7 +14,7 @@ from orchestrator.commands.options import (
     add_set,
     add_system,
     assignments,
-    read,
+    read_system,
 )
 from orchestrator.commands.streams import FAILED, OK, say, show
 from orchestrator.exchange.hosts import HOSTS, compare
@@ -22,7 +22,7 @@ from orchestrator.exchange.verify import verify
 from orchestrator.formats.osp_and_container import write_container, write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS, order_of
+from orchestrator.master.experiment import ORDERS, read_order
 from orchestrator.runs.folder import replace_files
 from orchestrator.runs.loading import left_behind, load
 from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prepare
@@ -82,7 +82,7 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--order",
-        type=order_of,
+        type=read_order,
         metavar=f"{'|'.join(ORDERS)}|NAME,...",
         help="in which the tool steps the components, or the names of all of them; default: "
         f"{' and '.join(ORDERS)}, the one that fits",
@@ -111,7 +111,7 @@ def _add_scenario(parser: argparse.ArgumentParser) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    scenario, system = read(options, options.fmi)
+    scenario, system = read_system(options, options.fmi)
     ends = scenario.stop_time is not None or system.stop_time is not None
     request = Request(
         # What names no end is written without one.

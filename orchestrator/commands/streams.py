@@ -20,7 +20,7 @@ class Unheard(Exception):
     """Standard output cannot be written, which has been said."""
 
 
-def fill() -> None:
+def fill_streams() -> None:
     """Put the null device where a standard stream is closed.
 
     The next file that is opened would take its place, and get what is printed.

@@ -15,7 +15,7 @@ from orchestrator.machine.children import COMPILERS, LIMIT_OF_ZIG, machines_comp
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.binary import binary_of
-from orchestrator.master.plan import gathered, stages
+from orchestrator.master.plan import gathered_connections, stages
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
@@ -36,7 +36,7 @@ def _library_of(component: Component) -> Path:
     return binary_of(component, component.folder)
 
 
-def compiled(
+def compile_host(
     folder: Path,
     system: System,
     experiment: Experiment,
@@ -108,7 +108,7 @@ def _plan(system: System, experiment: Experiment, library: LibraryOf) -> str:
             parameters.append(_setting(f"&fmus[{number}]", component.variable(parameter), value))
     copies: list[Connection] = []
     found, first = [], 0
-    takings = [system.connections, *gathered(system, parts)]
+    takings = [system.connections, *gathered_connections(system, parts)]
     for names, taken in zip([[], *parts], takings, strict=True):
         at = len(copies)
         copies += taken
@@ -161,7 +161,7 @@ def _setting(fmu: str, variable: ScalarVariable, value: Value) -> str:
             return f'set_integer({fmu}, "{name}", {variable.valueReference}, {int(value)});'
 
 
-def run(
+def run_host(
     command: Sequence[str | Path], folder: Path, steps: int, names: Sequence[str]
 ) -> tuple[np.ndarray, float]:
     """Run the host.

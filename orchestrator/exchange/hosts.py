@@ -31,8 +31,8 @@ from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import completed
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_to_end
 from orchestrator.system.structure import System
 
 #: How long a host may take for a run before it is given up [s].
@@ -199,8 +199,8 @@ def _container(system: System, folder: Path, steps: int, step: float) -> Ran:
 
 
 def _c_program(system: System, folder: Path, steps: int, step: float) -> Ran:
-    program = c_host.compiled(folder, system, Experiment(steps * step, step, "jacobi"))
-    rows, seconds = c_host.run([program], folder, steps, _names(system))
+    program = c_host.compile_host(folder, system, Experiment(steps * step, step, "jacobi"))
+    rows, seconds = c_host.run_host([program], folder, steps, _names(system))
     return Ran(rows[1:], seconds)
 
 
@@ -233,7 +233,9 @@ def compare(system: System, hosts: Sequence[str], steps: int, step: float) -> li
     """
     expected = Table()
     start = system.start_time or 0.0
-    completed(planned(system, Experiment(start + steps * step, step, "jacobi", start)), [expected])
+    simulate_to_end(
+        make_plan(system, Experiment(start + steps * step, step, "jacobi", start)), [expected]
+    )
     names = _names(system)
     table = expected.group(*names)[1:]
     return [_verdict(system, host, steps, step, names, table) for host in hosts]

@@ -26,9 +26,9 @@ from orchestrator.figures.style import (
     Drawn,
     earth_axes,
     escape_math,
-    having,
     heading,
     printed_unit,
+    runs_with,
     styled,
 )
 from orchestrator.figures.visible import draw_signal, mean_window
@@ -165,11 +165,11 @@ def _path(cell: Cell, runs: Sequence[Drawn]) -> None:
     """Paths of control points and their reference in three dimensions."""
     axes = cell.axes(projection="3d")
     paths = []
-    for run, _ in list(having(runs, Loop.for_reference))[:1]:
+    for run, _ in list(runs_with(runs, Loop.for_reference))[:1]:
         paths.append(run.result.group(*run.loop.y_d))
         axes.plot(*paths[0].T, color=REFERENCE, linestyle="--", linewidth=1, label="reference")
         axes.scatter(*paths[0][0], color=REFERENCE, marker="s", s=20, label="its start")
-    shown = list(having(runs, Loop.for_control_point))
+    shown = list(runs_with(runs, Loop.for_control_point))
     for i, (run, colour) in enumerate(shown):
         y = true_control_point(run.result, run.loop)
         paths.append(y)
@@ -234,7 +234,7 @@ def draw_lines(
 
 def draw_all_errors(axes: Axes, runs: Sequence[Drawn]) -> None:
     """The three tracking errors of some runs in one panel."""
-    for i, (run, _) in enumerate(having(runs, Loop.for_tracking)):
+    for i, (run, _) in enumerate(runs_with(runs, Loop.for_tracking)):
         errors, twin = tracking_error(run.result, run.loop), run.label if i else None
         draw_lines(axes, run.result.time, errors, [f"$e_{k}$" for k in AXES], twin)
     axes.set_ylabel("error [m]")
@@ -297,7 +297,7 @@ def _make_room_below(axes: Axes) -> None:
 def _errors(cell: Cell, runs: Sequence[Drawn], logarithmic: bool = False) -> None:
     """Tracking errors of some runs, an axis a panel."""
     panels = cell.stack(3)
-    for i, (run, colour) in enumerate(having(runs, Loop.for_tracking)):
+    for i, (run, colour) in enumerate(runs_with(runs, Loop.for_tracking)):
         errors = tracking_error(run.result, run.loop)
         for axes, error in zip(panels, (np.abs(errors) if logarithmic else errors).T, strict=True):
             axes.plot(run.result.time, error, **_line(i, run, colour))
@@ -321,8 +321,8 @@ def draw_commands(
     panels: Sequence[Axes], runs: Sequence[Drawn], name: str = "commanded control signals"
 ) -> None:
     """Commands of some runs and the limits of (3), an actuator a panel."""
-    shown = list(having(runs, Loop.for_commands))
-    limited = [run for run, _ in having(runs, Loop.for_limits)]
+    shown = list(runs_with(runs, Loop.for_commands))
+    limited = [run for run, _ in runs_with(runs, Loop.for_limits)]
     has_means = False
     for k, axes, unit in zip(range(3), panels, map(printed_unit, TAU.values()), strict=True):
         for i, (run, colour) in enumerate(shown):

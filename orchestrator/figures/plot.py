@@ -49,7 +49,7 @@ class Plot(Figure):
         return image.getvalue()
 
 
-def wanted(columns: Sequence[str], patterns: Sequence[str]) -> list[str]:
+def wanted_columns(columns: Sequence[str], patterns: Sequence[str]) -> list[str]:
     """The columns of a table that would be drawn."""
     return [name for name in columns if any(matches(name, p) for p in patterns or DEFAULT_PATTERNS)]
 
@@ -70,7 +70,7 @@ def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Fig
         raise InputError(f"patterns are texts such as plant.y.*, not {list(patterns)!r}")
     names = list(dict.fromkeys(name for _, table in runs for name in table.columns))
     if not patterns:
-        patterns = [pattern for pattern in DEFAULT_PATTERNS if wanted(names, [pattern])]
+        patterns = [pattern for pattern in DEFAULT_PATTERNS if wanted_columns(names, [pattern])]
     if not patterns:
         groups = dict.fromkeys(map(group_of, names))
         raise InputError(f"name the columns to draw; there are {', '.join(groups)}")

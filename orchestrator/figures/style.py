@@ -107,7 +107,7 @@ def earth_axes(z_up: bool) -> tuple[str, str, str]:
     return "x north [m]", "y east [m]", "z down [m]"
 
 
-def having(runs: Sequence[Drawn], needs: Callable[[Loop], Needs]) -> Iterator[tuple[Drawn, str]]:
+def runs_with(runs: Sequence[Drawn], needs: Callable[[Loop], Needs]) -> Iterator[tuple[Drawn, str]]:
     """The runs that have what is needed, each with its own colour whichever others have."""
     for run, colour in zip(runs, cycle(COLOURS), strict=False):
         if not run.lacks(needs):

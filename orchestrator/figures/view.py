@@ -118,7 +118,7 @@ class _Lines(NamedTuple):
     limits: Sequence[float] = ()
 
 
-def page(title: str, run: Drawn) -> str:
+def view_page(title: str, run: Drawn) -> str:
     """A page of a run that needs no other file.
 
     Args:

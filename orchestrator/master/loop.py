@@ -20,7 +20,7 @@ from orchestrator.master.experiment import ROUNDING, Experiment
 from orchestrator.master.fmi.instance import Ended
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.hook import Run
-from orchestrator.master.schedule import Stage, step
+from orchestrator.master.schedule import Stage, step_members
 from orchestrator.master.stepper import compile_stepper, load_stepper, step_compiled
 
 #: Loops that can be asked for; the first is the default.
@@ -67,10 +67,10 @@ def step_interpreted(run: Run) -> Iterator[None]:
                     values[gather.targets] = values[gather.sources]
                 else:
                     gather(values)
-                step(members, t, h)
+                step_members(members, t, h)
             elif decimation.is_due(k - 1, steps):
                 gather(values)
-                step(members, t, experiment.length(k - 1, decimation.every))
+                step_members(members, t, experiment.length(k - 1, decimation.every))
         if is_not_finite():
             return
         append(end, shown)
@@ -178,7 +178,9 @@ def _finished(run: Run, end: Ended) -> Iterator[None]:
             for name in filter(None, (one.instance.name for one in stage.members)):
                 takes = is_whole or run.system.components[name].takes_any_step
                 reached[name] = cut.time(min(n - 1 + every, cut.rows - 1)) if takes else t
-            step([one for one in stage.members if reached.get(one.instance.name, after) > t], t, h)
+            step_members(
+                [one for one in stage.members if reached.get(one.instance.name, after) > t], t, h
+            )
         if not np.isfinite(run.row.shown).all():
             return
         run.blocks.append(after, run.row.shown)
@@ -212,10 +214,10 @@ def _stepped_on(stage: Stage, end: Ended, t: float, h: float) -> Ended:
     for i, member in enumerate(stage.members):
         idle = member._replace(set_inputs=[], do_step=_nothing)
         try:
-            step([idle if i < begun else member], t, h)
+            step_members([idle if i < begun else member], t, h)
         except Ended as other:
             end = min(end, other, key=lambda one: one.time)
-            step([idle], t, h)
+            step_members([idle], t, h)
     return end
 
 

@@ -232,7 +232,7 @@ OF_READING = (
 )
 
 
-def options_of(choice: Choice, scenario: str) -> tuple[Option, ...]:
+def choice_options(choice: Choice, scenario: str) -> tuple[Option, ...]:
     """The options of a choice in a scenario: one where it has none."""
     if choice.of_proposed and scenario != PROPOSED:
         return (choice.options[choice.ours],)
@@ -241,7 +241,7 @@ def options_of(choice: Choice, scenario: str) -> tuple[Option, ...]:
 
 def runs(scenario: str, of_runs: Sequence[Choice] = OF_RUNS) -> Iterator[Point]:
     """A run for each combination, in the order of the choices; the last varies fastest."""
-    combinations = product(*(options_of(choice, scenario) for choice in of_runs))
+    combinations = product(*(choice_options(choice, scenario) for choice in of_runs))
     for number, combination in enumerate(combinations):
         yield run_of(scenario, combination, number)
 
@@ -257,7 +257,7 @@ def run_of(scenario: str, combination: Sequence[Option], number: int = 0) -> Poi
 
 def contradicts_nothing(scenario: str, choices: Sequence[Choice]) -> np.ndarray:
     """Whether a combination of options contradicts nothing that is printed, an axis a choice."""
-    flags = [[not option.against for option in options_of(each, scenario)] for each in choices]
+    flags = [[not option.against for option in choice_options(each, scenario)] for each in choices]
     found: np.ndarray = reduce(np.logical_and, np.meshgrid(*flags, indexing="ij", sparse=True))
     return found
 

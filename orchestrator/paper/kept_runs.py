@@ -19,7 +19,7 @@ from orchestrator.machine.workers import Workers
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import code_of, digest_of
 from orchestrator.runs.folder import open_ledger
-from orchestrator.runs.preparation import Prepared, prepared_of
+from orchestrator.runs.preparation import Prepared, prepare_request
 from orchestrator.runs.record import content_of, ending_in, header_in, loops_in
 from orchestrator.runs.request import Request
 from orchestrator.vehicle.indices import Metrics
@@ -101,7 +101,7 @@ class KeptRuns:
         for run in dict.fromkeys(runs):
             wanted = replace(run, stop_time=self._stop_time or run.stop_time, kind=self._kind)
             try:
-                prepared = prepared_of(wanted)
+                prepared = prepare_request(wanted)
             except InputError as error:
                 self._keys[run] = self._labels[run.command_line] = key = run.command_line
                 self._kept_runs[key] = KeptRun({"failure": str(error)}, Table())
@@ -144,7 +144,7 @@ def key_of(prepared: Prepared) -> str:
 def _make(run: Request, key: str) -> KeptRun:
     """Make a run; a task for a worker."""
     try:
-        prepared = prepared_of(run)
+        prepared = prepare_request(run)
         if key_of(prepared) != key:
             raise InputError("FMUs have changed while the report was made; make it anew")
         metrics = Metrics(prepared.loops)

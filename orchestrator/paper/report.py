@@ -22,9 +22,9 @@ from orchestrator.paper.sections import (
     Section,
     draw_section,
     make_studies,
+    section_text,
     sections,
     study_sections,
-    written,
 )
 from orchestrator.paper.variants import all_variants
 from orchestrator.runs.bundle import current_fmus
@@ -165,7 +165,7 @@ def _text(
     yield held
     yield "## Figures"
     for section in chapters:
-        yield from written(section, kept_runs, notes[section.name], folder)
+        yield from section_text(section, kept_runs, notes[section.name], folder)
     yield "## Effects that the paper does not show"
     for effect in EFFECTS:
         yield f"### {effect.title}"

@@ -20,12 +20,12 @@ from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.paper.kept_runs import KeptRun, KeptRuns
 from orchestrator.paper.page import escape_markdown, picture, table, values_with_units
 from orchestrator.runs.folder import inner_folder
-from orchestrator.runs.preparation import Prepared, prepared_of, with_companion
+from orchestrator.runs.preparation import Prepared, prepare_request, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario, read_scenario
 from orchestrator.studies.study import Study, ready_studies
 from orchestrator.studies.study_file import read_study
-from orchestrator.studies.sweep import Means, swept
+from orchestrator.studies.sweep import Means, complete_study
 from orchestrator.system.names import file_name, port_name
 from orchestrator.vehicle.indices import metrics, of_vehicles
 
@@ -86,7 +86,7 @@ def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Request]:
     """The run of a scenario and what it is drawn with: its companion, or its twin without noise."""
     request = Request(reference, kind=kind)
     try:
-        prepared = prepared_of(request)
+        prepared = prepare_request(request)
     except InputError:
         # The report says why it cannot be made.
         return {scenario.legend: request}
@@ -112,7 +112,7 @@ def as_request(prepared: Prepared, compared: Prepared, request: Request) -> Requ
 
     """
     standard = Request(compared.scenario.compare, kind=request.kind)
-    own = prepared_of(standard)
+    own = prepare_request(standard)
     experiment, table = prepared.experiment, prepared.input_table
     played = table.targets if table else ()
     inputs = prepared.scenario.inputs
@@ -163,7 +163,7 @@ def draw_section(section: Section, kept_runs: Sequence[KeptRun], folder: Path) -
     return draw(kind, "", runs, folder, section.name)
 
 
-def written(
+def section_text(
     section: Section, kept_runs: KeptRuns, notes: Sequence[str], folder: Path
 ) -> Iterator[str]:
     """A section in Markdown.
@@ -254,7 +254,7 @@ def make_studies(
     studies = [read_study(name) for name in names]
     for study in studies:
         place = inner_folder(folder, study.stem)
-        swept(study, Means(kind=kind, force=force), place, command, progress=True)
+        complete_study(study, Means(kind=kind, force=force), place, command, progress=True)
     return studies
 
 

@@ -51,7 +51,7 @@ CONTROLLER_BASES = ("plain", "hardened")
 _CLASS, _MODULE = "OwnController", "own_controller"
 
 
-def build(
+def build_bundle(
     folder: Path,
     loader: str | None = None,
     *,

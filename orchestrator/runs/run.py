@@ -49,7 +49,7 @@ from orchestrator.runs.request import Files
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import file_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.cautions import cautions, cautions_after, cautions_beside, watched
+from orchestrator.vehicle.cautions import cautions, cautions_after, cautions_beside, watched_columns
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.proof import CertificatesFile
 from orchestrator.vehicle.signals import Loop, suffixes
@@ -200,7 +200,7 @@ class _Running:
         loops = prepared.loops
         self._metrics = Metrics(loops)
         # Without figures only the cautions look at what was seen.
-        seen = watched if files.no_figures else Loop.drawn
+        seen = watched_columns if files.no_figures else Loop.drawn
         self.seen = VisibleRows({name for loop in loops for name in seen(loop)})
         self._table = TABLE_FORMATS[files.format](folder / f"result.{files.format}")
         self.observers: list[Observer] = [

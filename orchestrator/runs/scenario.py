@@ -21,7 +21,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import explain_errors, find_toml, names_in, read_text
 from orchestrator.master.experiment import Order
 from orchestrator.master.hooks.timing import InputTable
-from orchestrator.system.names import PortName, file_name, flattened, port_name
+from orchestrator.system.names import PortName, file_name, flatten, port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import finite, type_of, typed
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD
@@ -150,7 +150,7 @@ def _scenario(path: Path, text: str) -> Scenario:
     content = tomllib.loads(text)
     ScenarioFile.check(path, content)
     content["parameters"] = {
-        port_name(key): value for key, value in flattened(content.get("parameters", {}))
+        port_name(key): value for key, value in flatten(content.get("parameters", {}))
     }
     if "path" in content:
         said, others = content.pop("path"), content["parameters"]
@@ -161,7 +161,7 @@ def _scenario(path: Path, text: str) -> Scenario:
     if "inputs" in content:
         said = content["inputs"]
         content["inputs"] = Inputs(**said | {"file": path.parent / said["file"]})
-    content["ours"] = {key: str(why) for key, why in flattened(content.get("ours", {}))}
+    content["ours"] = {key: str(why) for key, why in flatten(content.get("ours", {}))}
     content["components"] = {
         component: str(path.parent / fmu) if fmu.endswith(".fmu") else fmu
         for component, fmu in content.get("components", {}).items()

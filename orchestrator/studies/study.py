@@ -65,10 +65,10 @@ class Sample(NamedTuple):
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the values, the ones in a norm one by one."""
-        return tuple(name for key in self.ranges for name in members(key))
+        return tuple(name for key in self.ranges for name in norm_members(key))
 
 
-def members(key: str) -> list[str]:
+def norm_members(key: str) -> list[str]:
     """The names in a norm `|a, b, c|`, or the one name."""
     return [name.strip() for name in key.strip("|").split(",")] if key.startswith("|") else [key]
 

@@ -35,9 +35,9 @@ from orchestrator.studies.study import (
     Sample,
     StopTime,
     Study,
-    members,
+    norm_members,
 )
-from orchestrator.system.names import flattened, port_name
+from orchestrator.system.names import flatten, port_name
 from orchestrator.system.values import is_finite
 from orchestrator.vehicle.indices import index_columns
 
@@ -59,7 +59,7 @@ _LARGEST_SEED = 2**63 - 1
 
 def _each(fits: Callable[[Any], bool]) -> AfterValidator:
     def check(table: Mapping[str, Any]) -> Mapping[str, Any]:
-        if not all(fits(value) for _, value in flattened(table)):
+        if not all(fits(value) for _, value in flatten(table)):
             raise ValueError
         return table
 
@@ -229,16 +229,16 @@ def study_of(name: str, content: Mapping[str, Any], path: Path | None = None) ->
         str(path.parent / scenario) if path and is_path(scenario) else scenario
         for scenario in ([names] if isinstance(names, str) else names)
     )
-    entries["parameters"] = dict(flattened(content.get("parameters", {})))
+    entries["parameters"] = dict(flatten(content.get("parameters", {})))
     entries["vary"] = {}
-    for key, value in flattened(content.get("vary", {}), _is_range):
+    for key, value in flatten(content.get("vary", {}), _is_range):
         with findings.collecting():
             entries["vary"][key] = _values(f"{where}: vary: {key}", value)
     if "sample" in content:
         with findings.collecting():
             entries["sample"] = _sample(f"{where}: sample", content["sample"])
     if (end := content.get("stop_time")) is not None:
-        per = dict(flattened(end["per"])) if isinstance(end, Mapping) else {}
+        per = dict(flatten(end["per"])) if isinstance(end, Mapping) else {}
         entries["stop_time"] = StopTime(end["base"] if isinstance(end, Mapping) else end, per)
     findings.refuse()
     study = Study(name, **entries)
@@ -276,12 +276,12 @@ def _range(where: str, value: Any) -> Range:
 
 def _sample(where: str, content: Mapping[str, Any]) -> Sample:
     findings, ranges = Findings(), {}
-    for key, value in flattened(content["range"], _is_range):
+    for key, value in flatten(content["range"], _is_range):
         with findings.collecting():
             if _is_range(value):
                 RangeTable.check(f"{where}: {key}", value)
             ranges[key] = limits = _range(f"{where}: {key}", value)
-            is_norm = key.endswith("|") and len(members(key)) in (2, 3)
+            is_norm = key.endswith("|") and len(norm_members(key)) in (2, 3)
             if key.startswith("|") and not (is_norm and min(limits.low, limits.high) >= 0.0):
                 raise InputError(
                     f"{where}: {key}: a norm is of two or three numbers, and not negative"
@@ -332,7 +332,7 @@ def read_figures(
 
     """
     tables, indices = dict(figures), indices or index_columns()
-    labels = dict(flattened(tables.pop(LABELS, {})))
+    labels = dict(flatten(tables.pop(LABELS, {})))
     numbers = [name for name, kind in varied.items() if kind is not str]
     if not tables and numbers:
         tables["influence"] = {"kind": "influence", "x": numbers, "show": _usual(indices)}
@@ -353,8 +353,8 @@ def read_figures(
                 table.get("y", ""),
                 _listed(table.get("show", ())),
                 _listed(table.get("by", by)),
-                dict(flattened(table.get("where", {}))),
-                dict(flattened(table.get("limits", {}))),
+                dict(flatten(table.get("where", {}))),
+                dict(flatten(table.get("limits", {}))),
                 labels,
             )
         )
@@ -396,5 +396,5 @@ def _check_figure(
 
 def _listed(value: Any) -> list[str]:
     if isinstance(value, Mapping):
-        return [name for name, _ in flattened(value)]
+        return [name for name, _ in flatten(value)]
     return [value] if isinstance(value, str) else list(value)

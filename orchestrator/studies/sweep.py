@@ -22,12 +22,12 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.loop import LOOPS
 from orchestrator.master.plan import PACKAGES, digest_of
-from orchestrator.runs.loading import loaded
+from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import CliOption, Force, Kind, LoopName
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.blocks import Making, local
+from orchestrator.studies.blocks import Making, local_workers
 from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import Store, StudyResult, open_store, read_study_record
@@ -119,7 +119,7 @@ def sweep(
     """
     plan = study_of(_NAMELESS, study) if isinstance(study, Mapping) else read_study(str(study))
     means = Means(engine, kind, loop, scheduler, workers, force)
-    return swept(plan, means, study_folder(plan, out), sys.argv, progress=progress)
+    return complete_study(plan, means, study_folder(plan, out), sys.argv, progress=progress)
 
 
 def study_folder(study: Study, out: str | Path | None) -> Path:
@@ -127,7 +127,7 @@ def study_folder(study: Study, out: str | Path | None) -> Path:
     return Path("results", study.stem) if out is None else Path(out)
 
 
-def swept(
+def complete_study(
     study: Study,
     means: Means,
     folder: Path,
@@ -151,7 +151,7 @@ def swept(
 
     """
     check_installed(_NEEDED if means.scheduler is None else (*_NEEDED, "distributed"))
-    systems = {name: loaded(name, means.kind) for name in study.scenario}
+    systems = {name: load_scenario(name, means.kind) for name in study.scenario}
     space = Space(study, systems)
     plans = read_figures(
         study.name, study.figures, space.columns, space.has_scenarios, space.indices
@@ -296,7 +296,7 @@ def making(
             )
         crew = cluster(scheduler, engine)
     else:
-        crew = local(workers, engine)
+        crew = local_workers(workers, engine)
     with crew as of:
         yield Making(of).outcomes(runs)
 

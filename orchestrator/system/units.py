@@ -50,8 +50,8 @@ class Mapped:
 Transformation: TypeAlias = Linear | Mapped
 
 
-def chained(first: Transformation | None, then: Transformation | None) -> Transformation | None:
-    """Two transformations, one after the other, as one; None leaves a value as it is.
+def combine(first: Transformation | None, then: Transformation | None) -> Transformation | None:
+    """Combine two transformations, one after the other; None leaves a value as it is.
 
     Raises:
         InputError: one is linear, and the other a table; no number holds what they come to; or

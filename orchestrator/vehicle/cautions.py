@@ -29,7 +29,7 @@ _REVERSES, _GROWS = 1.0, 2.0
 _VELOCITY_UNITS = {"m/s", "rad/s"}
 
 
-def watched(loop: Loop) -> tuple[str, str]:
+def watched_columns(loop: Loop) -> tuple[str, str]:
     """The columns whose extremes :func:`cautions_after` looks at: theta_hat[1], and the pitch."""
     return loop.theta_hat[0], loop.attitude[1]
 

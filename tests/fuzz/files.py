@@ -329,7 +329,7 @@ def prepared() -> Iterator[dict[str, Kind]]:
         _process_folder.cache_clear()
         try:
             runs = {order: simulate("fig4", stop_time=RECORDED, order=order) for order in ORDERS}
-            with patch.object(verify, "completed", partial(_replay, runs)):
+            with patch.object(verify, "simulate_to_end", partial(_replay, runs)):
                 found = kinds(runs)
                 for name, kind in found.items():
                     # The first use of a library may write into its cache.

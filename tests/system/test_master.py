@@ -25,8 +25,8 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.binary import check_place
 from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned, stages
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import make_plan, stages
+from orchestrator.master.simulation import simulate_plan
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
@@ -126,7 +126,7 @@ class Impatient(Table):
 def test_interrupt_keeps_the_rows_and_does_not_reach_the_fmus(system: System, loop: str):
     """In a run that would take minutes."""
     result, experiment = Impatient(), Experiment(1e4, 0.02)
-    simulate(planned(system, experiment), [result], loop=choose_loop(loop, experiment))
+    simulate_plan(make_plan(system, experiment), [result], loop=choose_loop(loop, experiment))
     assert result.failure is not None
     assert "interrupted at t =" in result.failure
     assert 1 < len(result) < 500_000

@@ -21,7 +21,7 @@ from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import unpack
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.plan import planned
+from orchestrator.master.plan import make_plan
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.record import read_result
 from orchestrator.runs.scenario import Scenario
@@ -146,14 +146,14 @@ def test_an_fmu_that_has_another_content_is_another_one(workplace: Path):
 def test_who_takes_fmus_along_takes_those_that_were_read(workplace: Path):
     fmu = build(workplace)
     experiment = Experiment(0.2, 0.1)
-    prepared = Prepared(Scenario("s"), planned(system_of(fmu), experiment))
+    prepared = Prepared(Scenario("s"), make_plan(system_of(fmu), experiment))
     engine, run = FmuEngine({"s": prepared}), Point(0, "s", {}, 0.2, 0.1)
     assert list(pickle.loads(pickle.dumps(engine)).outcomes([run])) == list(engine.outcomes([run]))
     replace_by_another(fmu)
     with pytest.raises(InputError, match=r"plain\.fmu"):
         pickle.dumps(engine)
     assert (
-        Prepared(Scenario("s"), planned(system_of(fmu), experiment)).identity != prepared.identity
+        Prepared(Scenario("s"), make_plan(system_of(fmu), experiment)).identity != prepared.identity
     )
 
 

@@ -26,7 +26,7 @@ from orchestrator.machine import cache
 from orchestrator.machine.children import compile_library, find_compiler
 from orchestrator.machine.disk import hold_lock
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.master.fmi.surroundings import put_back, within
+from orchestrator.master.fmi.surroundings import restore_mode, within_folder
 from orchestrator.system.component import Component
 
 #: How this program names itself in descriptions of FMUs.
@@ -77,7 +77,7 @@ class FMU2OfOthers(FMU2Slave):  # type: ignore[misc]
         try:
             result = super()._call(fname, *args)
         finally:
-            put_back()
+            restore_mode()
         # fmpy takes what is below all of FMI's statuses for a good one.
         if self._functions[fname].restype is fmi2Status and result < 0:
             raise FMICallException(fname, result)
@@ -86,7 +86,7 @@ class FMU2OfOthers(FMU2Slave):  # type: ignore[misc]
     def freeLibrary(self) -> None:
         """Unload the library."""
         super().freeLibrary()
-        put_back()
+        restore_mode()
 
 
 class _Lenient:
@@ -130,23 +130,25 @@ class Library:
         make_binary(component, folder)
         try:
             # fmpy changes the current folder meanwhile, and leaves it so if it fails.
-            with within(folder):
+            with within_folder(folder):
                 self.fmu = FMU2OfOthers(
                     guid=component.description.guid,
                     modelIdentifier=component.description.coSimulation.modelIdentifier,
                     unzipDirectory=str(folder),
                 )
         except Exception as error:
-            raise InputError(f"{named(component)} cannot be loaded: {reason(error)}") from error
+            raise InputError(
+                f"{name_with_fmu(component)} cannot be loaded: {reason(error)}"
+            ) from error
         finally:
-            put_back()
+            restore_mode()
         tool = component.description.generationTool or ""
         self.runs_python = runs_python(folder)
         self.is_akin = tool.startswith(_OWN) or self.runs_python
         self.corrupted, self.users = False, 0
 
 
-def named(component: Component) -> str:
+def name_with_fmu(component: Component) -> str:
     """A component and its FMU, for messages."""
     return f"{component.name}: {component.fmu.name}"
 
@@ -226,7 +228,9 @@ def check_binary(component: Component, folder: Path) -> None:
     if binary.is_file():
         for path in sorted(binary.parent.iterdir()):
             if path.is_file() and _is_cut_short(path):
-                raise InputError(f"{named(component)}: its {path.name} is cut short: get it anew")
+                raise InputError(
+                    f"{name_with_fmu(component)}: its {path.name} is cut short: get it anew"
+                )
         return
     if _sources_of(component, folder):
         _check_compiler(component)
@@ -240,7 +244,8 @@ def check_binary(component: Component, folder: Path) -> None:
     else:
         there = "no binaries at all"
     raise InputError(
-        f"{named(component)} has no {binary.name} for this machine, {fmpy.platform}: it has {there}"
+        f"{name_with_fmu(component)} has no {binary.name} for this machine, {fmpy.platform}: "
+        f"it has {there}"
     )
 
 

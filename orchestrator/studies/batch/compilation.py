@@ -146,8 +146,8 @@ def _code(functions: list[ast.FunctionDef], path: str) -> CodeType:
 
 
 @cache
-def compiled(gains: type[Any]) -> Callable[..., Moment]:
-    """The function :func:`.kernel.run` for the controller with a type of gains.
+def compile_run(gains: type[Any]) -> Callable[..., Moment]:
+    """Compile the function :func:`.kernel.run` for the controller with a type of gains.
 
     It is compiled when it is first called, which takes some ten seconds, unless some process of
     this user has done so before.
