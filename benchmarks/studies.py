@@ -33,7 +33,7 @@ from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import open_store
 from orchestrator.studies.study_file import study_of
-from orchestrator.studies.sweep import making
+from orchestrator.studies.sweep import making_runs
 from orchestrator.vehicle.indices import index_columns
 
 SCENARIO = "fig4"
@@ -81,7 +81,7 @@ class Cost(NamedTuple):
 
 def cost(engine: Engine, runs: Iterable[Point], workers: int) -> Cost:
     """What runs take when some processes make them."""
-    with making(Timed(engine), iter(runs), workers=workers) as blocks:
+    with making_runs(Timed(engine), iter(runs), workers=workers) as blocks:
         for _ in islice(blocks, _WARM * workers):
             pass
         start = perf_counter()
@@ -111,7 +111,7 @@ def keeping(n: int) -> tuple[float, float, float]:
         open_store(Path(folder), {"made_of": {}}, space.indices) as unfinished,
     ):
         assert unfinished is not None
-        with making(Idle(), (space[i] for i in range(n)), workers=1) as blocks:
+        with making_runs(Idle(), (space[i] for i in range(n)), workers=1) as blocks:
             for outcomes in blocks:
                 unfinished.add(outcomes)
         database = sum(file.stat().st_size for file in Path(folder).glob("unfinished*"))
@@ -125,7 +125,7 @@ def block(n: int) -> float:
     space = starts(n, 1.0)
     with (
         patch.object(blocks_module, "_MOST_RUNS", 1),
-        making(Idle(), (space[i] for i in range(n)), workers=1) as blocks,
+        making_runs(Idle(), (space[i] for i in range(n)), workers=1) as blocks,
     ):
         start = perf_counter()
         made = sum(1 for _ in blocks)

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import get_type_hints
 
-from fmus.native.expressions import Code, Expressions, is_path
+from fmus.native.expressions import Code, Expressions, is_dotted_name
 from fmus.native.language import foreign
 from fmus.native.program import (
     DOUBLE,
@@ -243,7 +243,7 @@ class _Translation:
                     yield from self._assignment(one, other)
         else:
             code = self._in_c.code(value)
-            if not is_path(value):
+            if not is_dotted_name(value):
                 name = self._name_of_all(target, value)
                 yield self._stored([(name, code)])
                 code = Code(name, code.shape)

@@ -263,7 +263,7 @@ def _record(
 
 
 @contextmanager
-def making(
+def making_runs(
     engine: Engine,
     runs: Iterable[Point],
     *,
@@ -316,7 +316,7 @@ def _complete(
     """
     runs = (space[number] for number in unfinished.missing(len(space)))
     with (
-        making(engine, runs, scheduler=means.scheduler, workers=means.workers) as blocks,
+        making_runs(engine, runs, scheduler=means.scheduler, workers=means.workers) as blocks,
         tqdm(
             total=len(space),
             initial=len(unfinished),

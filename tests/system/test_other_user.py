@@ -17,7 +17,7 @@ import pytest
 from orchestrator.machine.cache import read_cached, write_cached
 from orchestrator.machine.disk import process_folder
 from orchestrator.master import stepper
-from orchestrator.studies.sweep import making
+from orchestrator.studies.sweep import making_runs
 from support.machine import called
 from support.texts import mentions
 from support.toy_engine import Toy, outcome, run
@@ -145,7 +145,7 @@ def test_a_folder_cannot_be_made_before_us(open_folder, other):
 def test_a_sweep_cannot_be_reached(other):
     psutil = pytest.importorskip("psutil", reason="needs the extra `studies`")
     runs = [run(number) for number in range(400)]
-    with making(Toy(0.001), iter(runs), workers=2) as blocks:
+    with making_runs(Toy(0.001), iter(runs), workers=2) as blocks:
         made = list(next(blocks))
         this = psutil.Process()
         processes = [this, *this.children(recursive=True)]
