@@ -66,7 +66,7 @@ In Python:
 A step longer than `h_max`, where there is such a parameter, is split evenly with held inputs."""
 
 
-def page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
+def component_page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
     """The page of a component in Markdown: what it is, its ports, what it refuses, an example."""
     text = (package_folder(components()[name]) / "page.md").read_text(encoding="utf-8").strip()
     ports = (*ports_of(name), FAULT)
@@ -135,9 +135,9 @@ def _range(port: Port) -> str:
     return " ".join(filter(None, (lower, upper)))
 
 
-def html(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
+def component_html(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
     """The page of a component as one HTML file."""
-    body = MarkdownIt("commonmark").enable("table").render(page(name, kind, fmi))
+    body = MarkdownIt("commonmark").enable("table").render(component_page(name, kind, fmi))
     body = body.replace("<table>", '<div class="table"><table>')
     body = body.replace("</table>", "</table></div>")
     return Template(_HTML.read_text(encoding="utf-8")).substitute(title=name, body=body)

@@ -208,7 +208,7 @@ class Expressions:
 
     def _compare(self, node: ast.Compare, wanted: Shape | None) -> Code:
         operands = [node.left, *node.comparators]
-        if not all(map(is_path, operands[1:-1])):
+        if not all(map(is_dotted_name, operands[1:-1])):
             raise self.fail(node, "what stands between two comparisons must be a name")
         parts = []
         for operator, left, right in zip(node.ops, operands, operands[1:]):
@@ -246,7 +246,7 @@ class Expressions:
         codes: list[Code] = []
         for node in nodes:
             if isinstance(node, ast.Starred):
-                if not is_path(node.value):
+                if not is_dotted_name(node.value):
                     raise self.fail(node, "a star before something that has no name")
                 codes += self.parts(node, self.code(node.value))
             else:
@@ -315,8 +315,8 @@ def _initializer(code: Code) -> str:
     return code.text[len(prefix) - 1 :] if code.text.startswith(prefix) else code.text
 
 
-def is_path(node: ast.expr) -> bool:
+def is_dotted_name(node: ast.expr) -> bool:
     """Whether an expression is a name, or a part of one."""
     if isinstance(node, (ast.Attribute, ast.Subscript)):
-        return is_path(node.value)
+        return is_dotted_name(node.value)
     return isinstance(node, (ast.Name, ast.Constant))

@@ -29,7 +29,7 @@ from fmus.python.callbacks import (
     STEPPING,
     TERMINATED,
     Callbacks,
-    explained,
+    describe_error,
 )
 from fmus.python.state import (
     Snapshot,
@@ -173,7 +173,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
                 self._begin()
             except BaseException as error:
                 self._state, self._store.outputs = None, [0.0] * len(self._store.outputs)
-                return f"initialisation refused: {explained(error)}"
+                return f"initialisation refused: {describe_error(error)}"
             self._stale = False
         return ""
 
@@ -225,7 +225,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
             )
             self._accept(state, self._pack(outputs))
         except BaseException as error:
-            what = explained(error)
+            what = describe_error(error)
             self._store.fault = True
             said = f"step refused at t = {current_time:g} s: {what}"
             self._answer(Fmi2Status.discard, said, key=what)
@@ -266,7 +266,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         try:
             hidden = self.hidden_state()
         except BaseException as error:
-            return unusable(explained(error))
+            return unusable(describe_error(error))
         return Snapshot(
             identity=self._identity(),
             mode=self._mode,
@@ -283,7 +283,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         try:
             self._restore(state)
         except BaseException as error:
-            self._fail(f"state refused: {explained(error)}")
+            self._fail(f"state refused: {describe_error(error)}")
 
     def _restore(self, saved: Mapping[str, Any]) -> None:
         store = self._store

@@ -12,7 +12,7 @@ from orchestrator.commands.options import add_fmi, add_options, add_out, add_set
 from orchestrator.commands.streams import OK, show
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
-from orchestrator.runs.bundle import BASES, DEFAULT_FOLDERS, build_own, new_controller
+from orchestrator.runs.bundle import CONTROLLER_BASES, DEFAULT_FOLDERS, build_own, new_controller
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.wiring import closed_loop
@@ -58,10 +58,10 @@ def add_new(parser: argparse.ArgumentParser) -> None:
     )
     controller.add_argument(
         "--base",
-        choices=BASES,
-        default=BASES[0],
+        choices=CONTROLLER_BASES,
+        default=CONTROLLER_BASES[0],
         help="plain: PythonFMU alone; hardened: the base of the bundle's components, which checks "
-        f"values, saves states and survives exceptions; default: {BASES[0]}",
+        f"values, saves states and survives exceptions; default: {CONTROLLER_BASES[0]}",
     )
     controller.set_defaults(action=_controller)
 
@@ -84,7 +84,7 @@ def _build(options: argparse.Namespace) -> int:
         show(build_own(options.script, options.out, options.loader, force=options.force))
         return OK
     folder = options.out or DEFAULT_FOLDERS[options.kind]
-    written = bundle.build(
+    written = bundle.build_bundle(
         folder,
         options.loader,
         kind=options.kind,

@@ -12,10 +12,10 @@ from fmpy.validation import validate_fmu
 from orchestrator.commands.options import add_variant
 from orchestrator.commands.streams import BAD_INPUT, OK, show
 from orchestrator.machine.errors import Findings, InputError, reason
-from orchestrator.machine.user_files import unpacked
+from orchestrator.machine.user_files import unpack
 from orchestrator.master.fmi.binary import binary_of, check_binary
-from orchestrator.runs.loading import loaded
-from orchestrator.runs.preparation import SOME_TIME, prepare
+from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.preparation import FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import impossible_paths
 from orchestrator.studies.study import is_study
@@ -89,14 +89,14 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
     """Look at a system as a whole, then at its components; returns what is to be known of it."""
     to_know: list[str] = []
     with findings.collecting():
-        scenario, system = loaded(options.file, variant=options.variant, findings=findings)
+        scenario, system = load_scenario(options.file, variant=options.variant, findings=findings)
         for name, component in system.components.items():
             known = (*_binary(component, findings), *surprises(component))
             to_know += [f"{name}: {text}" for text in known]
         request = Request()
         if scenario.stop_time is None and system.stop_time is None:
             to_know.append("names no stop time: a run wants --stop-time")
-            request = Request(stop_time=(system.start_time or 0.0) + SOME_TIME)
+            request = Request(stop_time=(system.start_time or 0.0) + FALLBACK_STOP_TIME)
         prepared = prepare(scenario, system, request)
         for text in impossible_paths(prepared.system):
             findings.problem(text)
@@ -152,7 +152,7 @@ def surprises(component: Component) -> Iterator[str]:
 
 def _flaws(fmu: Path) -> list[str]:
     """What the standard's schema and rules have against the description."""
-    if not (unpacked(fmu).folder / "modelDescription.xml").is_file():
+    if not (unpack(fmu).folder / "modelDescription.xml").is_file():
         # What reads the FMU says so.
         return []
     try:
@@ -164,7 +164,7 @@ def _flaws(fmu: Path) -> list[str]:
 def _dangling(fmu: Path) -> Iterator[str]:
     """References in the structure of the model to variables that do not exist."""
     try:
-        root = ElementTree.parse(unpacked(fmu).folder / "modelDescription.xml").getroot()
+        root = ElementTree.parse(unpack(fmu).folder / "modelDescription.xml").getroot()
     except (OSError, ElementTree.ParseError):
         return
     known = range(1, 1 + len(root.findall("ModelVariables/ScalarVariable")))

@@ -14,7 +14,7 @@ from orchestrator.commands.options import (
     add_set,
     add_system,
     assignments,
-    read,
+    read_system,
 )
 from orchestrator.commands.streams import FAILED, OK, say, show
 from orchestrator.exchange.hosts import HOSTS, compare
@@ -22,15 +22,15 @@ from orchestrator.exchange.verify import verify
 from orchestrator.formats.osp_and_container import write_container, write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS, order_of
-from orchestrator.runs.folder import replaced
+from orchestrator.master.experiment import ORDERS, read_order
+from orchestrator.runs.folder import replace_files
 from orchestrator.runs.loading import left_behind, load
-from orchestrator.runs.preparation import DEFAULT_STEP, SOME_TIME, prepare
+from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Files, Request
 from orchestrator.system.structure import System
 
 #: Writers by the names of their formats.
-FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
+EXPORT_FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
     "ssp": write_ssp,
     "osp": write_osp,
     "container": write_container,
@@ -45,7 +45,7 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     add_system(parser)
     parser.add_argument(
         "--format",
-        choices=tuple(FORMATS),
+        choices=tuple(EXPORT_FORMATS),
         default="ssp",
         help="an SSP, libcosim's own folder, or one FMU (needs auv-fmu[hosts]); default: ssp",
     )
@@ -82,7 +82,7 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--order",
-        type=order_of,
+        type=read_order,
         metavar=f"{'|'.join(ORDERS)}|NAME,...",
         help="in which the tool steps the components, or the names of all of them; default: "
         f"{' and '.join(ORDERS)}, the one that fits",
@@ -111,11 +111,11 @@ def _add_scenario(parser: argparse.ArgumentParser) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    scenario, system = read(options, options.fmi)
+    scenario, system = read_system(options, options.fmi)
     ends = scenario.stop_time is not None or system.stop_time is not None
     request = Request(
         # What names no end is written without one.
-        stop_time=None if ends else (system.start_time or 0.0) + SOME_TIME,
+        stop_time=None if ends else (system.start_time or 0.0) + FALLBACK_STOP_TIME,
         step=options.step,
         parameters=assignments(options),
         strict=options.strict,
@@ -131,8 +131,8 @@ def _export(options: argparse.Namespace) -> int:
     if left := left_behind(prepared.scenario):
         say(f"warning: {left}")
     folder = options.out or Path("exports", prepared.scenario.stem)
-    with replaced(folder, force=options.force) as unfinished:
-        written = FORMATS[options.format](system, unfinished)
+    with replace_files(folder, force=options.force) as unfinished:
+        written = EXPORT_FORMATS[options.format](system, unfinished)
     for path in written:
         show(folder / path.relative_to(unfinished))
     return OK

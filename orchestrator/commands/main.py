@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Where it can keep no fonts it says so at length, and draws all the same.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
-    streams.fill()
+    streams.fill_streams()
     status = OK
     try:
         with orderly_end(arguments is None), warnings.catch_warnings():

@@ -6,7 +6,7 @@ import argparse
 import os
 from pathlib import Path
 
-from orchestrator.commands.options import add_options, add_out, taken
+from orchestrator.commands.options import add_options, add_out, from_options
 from orchestrator.commands.streams import INTERRUPTED, OK, say, show
 from orchestrator.paper.printed_table import write_table
 from orchestrator.paper.report import write_report
@@ -14,7 +14,7 @@ from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import names
 from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study
-from orchestrator.studies.sweep import Means, folder_of, swept
+from orchestrator.studies.sweep import Means, complete_study, study_folder
 
 
 def add_sweep(parser: argparse.ArgumentParser) -> None:
@@ -57,9 +57,11 @@ def add_table(parser: argparse.ArgumentParser) -> None:
 
 def _sweep(options: argparse.Namespace) -> int:
     study = read_study(options.study)
-    folder = folder_of(study, options.out)
+    folder = study_folder(study, options.out)
     try:
-        result = swept(study, taken(Means, options), folder, options.command, say, progress=True)
+        result = complete_study(
+            study, from_options(Means, options), folder, options.command, say, progress=True
+        )
     except KeyboardInterrupt:
         say(f"interrupted; {folder} keeps what is done: the same command goes on from there")
         return INTERRUPTED

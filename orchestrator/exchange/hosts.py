@@ -31,8 +31,8 @@ from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import completed
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_to_end
 from orchestrator.system.structure import System
 
 #: How long a host may take for a run before it is given up [s].
@@ -210,8 +210,8 @@ def _container(system: System, folder: Path, experiment: Experiment) -> Ran:
 
 
 def _c_program(system: System, folder: Path, experiment: Experiment) -> Ran:
-    program = c_host.compiled(folder, system, experiment)
-    rows, seconds = c_host.run([program], folder, experiment.rows - 1, _names(system))
+    program = c_host.compile_host(folder, system, experiment)
+    rows, seconds = c_host.run_host([program], folder, experiment.rows - 1, _names(system))
     return Ran(rows[1:], seconds)
 
 
@@ -243,7 +243,7 @@ def compare(system: System, hosts: Sequence[str], steps: int, step: float) -> li
 
     """
     expected = Table()
-    completed(planned(system, _experiment(system, steps, step)), [expected])
+    simulate_to_end(make_plan(system, _experiment(system, steps, step)), [expected])
     names = _names(system)
     table = expected.group(*names)[1:]
     return [_verdict(system, host, steps, step, names, table) for host in hosts]

@@ -20,12 +20,12 @@ from orchestrator.master.experiment import (
     Exchange,
     Experiment,
     Order,
-    written_order,
+    format_order,
 )
 from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.observers.observer import Ending, Header
-from orchestrator.master.plan import planned, stages
-from orchestrator.master.simulation import completed
+from orchestrator.master.plan import make_plan, stages
+from orchestrator.master.simulation import simulate_to_end
 from orchestrator.runs.preparation import DEFAULT_STEP
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
@@ -126,14 +126,14 @@ def _ways(system: System, order: Order | None, at_start: bool) -> Iterator[Algor
     start = "" if at_start else ", no values exchanged in initialisation mode"
     exchange = Exchange(at_start)
     if not (order is None or isinstance(order, str)):
-        words = f"in the order {written_order(order)}"
+        words = f"in the order {format_order(order)}"
         latest = exchange._replace(latest=True)
         yield Algorithm(order, None, latest, f"{words}, each with the latest outputs{start}")
     # Other tools solve rings, or delay them.
     for coupling in (None, DELAY) if rings(system) else (None,):
         delayed = ", rings delayed" * (coupling == DELAY)
         for one in ORDERS if order is None else (order,):
-            named = written_order(one)
+            named = format_order(one)
             words = f"in {named} order" if isinstance(one, str) else f"as run --order {named}"
             yield Algorithm(one, coupling, exchange, f"{words}{delayed}{start}")
 
@@ -145,7 +145,7 @@ def _complaint(table: ForeignTable, system: System, way: Algorithm, tolerance: f
     try:
         step, start_time = system.step or DEFAULT_STEP, system.start_time or 0.0
         experiment = Experiment(stop_time, step, way.order, start_time, way.coupling)
-        completed(planned(system, experiment), [ours], way.exchange)
+        simulate_to_end(make_plan(system, experiment), [ours], way.exchange)
     except InputError as error:
         return f"our own run fails: {error}"
     return _first_difference(table.time, table.columns, ours.values, tolerance)

@@ -21,7 +21,7 @@ from tempfile import mkdtemp, mkstemp
 
 from platformdirs import user_cache_path
 
-from orchestrator.machine.disk import process_folder, to_disk
+from orchestrator.machine.disk import process_folder, sync_to_disk
 
 #: The folder of the digests, beside one for each category of what is kept.
 _DIGESTS = "digests"
@@ -38,8 +38,8 @@ def users_folder() -> Path:
     return user_cache_path("auv-fmu", appauthor=False)
 
 
-def kept(category: str, key: str) -> dict[Path, bytes]:
-    """The files that were kept under a key, and what is in them; empty if they are not as then.
+def read_cached(category: str, key: str) -> dict[Path, bytes]:
+    """Read the files that were kept under a key; empty if they are not as they were kept.
 
     Args:
         category: of what is kept, a name of a folder.
@@ -60,8 +60,8 @@ def environment() -> dict[str, str]:
     return {} if root == users_folder() else {"XDG_CACHE_HOME": str(root.parent)}
 
 
-def folder_of(category: str) -> Path:
-    """The folder of a category, made if it is not there.
+def category_folder(category: str) -> Path:
+    """Give the folder of a category, made if it is not there.
 
     Raises:
         OSError: it cannot be made.
@@ -70,8 +70,8 @@ def folder_of(category: str) -> Path:
     return _made(category) / category
 
 
-def keep(category: str, key: str, files: Mapping[str, bytes]) -> list[Path]:
-    """Keep files, and say where they are.
+def write_cached(category: str, key: str, files: Mapping[str, bytes]) -> list[Path]:
+    """Keep files, and give their paths.
 
     Args:
         category: of what is kept, a name of a folder.
@@ -88,7 +88,7 @@ def keep(category: str, key: str, files: Mapping[str, bytes]) -> list[Path]:
         made.chmod(0o700)
         for name, content in files.items():
             _write(os.open(made / name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), content)
-        to_disk(made)
+        sync_to_disk(made)
         digests = {name: sha256(content).hexdigest() for name, content in files.items()}
         descriptor, record = mkstemp(".json", f"{category}-{key}-", root / _DIGESTS)
         try:

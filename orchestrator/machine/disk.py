@@ -85,12 +85,12 @@ def write_whole(path: Path, text: str, partial: Path) -> None:
     """
     partial.unlink(missing_ok=True)
     write_new(partial, text)
-    to_disk(partial)
+    sync_to_disk(partial)
     partial.replace(path)
-    to_disk(path.parent)
+    sync_to_disk(path.parent)
 
 
-def to_disk(path: Path) -> None:
+def sync_to_disk(path: Path) -> None:
     """Have a file, or the names in a folder, outlast a power cut.
 
     Raises:
@@ -117,7 +117,7 @@ def is_still(descriptor: int, status: os.stat_result) -> bool:
 
 
 @contextmanager
-def claimed(path: Path, wait: bool = False) -> Iterator[None]:
+def hold_lock(path: Path, wait: bool = False) -> Iterator[None]:
     """Keep other processes from a file or folder.
 
     Args:

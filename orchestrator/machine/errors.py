@@ -51,16 +51,17 @@ def shortened(text: str, most: int = 80) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
-def plain(text: str, kept: str = "") -> str:
-    """A text in which nothing of a name speaks to the terminal.
+def escape_unprintable(text: str, allowed: str = "") -> str:
+    """Escape what would speak to the terminal, in names as well.
 
     Args:
         text: to be shown.
-        kept: letters that may stay, though they are not printed.
+        allowed: letters that may stay, though they are not printed.
 
     """
     return "".join(
-        letter if letter.isprintable() or letter in kept else repr(letter)[1:-1] for letter in text
+        letter if letter.isprintable() or letter in allowed else repr(letter)[1:-1]
+        for letter in text
     )
 
 

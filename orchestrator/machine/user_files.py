@@ -71,7 +71,7 @@ _folders: dict[str, Path] = {}
 
 
 @contextmanager
-def explained(path: Path, what: str) -> Iterator[None]:
+def explain_errors(path: Path, what: str) -> Iterator[None]:
     """Say of a mistake in a file which file it is.
 
     Args:
@@ -105,7 +105,7 @@ def check_file(path: Path) -> None:
         InputError: there is none, or it is a folder, a pipe or a device.
 
     """
-    with explained(path, "not the name of a file"):
+    with explain_errors(path, "not the name of a file"):
         try:
             mode = path.stat().st_mode
         except FileNotFoundError:
@@ -114,8 +114,8 @@ def check_file(path: Path) -> None:
         raise InputError(f"{path}: {'a folder' if S_ISDIR(mode) else 'a pipe or device'}, no file")
 
 
-def text_of(path: Path, what: str) -> str:
-    """The text of a short file.
+def read_text(path: Path, what: str) -> str:
+    """Read a short file as text.
 
     Args:
         path: of the file.
@@ -126,7 +126,7 @@ def text_of(path: Path, what: str) -> str:
 
     """
     check_file(path)
-    with explained(path, what), path.open(encoding="utf-8-sig") as file:
+    with explain_errors(path, what), path.open(encoding="utf-8-sig") as file:
         text = file.read(_LONGEST + 1)
         if len(text) > _LONGEST:
             raise ValueError(f"longer than {_LONGEST:,} characters")
@@ -134,8 +134,8 @@ def text_of(path: Path, what: str) -> str:
 
 
 @contextmanager
-def lines_of(path: Path, newline: str | None = None) -> Iterator[Iterator[str]]:
-    """The lines of a text in UTF-8, one by one.
+def open_lines(path: Path, newline: str | None = None) -> Iterator[Iterator[str]]:
+    """Open a text in UTF-8, to take its lines one by one.
 
     Args:
         path: of the file.
@@ -163,8 +163,8 @@ def names_in(folder: Path) -> list[str]:
     return sorted(path.stem for path in folder.glob("*.toml"))
 
 
-def path_of(name: str, folder: Path, what: str, files: str) -> Path:
-    """The path of a file that comes with the program, by its name, or of any file of the user's.
+def find_toml(name: str, folder: Path, what: str, files: str) -> Path:
+    """Find a file that comes with the program by its name, or any file of the user's by its path.
 
     Args:
         name: of the file, or its path, which ends in .toml.
@@ -194,8 +194,8 @@ class Unpacked(NamedTuple):
     digest: str
 
 
-def unpacked(archive: Path) -> Unpacked:
-    """An FMU or SSP as it is now, unpacked.
+def unpack(archive: Path) -> Unpacked:
+    """Unpack an FMU or SSP as it is now.
 
     Raises:
         InputError: it cannot be unpacked.
@@ -217,8 +217,8 @@ def unpacked(archive: Path) -> Unpacked:
         raise InputError(f"{archive}: cannot be opened: {reason(error)}") from error
 
 
-def folder_of(archive: Path, digest: str) -> Path:
-    """The folder of an archive as it was read, in this process or in another one.
+def unpacked_folder(archive: Path, digest: str) -> Path:
+    """Give the folder of an archive as it was read, in this process or in another one.
 
     Raises:
         InputError: this process has not read it, and the file is another one now.
@@ -226,13 +226,13 @@ def folder_of(archive: Path, digest: str) -> Path:
     """
     folder = _folders.get(digest)
     if folder is None:
-        folder, now = unpacked(archive)
+        folder, now = unpack(archive)
         _check_same(archive, now, digest)
     return folder
 
 
-def archive_of(archive: Path, digest: str) -> bytes:
-    """The bytes of an archive as it was read.
+def read_archive(archive: Path, digest: str) -> bytes:
+    """Read the bytes of an archive as it was read before.
 
     Raises:
         InputError: the file is another one now.

@@ -15,7 +15,7 @@ from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.plan import Plan, delays, stages
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Gathering, Row
-from orchestrator.master.schedule import Stage, StageCall, member, schedule, step
+from orchestrator.master.schedule import Stage, StageCall, member, schedule, step_members
 from orchestrator.system.graph import has_feedthrough, rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
@@ -198,14 +198,14 @@ class _LinearSteps:
         begin = values.copy()
         for instance in self._fed:
             instance.keep()
-        step(self._all, t, h, is_final=False)
+        step_members(self._all, t, h, is_final=False)
         self._settling.settle()
         slopes = (values - begin) / h
         values[self._inputs] = begin[self._inputs]
         for instance, (references, columns) in zip(self._fed, self._changing, strict=True):
             instance.go_back()
             instance.let_change(references, slopes[columns].tolist())
-        step(self._again, t, h)
+        step_members(self._again, t, h)
         for instance, (references, _) in zip(self._fed, self._changing, strict=True):
             instance.let_change(references, [0.0] * len(references))
         self._settling.settle()

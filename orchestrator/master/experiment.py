@@ -33,13 +33,13 @@ MOST_STEPS = 1_000_000_000
 _MOST_PARTS = 1000
 
 
-def order_of(text: str) -> Order:
-    """An order as a command line has it: one of :data:`ORDERS`, or names with commas."""
+def read_order(text: str) -> Order:
+    """Read an order as a command line has it: one of :data:`ORDERS`, or names with commas."""
     return tuple(name.strip() for name in text.split(",")) if "," in text else text
 
 
-def written_order(order: Order) -> str:
-    """An order as a command line has it."""
+def format_order(order: Order) -> str:
+    """Write an order as a command line has it."""
     return order if isinstance(order, str) else ",".join(order)
 
 

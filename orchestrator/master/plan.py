@@ -28,7 +28,7 @@ from platform import python_version
 
 from orchestrator.machine.errors import InputError, shortened
 from orchestrator.master.experiment import JACOBI, LINEAR, ORDERS, Experiment, Order, decimations
-from orchestrator.system.graph import delayed, derived_order, has_feedthrough, in_stages
+from orchestrator.system.graph import delayed_connections, derived_order, has_feedthrough, in_stages
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 
@@ -44,7 +44,7 @@ _ROOMS = ("machine", "system", "formats", "master")
 
 @dataclass(frozen=True)
 class Plan:
-    """What :func:`planned` makes of a system, for :func:`.simulation.simulate` to run.
+    """What :func:`make_plan` makes of a system, for :func:`.simulation.simulate_plan` to run.
 
     Attributes:
         system: that is run.
@@ -60,7 +60,7 @@ class Plan:
     remarks: Sequence[str] = ()
 
 
-def planned(system: System, experiment: Experiment) -> Plan:
+def make_plan(system: System, experiment: Experiment) -> Plan:
     """Check what can be checked before an FMU is loaded.
 
     Where an FMU takes steps of one length only, a last, shorter step is left out.
@@ -162,7 +162,7 @@ def delays(
     if not isinstance(order, str) or order == JACOBI:
         return []
     late: dict[str, list[PortName]] = {}
-    for connection in delayed(system, derived_order(system, solved), solved):
+    for connection in delayed_connections(system, derived_order(system, solved), solved):
         late.setdefault(connection.target.component, []).append(connection.source)
     found = []
     for name, sources in late.items():
@@ -173,7 +173,7 @@ def delays(
     return found
 
 
-def gathered(
+def gathered_connections(
     system: System,
     sequence: Sequence[Sequence[str]],
     solved: Sequence[Sequence[str]] = (),

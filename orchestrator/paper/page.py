@@ -60,8 +60,8 @@ def values_with_units(values: Sequence[float], units: Iterable[str]) -> str:
     return "; ".join(" ".join(filter(None, part)) for part in parts)
 
 
-def plain(text: str) -> str:
-    """A text of one line in which Markdown sees no mark."""
+def escape_markdown(text: str) -> str:
+    """Escape the marks of Markdown in a text, and make one line of it."""
     # An underscore within a name is none.
     marks = r"[\\`*{}\[\]<>#|&]|(?<![^\W_])_|_(?![^\W_])"
     return re.sub(marks, r"\\\g<0>", " ".join(text.split()))

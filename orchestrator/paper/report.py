@@ -22,14 +22,14 @@ from orchestrator.paper.sections import (
     Section,
     draw_section,
     make_studies,
+    section_text,
     sections,
     study_sections,
-    written,
 )
 from orchestrator.paper.variants import all_variants
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.folder import inner, replaced
-from orchestrator.runs.record import RECORDED, Stopwatch, write_content
+from orchestrator.runs.folder import inner_folder, replace_files
+from orchestrator.runs.record import RECORDED_PACKAGES, Stopwatch, write_content
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.proof import gain_check
 
@@ -96,9 +96,9 @@ def write_report(
     # Built before there are processes that would each build them.
     fmus = current_fmus(kind)
     chapters = sections(scenarios, kind)
-    kept_runs = KeptRuns(inner(folder, _RUNS), stop_time, kind, force)
-    made = make_studies(ready, inner(folder, _STUDIES), kind, command, force)
-    with replaced(folder, (*_NAMES, RECORD), force=force) as unfinished:
+    kept_runs = KeptRuns(inner_folder(folder, _RUNS), stop_time, kind, force)
+    made = make_studies(ready, inner_folder(folder, _STUDIES), kind, command, force)
+    with replace_files(folder, (*_NAMES, RECORD), force=force) as unfinished:
         with workers() as crew:
             kept_runs.make(
                 [
@@ -165,7 +165,7 @@ def _text(
     yield held
     yield "## Figures"
     for section in chapters:
-        yield from written(section, kept_runs, notes[section.name], folder)
+        yield from section_text(section, kept_runs, notes[section.name], folder)
     yield "## Effects that the paper does not show"
     for effect in EFFECTS:
         yield f"### {effect.title}"
@@ -180,7 +180,7 @@ def _text(
     yield "## Readings"
     yield readings()
     yield "## Versions and commands"
-    versions = ", ".join(f"{package} {version(package)}" for package in RECORDED)
+    versions = ", ".join(f"{package} {version(package)}" for package in RECORDED_PACKAGES)
     yield f"Python {platform.python_version()}, {versions}. Written by `{shlex.join(command)}`."
     yield "Each of these commands makes a run of this report:"
     yield "```\n" + "\n".join(f"auv-fmu run {label}" for label in kept_runs.labels) + "\n```"

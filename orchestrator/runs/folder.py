@@ -16,9 +16,9 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
-from orchestrator.machine.disk import claimed
+from orchestrator.machine.disk import hold_lock
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.ledger import RECORD, Ledger, Taken, located
+from orchestrator.machine.ledger import RECORD, Ledger, Taken, locate
 
 #: Where a run that came to no end goes, if there is a whole result already.
 INCOMPLETE = "incomplete"
@@ -28,14 +28,14 @@ VIEW = "view.html"
 
 
 @contextmanager
-def replaced(
+def replace_files(
     folder: Path,
     names: Iterable[str] = (),
     *,
     force: bool = False,
     keep: Callable[[], bool] = lambda: False,
 ) -> Iterator[Path]:
-    """A folder to write files into; at the end they take the place of what was there before.
+    """Give a folder to write files into; at the end they take the place of what was there before.
 
     An exception in the context leaves the folder as it was.
 
@@ -50,7 +50,7 @@ def replaced(
             another run is writing into it.
 
     """
-    with opened(folder, force) as ledger:
+    with open_ledger(folder, force) as ledger:
         ledger.check(names)
         with ledger.writing() as unfinished:
             try:
@@ -62,8 +62,8 @@ def replaced(
 
 
 @contextmanager
-def opened(folder: Path, force: bool = False) -> Iterator[Ledger]:
-    """The ledger of a folder, which is made if it does not exist, and kept from other runs.
+def open_ledger(folder: Path, force: bool = False) -> Iterator[Ledger]:
+    """Open the ledger of a folder, which is made if it does not exist, and keep other runs out.
 
     Args:
         folder: to write into.
@@ -76,7 +76,7 @@ def opened(folder: Path, force: bool = False) -> Iterator[Ledger]:
     made = not os.path.exists(folder)  # noqa: PTH110  # Path.exists raises without permission
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with locked(folder):
+        with lock_folder(folder):
             yield Ledger(folder, force)
     except OSError as error:
         raise InputError(_cannot_write(folder, error)) from error
@@ -87,8 +87,8 @@ def opened(folder: Path, force: bool = False) -> Iterator[Ledger]:
                 folder.rmdir()
 
 
-def inner(folder: Path, *names: str) -> Path:
-    """A folder in another one.
+def inner_folder(folder: Path, *names: str) -> Path:
+    """Give a folder in another one.
 
     Raises:
         InputError: a link leads to it, which could lead anywhere.
@@ -138,10 +138,10 @@ def _publish(ledger: Ledger) -> None:
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def lock_folder(folder: Path) -> Iterator[None]:
     """Keep other runs out; the lock ends with the process, however it ends."""
     try:
-        with claimed(folder):
+        with hold_lock(folder):
             yield
     except BlockingIOError:
         raise InputError(
@@ -214,7 +214,7 @@ def files_of(folder: Path) -> set[str]:
 def _record(path: Path) -> dict[str, Any]:
     """A record; empty if there is none, or none of ours."""
     try:
-        record = json.loads(located(path).read_text(encoding="utf-8"))
+        record = json.loads(locate(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return {}
     return record if isinstance(record, dict) else {}

@@ -47,8 +47,8 @@ def load(
         InputError: there is no such scenario, or its system cannot be put together.
 
     """
-    with warned(strict) as findings:
-        scenario, system = loaded(str(name), kind, variant=variant, findings=findings)
+    with notes_as_warnings(strict) as findings:
+        scenario, system = load_scenario(str(name), kind, variant=variant, findings=findings)
         left = left_behind(scenario)
         for note in [left] if left else doubts_of(system):
             findings.note(note)
@@ -62,22 +62,22 @@ def load(
 
 
 @contextmanager
-def warned(strict: bool = False) -> Iterator[Findings]:
-    """Findings whose notes become warnings, as Python has them."""
+def notes_as_warnings(strict: bool = False) -> Iterator[Findings]:
+    """Collect findings whose notes become warnings, as Python has them."""
     findings = Findings(strict)
     yield findings
     for note in findings.notes:
         warnings.warn(note, stacklevel=4)
 
 
-def loaded(
+def load_scenario(
     name: str,
     kind: str = PYTHON,
     fmi: str = FMI_VERSIONS[0],
     variant: str | None = None,
     findings: Findings | None = None,
 ) -> tuple[Scenario, System]:
-    """A scenario and its system.
+    """Load a scenario and its system.
 
     Args:
         name: of a scenario of the bundle, or path of a .toml file, an SSP, an FMU, or libcosim's

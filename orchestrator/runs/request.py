@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 from fmus.kinds import KINDS, PYTHON
-from orchestrator.master.experiment import COUPLINGS, ORDERS, Order, order_of, written_order
+from orchestrator.master.experiment import COUPLINGS, ORDERS, Order, format_order, read_order
 from orchestrator.master.fmi.isolated import STEP_TIMEOUT
 from orchestrator.master.loop import LOOPS
-from orchestrator.master.observers.files import FORMATS
+from orchestrator.master.observers.files import TABLE_FORMATS
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.values import literal
 
@@ -29,7 +29,7 @@ class CliOption:
         self.help, self.how = help, how
 
 
-def options_of(declared: type[Any]) -> dict[str, CliOption]:
+def option_fields(declared: type[Any]) -> dict[str, CliOption]:
     """The fields of a dataclass that are options."""
     hints = get_type_hints(declared, include_extras=True)
     return {
@@ -105,7 +105,7 @@ class Request:
         CliOption(
             "order in which the components are stepped, or the names of all of them; default: "
             f"the scenario's, else {ORDERS[0]}",
-            type=order_of,
+            type=read_order,
             metavar=f"{'|'.join(ORDERS)}|NAME,...",
         ),
     ] = None
@@ -171,13 +171,13 @@ class Request:
     def command_line(self) -> str:
         """What a user types after `auv-fmu run`."""
         words, untouched = [self.scenario], Request()
-        for name, one in options_of(Request).items():
+        for name, one in option_fields(Request).items():
             value = getattr(self, name)
             if value == getattr(untouched, name):
                 continue
             words.append(flag(name))
             if one.how.get("action") != "store_true":
-                words.append(written_order(value) if name == "order" else _text(value))
+                words.append(format_order(value) if name == "order" else _text(value))
         for name, value in self.parameters.items():
             words += ["--set", f"{name}={_text(value)}"]
         # There is no option for these.
@@ -204,7 +204,9 @@ class Files:
             metavar="outputs|all|PATTERN,...",
         ),
     ] = "all"
-    format: Annotated[str, CliOption("of the table; default: csv", choices=tuple(FORMATS))] = "csv"
+    format: Annotated[
+        str, CliOption("of the table; default: csv", choices=tuple(TABLE_FORMATS))
+    ] = "csv"
     no_figures: Annotated[bool, CliOption("draw none; default: draw", action="store_true")] = False
     checkpoint_every: Annotated[
         float | None,

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any
 from fmus.kinds import PYTHON
 from orchestrator.figures.plot import plot
 from orchestrator.machine.errors import InputError, did_you_mean, reason
-from orchestrator.master.experiment import Order, written_order
+from orchestrator.master.experiment import Order, format_order
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.loop import LOOPS
-from orchestrator.master.observers.files import FORMATS
+from orchestrator.master.observers.files import TABLE_FORMATS
 from orchestrator.master.observers.observer import Observer, Occurrence, Progress
 from orchestrator.master.observers.table import Table
-from orchestrator.runs.folder import locked, replaced
-from orchestrator.runs.loading import check_brings_its_own, loaded, warned
+from orchestrator.runs.folder import lock_folder, replace_files
+from orchestrator.runs.loading import check_brings_its_own, load_scenario, notes_as_warnings
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.record import (
     FILES,
@@ -98,7 +98,7 @@ class Result(Table):
         first, last = (self.time[0], self.time[-1]) if len(self) else (0.0, 0.0)
         return (
             f"<Result {self._prepared.scenario.name}: {len(self)} rows of {len(self.columns)} "
-            f"columns, {first:g} to {last:g} s, {written_order(self.header.experiment.order)}{end}>"
+            f"columns, {first:g} to {last:g} s, {format_order(self.header.experiment.order)}{end}>"
         )
 
     @cached_property
@@ -170,11 +170,11 @@ class Result(Table):
             ValueError: the folder cannot be written, or there is no such format.
 
         """
-        if format not in FORMATS:
-            raise InputError(f"format {format!r}: use one of {', '.join(FORMATS)}")
+        if format not in TABLE_FORMATS:
+            raise InputError(f"format {format!r}: use one of {', '.join(TABLE_FORMATS)}")
         folder = Path(folder)
-        with replaced(folder, FILES, force=force) as unfinished:
-            table = FORMATS[format](unfinished / f"result.{format}")
+        with replace_files(folder, FILES, force=force) as unfinished:
+            table = TABLE_FORMATS[format](unfinished / f"result.{format}")
             table.begin(self.header)
             table.take(self.rows)
             table.end(self.ending)
@@ -263,8 +263,8 @@ def simulate(
             raise InputError(f"{system}: has no variants; give it to load")
         scenario = Scenario(system.name)
     else:
-        with warned(strict) as findings:
-            scenario, system = loaded(str(system), kind, variant=variant, findings=findings)
+        with notes_as_warnings(strict) as findings:
+            scenario, system = load_scenario(str(system), kind, variant=variant, findings=findings)
     if not isinstance(parameters, Mapping | None):
         raise InputError(f"parameters: a mapping by component.parameter, not {parameters!r}")
     request = Request(
@@ -284,7 +284,7 @@ def simulate(
     )
     prepared = prepare(scenario, system, request)
     if is_named:
-        with warned(strict) as findings:
+        with notes_as_warnings(strict) as findings:
             for doubt in prepared.doubts():
                 findings.note(doubt)
             findings.refuse()
@@ -313,7 +313,7 @@ def _checkpoints(
     place = Path(folder)
     try:
         place.mkdir(parents=True, exist_ok=True)
-        with locked(place):
+        with lock_folder(place):
             yield checkpoints_of([prepared], [place], every, resume)
     except OSError as error:
         raise InputError(f"cannot write into {place}: {reason(error)}") from error

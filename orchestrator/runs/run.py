@@ -24,7 +24,7 @@ from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.hooks.timing import RealTime
-from orchestrator.master.observers.files import FORMATS
+from orchestrator.master.observers.files import TABLE_FORMATS
 from orchestrator.master.observers.observer import (
     Ending,
     Observer,
@@ -34,7 +34,7 @@ from orchestrator.master.observers.observer import (
     matches,
     matching,
 )
-from orchestrator.runs.folder import INCOMPLETE, inner, place_of, publish, replaced
+from orchestrator.runs.folder import INCOMPLETE, inner_folder, place_of, publish, replace_files
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.record import (
     CHECKPOINTS,
@@ -49,7 +49,7 @@ from orchestrator.runs.request import Files
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import file_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.cautions import cautions, cautions_after, cautions_beside, watched
+from orchestrator.vehicle.cautions import cautions, cautions_after, cautions_beside, watched_columns
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.proof import CertificatesFile
 from orchestrator.vehicle.signals import Loop, suffixes
@@ -123,11 +123,11 @@ def run_into(
     ]
     with (
         held_interrupts() as interrupts,
-        replaced(folder, names, force=files.force, keep=lambda: bool(done)) as unfinished,
+        replace_files(folder, names, force=files.force, keep=lambda: bool(done)) as unfinished,
     ):
         kept = checkpoints_of(
             runs,
-            [inner(folder, CHECKPOINTS, *filter(None, [below])) for below in folders],
+            [inner_folder(folder, CHECKPOINTS, *filter(None, [below])) for below in folders],
             files.checkpoint_every,
             files.resume,
             files.force,
@@ -200,9 +200,9 @@ class _Running:
         loops = prepared.loops
         self._metrics = Metrics(loops)
         # Without figures only the cautions look at what was seen.
-        seen = watched if files.no_figures else Loop.drawn
+        seen = watched_columns if files.no_figures else Loop.drawn
         self.seen = VisibleRows({name for loop in loops for name in seen(loop)})
-        self._table = FORMATS[files.format](folder / f"result.{files.format}")
+        self._table = TABLE_FORMATS[files.format](folder / f"result.{files.format}")
         self.observers: list[Observer] = [
             Selection(self._table, files.interval, columns),
             *(

@@ -18,19 +18,19 @@ from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.vehicle import Vehicle
 from orchestrator.formats.tables import read_columns, read_rows, records
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.user_files import explained, names_in, path_of, text_of
+from orchestrator.machine.user_files import explain_errors, find_toml, names_in, read_text
 from orchestrator.master.experiment import Order
 from orchestrator.master.hooks.timing import InputTable
-from orchestrator.system.names import PortName, file_name, flattened, port_name
+from orchestrator.system.names import PortName, file_name, flatten, port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import finite, type_of, typed
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
 #: What a message calls a file that cannot be read.
-_WHAT = "not a scenario"
+_NOT_A_SCENARIO = "not a scenario"
 
 #: Scenarios that come with the bundle.
-FOLDER = Path(__file__).parent / "scenarios"
+SCENARIOS_FOLDER = Path(__file__).parent / "scenarios"
 
 #: What is run besides the scenarios that come with the bundle.
 _OTHERS = "a .toml, .ssp, .ssd or .fmu file, an OspSystemStructure.xml, or a folder with a .ssd"
@@ -116,7 +116,7 @@ class Scenario:
 
 def names() -> list[str]:
     """Scenarios that come with the bundle."""
-    return names_in(FOLDER)
+    return names_in(SCENARIOS_FOLDER)
 
 
 def read_scenario(name: str) -> Scenario:
@@ -126,9 +126,9 @@ def read_scenario(name: str) -> Scenario:
         InputError: there is no such scenario, or its file has a mistake.
 
     """
-    path = path_of(name, FOLDER, "scenario", _OTHERS)
-    text = text_of(path, _WHAT)
-    with explained(path, _WHAT):
+    path = find_toml(name, SCENARIOS_FOLDER, "scenario", _OTHERS)
+    text = read_text(path, _NOT_A_SCENARIO)
+    with explain_errors(path, _NOT_A_SCENARIO):
         return _scenario(path, text)
 
 
@@ -150,7 +150,7 @@ def _scenario(path: Path, text: str) -> Scenario:
     content = tomllib.loads(text)
     ScenarioFile.check(path, content)
     content["parameters"] = {
-        port_name(key): value for key, value in flattened(content.get("parameters", {}))
+        port_name(key): value for key, value in flatten(content.get("parameters", {}))
     }
     if "path" in content:
         said, others = content.pop("path"), content["parameters"]
@@ -161,7 +161,7 @@ def _scenario(path: Path, text: str) -> Scenario:
     if "inputs" in content:
         said = content["inputs"]
         content["inputs"] = Inputs(**said | {"file": path.parent / said["file"]})
-    content["ours"] = {key: str(why) for key, why in flattened(content.get("ours", {}))}
+    content["ours"] = {key: str(why) for key, why in flatten(content.get("ours", {}))}
     content["components"] = {
         component: str(path.parent / fmu) if fmu.endswith(".fmu") else fmu
         for component, fmu in content.get("components", {}).items()

@@ -21,7 +21,7 @@ from orchestrator.master.hooks.events import (
     Stop,
 )
 from orchestrator.master.hooks.timing import InputTable
-from orchestrator.system.names import PortName, flattened, port_name, splits
+from orchestrator.system.names import PortName, flatten, port_name, splits
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import Linear, Mapped
 from orchestrator.system.values import INTEGERS, finite, is_finite, literal, type_of, typed
@@ -100,7 +100,7 @@ def _event(table: Mapping[str, Any], system: System) -> Event:
 def _things(value: Any) -> Iterator[str]:
     """What an event acts on, in words."""
     if isinstance(value, Mapping):
-        yield from (f"{name} = {_shown(one)}" for name, one in flattened(value))
+        yield from (f"{name} = {_shown(one)}" for name, one in flatten(value))
     else:
         yield from [value] if isinstance(value, str) else value
 
@@ -203,7 +203,7 @@ def _altered(
     """The inputs that some signals reach, with what arrives there of their values."""
     return tuple(
         (route.target if route else port, arriving(system, port, route, one))
-        for name, value in flattened(values)
+        for name, value in flatten(values)
         for port, one in _members(name, value, _ports(system, name, ("input", "output")))
         for route in _routes(system, port)
     )
@@ -250,7 +250,7 @@ def _text(value: Any) -> Any:
 def _set(values: Mapping[str, Any], system: System) -> Action:
     fed = {connection.target: connection.source for connection in system.connections}
     parameters, inputs = [], []
-    for name, value in flattened(values):
+    for name, value in flatten(values):
         for port, one in _members(name, value, _ports(system, name, ("parameter", "input"))):
             variable = system.component(port.component).variable(port.port)
             if port in fed:

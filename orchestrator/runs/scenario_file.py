@@ -12,7 +12,7 @@ from orchestrator.runs.scenario_events import ACTIONS
 from orchestrator.vehicle.signals import STANDARD
 
 #: What an input does between two rows of its table; the first is the default.
-WAYS = ("linear", "hold")
+INTERPOLATIONS = ("linear", "hold")
 
 #: Actions of an event after which there is nothing left that could end.
 _AT_ONCE = ("release", "reset", "stop")
@@ -40,10 +40,10 @@ class InputsTable(TomlTable):
         "that nothing feeds, as `component.port`.",
         '"inputs.csv"',
     )
-    between: Annotated[str, OneOf(WAYS)] = entry(
+    between: Annotated[str, OneOf(INTERPOLATIONS)] = entry(
         "What a Real input does between two rows: `linear`, or `hold`, as all others do, and Real "
         "inputs of variability `discrete`.",
-        f"`{WAYS[0]}`",
+        f"`{INTERPOLATIONS[0]}`",
     )
 
 

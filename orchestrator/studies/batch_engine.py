@@ -283,9 +283,9 @@ def _run(
     """Call the kernel."""
     # Not installed where no studies are made.
     imported_apart("numba", ".numba_config.yaml")
-    from orchestrator.studies.batch.compilation import compiled  # noqa: PLC0415
+    from orchestrator.studies.batch.compilation import compile_run  # noqa: PLC0415
 
-    run = compiled(type(job.setting.controller))  # type: ignore[arg-type]
+    run = compile_run(type(job.setting.controller))  # type: ignore[arg-type]
     uniform = _NOISE.uniform(job.setting.plant.noise.seed)
     return run(job.setting, plan, uniform, ends, accumulators, rows, progress)
 

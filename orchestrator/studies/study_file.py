@@ -14,30 +14,30 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
-from orchestrator.figures.study_figures import KINDS, FigureEntry
+from orchestrator.figures.study_figures import FIGURE_KINDS, FigureEntry
 from orchestrator.figures.study_values import SCENARIO, is_known
 from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
-from orchestrator.machine.user_files import explained, path_of, text_of
+from orchestrator.machine.user_files import explain_errors, find_toml, read_text
 from orchestrator.master.experiment import ORDERS
 from orchestrator.runs.loading import is_path
 from orchestrator.studies.study import (
     ENGINES,
-    FOLDER,
-    LINEAR,
-    LOG,
+    LINEAR_SPACING,
+    LOG_SPACING,
     METHODS,
     MOST_RUNS,
+    NOT_A_STUDY,
     SPACINGS,
     STEP,
-    WHAT,
+    STUDIES_FOLDER,
     Range,
     Sample,
     StopTime,
     Study,
-    members,
+    norm_members,
 )
-from orchestrator.system.names import flattened, port_name
+from orchestrator.system.names import flatten, port_name
 from orchestrator.system.values import is_finite
 from orchestrator.vehicle.indices import index_columns
 
@@ -59,7 +59,7 @@ _LARGEST_SEED = 2**63 - 1
 
 def _each(fits: Callable[[Any], bool]) -> AfterValidator:
     def check(table: Mapping[str, Any]) -> Mapping[str, Any]:
-        if not all(fits(value) for _, value in flattened(table)):
+        if not all(fits(value) for _, value in flatten(table)):
             raise ValueError
         return table
 
@@ -112,8 +112,8 @@ class StopTimeTable(TomlTable):
 class FigureTable(TomlTable):
     """A figure: `[figures.NAME]`."""
 
-    kind: Annotated[str, OneOf(tuple(KINDS))] = needed(
-        "What it is.", " or ".join(f'"{kind}"' for kind in KINDS)
+    kind: Annotated[str, OneOf(tuple(FIGURE_KINDS))] = needed(
+        "What it is.", " or ".join(f'"{kind}"' for kind in FIGURE_KINDS)
     )
     x: Names = entry(
         "Value along the horizontal axis; of `bands` also several, a column of panels each; of "
@@ -130,7 +130,7 @@ class FigureTable(TomlTable):
 
     @model_validator(mode="after")
     def _has_what_its_kind_has(self) -> Self:
-        _, needs, may = KINDS[self.kind]
+        _, needs, may = FIGURE_KINDS[self.kind]
         if missing := [key for key in needs if not getattr(self, key)]:
             raise ValueError(f"lacks {' and '.join(missing)}")
         if more := self.model_fields_set - {"kind", *needs, *may}:
@@ -202,9 +202,9 @@ def read_study(name: str) -> Study:
         InputError: there is no such study, or its file has a mistake.
 
     """
-    path = path_of(name, FOLDER, "study", "a .toml file")
-    text = text_of(path, WHAT)
-    with explained(path, WHAT):
+    path = find_toml(name, STUDIES_FOLDER, "study", "a .toml file")
+    text = read_text(path, NOT_A_STUDY)
+    with explain_errors(path, NOT_A_STUDY):
         return study_of(path.stem, tomllib.loads(text), path)
 
 
@@ -229,16 +229,16 @@ def study_of(name: str, content: Mapping[str, Any], path: Path | None = None) ->
         str(path.parent / scenario) if path and is_path(scenario) else scenario
         for scenario in ([names] if isinstance(names, str) else names)
     )
-    entries["parameters"] = dict(flattened(content.get("parameters", {})))
+    entries["parameters"] = dict(flatten(content.get("parameters", {})))
     entries["vary"] = {}
-    for key, value in flattened(content.get("vary", {}), _is_range):
+    for key, value in flatten(content.get("vary", {}), _is_range):
         with findings.collecting():
             entries["vary"][key] = _values(f"{where}: vary: {key}", value)
     if "sample" in content:
         with findings.collecting():
             entries["sample"] = _sample(f"{where}: sample", content["sample"])
     if (end := content.get("stop_time")) is not None:
-        per = dict(flattened(end["per"])) if isinstance(end, Mapping) else {}
+        per = dict(flatten(end["per"])) if isinstance(end, Mapping) else {}
         entries["stop_time"] = StopTime(end["base"] if isinstance(end, Mapping) else end, per)
     findings.refuse()
     study = Study(name, **entries)
@@ -258,7 +258,7 @@ def _values(where: str, value: Any) -> tuple[Any, ...]:
         raise InputError(f"{where}: write [values], or {{ from = 1.0, to = 10.0, n = 7 }}")
     GridTable.check(where, value)
     low, high, spacing = _range(where, value)
-    between = np.geomspace if spacing == LOG else np.linspace
+    between = np.geomspace if spacing == LOG_SPACING else np.linspace
     return tuple(between(low, high, value["n"]).tolist())
 
 
@@ -266,22 +266,22 @@ def _range(where: str, value: Any) -> Range:
     if isinstance(value, list) and len(value) == 2 and all(map(is_finite, value)):
         found = Range(*value)
     elif _is_range(value):
-        found = Range(value["from"], value["to"], value.get("spacing", LINEAR))
+        found = Range(value["from"], value["to"], value.get("spacing", LINEAR_SPACING))
     else:
         raise InputError(f"{where}: write [low, high], or {{ from = 1.0, to = 10.0 }}")
-    if found.spacing == LOG and not (found.low > 0.0 and found.high > 0.0):
-        raise InputError(f"{where}: spacing = {LOG!r} needs two positive ends")
+    if found.spacing == LOG_SPACING and not (found.low > 0.0 and found.high > 0.0):
+        raise InputError(f"{where}: spacing = {LOG_SPACING!r} needs two positive ends")
     return found
 
 
 def _sample(where: str, content: Mapping[str, Any]) -> Sample:
     findings, ranges = Findings(), {}
-    for key, value in flattened(content["range"], _is_range):
+    for key, value in flatten(content["range"], _is_range):
         with findings.collecting():
             if _is_range(value):
                 RangeTable.check(f"{where}: {key}", value)
             ranges[key] = limits = _range(f"{where}: {key}", value)
-            is_norm = key.endswith("|") and len(members(key)) in (2, 3)
+            is_norm = key.endswith("|") and len(norm_members(key)) in (2, 3)
             if key.startswith("|") and not (is_norm and min(limits.low, limits.high) >= 0.0):
                 raise InputError(
                     f"{where}: {key}: a norm is of two or three numbers, and not negative"
@@ -332,7 +332,7 @@ def read_figures(
 
     """
     tables, indices = dict(figures), indices or index_columns()
-    labels = dict(flattened(tables.pop(LABELS, {})))
+    labels = dict(flatten(tables.pop(LABELS, {})))
     numbers = [name for name, kind in varied.items() if kind is not str]
     if not tables and numbers:
         tables["influence"] = {"kind": "influence", "x": numbers, "show": _usual(indices)}
@@ -353,8 +353,8 @@ def read_figures(
                 table.get("y", ""),
                 _listed(table.get("show", ())),
                 _listed(table.get("by", by)),
-                dict(flattened(table.get("where", {}))),
-                dict(flattened(table.get("limits", {}))),
+                dict(flatten(table.get("where", {}))),
+                dict(flatten(table.get("limits", {}))),
                 labels,
             )
         )
@@ -396,5 +396,5 @@ def _check_figure(
 
 def _listed(value: Any) -> list[str]:
     if isinstance(value, Mapping):
-        return [name for name, _ in flattened(value)]
+        return [name for name, _ in flatten(value)]
     return [value] if isinstance(value, str) else list(value)

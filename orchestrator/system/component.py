@@ -15,7 +15,7 @@ import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable, ValidationError
 
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason, shortened
-from orchestrator.machine.user_files import folder_of, unpacked
+from orchestrator.machine.user_files import unpack, unpacked_folder
 from orchestrator.system.values import Value, finite, integer, real, typed
 
 _CAUSALITIES = {"parameter", "calculatedParameter", "input", "output", "local", "independent"}
@@ -161,7 +161,7 @@ class Component:
             InputError: it was read in another process, and the file is another one now.
 
         """
-        return folder_of(self.fmu, self.digest)
+        return unpacked_folder(self.fmu, self.digest)
 
     @cached_property
     def variables(self) -> dict[str, ModelVariable]:
@@ -291,7 +291,7 @@ def read_component(
         InputError: the file is missing or is no such FMU for co-simulation.
 
     """
-    folder, digest = unpacked(fmu)
+    folder, digest = unpack(fmu)
     found = described(fmu, folder, tuple(versions))
     if findings is not None and (remark := found.remark()):
         findings.note(f"{name}: the description of {fmu.name} is not valid: {remark}")

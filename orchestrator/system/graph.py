@@ -41,7 +41,7 @@ def derived_order(system: System, solved: Sequence[Sequence[str]] = ()) -> list[
 
     No order does that for every connection of a ring. The component of the ring that stands first
     in the system then comes first, and takes one step late what feeds it; where the others are a
-    ring still, it is opened in the same way: see :func:`delayed`.
+    ring still, it is opened in the same way: see :func:`delayed_connections`.
 
     Args:
         system: that is stepped.
@@ -64,7 +64,7 @@ def derived_order(system: System, solved: Sequence[Sequence[str]] = ()) -> list[
     return [member for name in order for member in ring_of.get(name, (name,))]
 
 
-def delayed(
+def delayed_connections(
     system: System, order: Sequence[str], solved: Iterable[Sequence[str]] = ()
 ) -> list[Connection]:
     """The connections with direct feedthrough that an order makes one step late.
@@ -99,7 +99,9 @@ def in_stages(
     for name in order:
         ring = ring_of.get(name, [name])
         units.setdefault(ring[0], ring)
-    late = set(delayed(system, [name for unit in units.values() for name in unit], solved))
+    late = set(
+        delayed_connections(system, [name for unit in units.values() for name in unit], solved)
+    )
     feeding: dict[str, set[str]] = {name: set() for name in order}
     for connection in system.connections:
         if has_feedthrough(system, connection) and connection not in late:

@@ -16,7 +16,7 @@ from orchestrator.system.values import unit_of
 _MOST_PAIRS = 1000
 
 #: The base units of FMI 2.0 and SSP 1.0, in the order of :attr:`Unit.exponents`.
-BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,8 @@ class Mapped:
 Transformation: TypeAlias = Linear | Mapped
 
 
-def chained(first: Transformation | None, then: Transformation | None) -> Transformation | None:
-    """Two transformations, one after the other, as one; None leaves a value as it is.
+def combine(first: Transformation | None, then: Transformation | None) -> Transformation | None:
+    """Combine two transformations, one after the other; None leaves a value as it is.
 
     Raises:
         InputError: one is linear, and the other a table; no number holds what they come to; or
@@ -89,7 +89,7 @@ class Unit:
 
     Attributes:
         name: as connectors and variables write it.
-        exponents: of :data:`BASES`; None: nothing defines this unit.
+        exponents: of :data:`BASE_UNITS`; None: nothing defines this unit.
 
     """
 
@@ -112,7 +112,7 @@ def _defined(component: Component, name: str) -> Unit:
     for unit in component.description.unitDefinitions:
         if unit.name == name and unit.baseUnit is not None:
             base: Any = unit.baseUnit
-            exponents = tuple(int(getattr(base, of, 0) or 0) for of in BASES)
+            exponents = tuple(int(getattr(base, of, 0) or 0) for of in BASE_UNITS)
             return Unit(name, exponents, float(base.factor), float(base.offset))
     return Unit(name)
 

@@ -22,7 +22,7 @@ from typing import Any
 import fmpy
 import pytest
 
-from fmus.python.own import build_own
+from fmus.python.own import build_script
 from fmus.python.packaging import loader_compiler
 from support.fmi3 import Fmi3Library
 from support.kinds import FIXTURES
@@ -508,7 +508,7 @@ class Slow(Fmi2Slave):
 
 def test_child_that_is_forked_waits_for_no_thread_of_its_parent(python, tmp_path):
     (tmp_path / "slow.py").write_text(SLOW)
-    fmpy.extract(build_own(tmp_path / "slow.py", tmp_path), unzipdir=tmp_path / "slow")
+    fmpy.extract(build_script(tmp_path / "slow.py", tmp_path), unzipdir=tmp_path / "slow")
     subprocess.run(
         [sys.executable, "-c", FORKS, tmp_path / "slow", python.folder],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
@@ -553,7 +553,7 @@ class Foreign(Fmi2Slave):
 def foreign(tmp_path_factory: pytest.TempPathFactory) -> Library:
     folder = tmp_path_factory.mktemp("foreign")
     (folder / "foreign_slave.py").write_text(FOREIGN)
-    fmu = build_own(folder / "foreign_slave.py", folder)
+    fmu = build_script(folder / "foreign_slave.py", folder)
     return Library(Path(fmpy.extract(fmu, folder / "unpacked")))
 
 

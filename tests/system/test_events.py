@@ -21,7 +21,7 @@ from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS
 from orchestrator.master.observers.table import Table
-from orchestrator.runs.loading import loaded
+from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
@@ -297,7 +297,9 @@ def test_what_is_said_of_the_scenarios_is_so(name):
     scenario = read_scenario(name)
     [event] = scenario.events
     begin, end = event["at"], event["at"] + event.get("for", 0.0)
-    own = prepare(scenario, loaded(name, "native")[1], Request(kind="native", loop="compiled"))
+    own = prepare(
+        scenario, load_scenario(name, "native")[1], Request(kind="native", loop="compiled")
+    )
     for prepared in with_companion(own, Request(kind="native", loop="compiled")):
         table = Table()
         prepared.run([table])

@@ -21,7 +21,7 @@ from lxml import etree
 
 from orchestrator.formats.ssp import NAMESPACES, STRUCTURE
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason
-from orchestrator.machine.user_files import check_file, is_folder, unpacked
+from orchestrator.machine.user_files import check_file, is_folder, unpack
 from orchestrator.system.names import listed
 from orchestrator.system.units import Linear, UndefinedUnit, Unit, conversion
 from orchestrator.system.values import finite, integer
@@ -160,7 +160,7 @@ class Archive:
         is_whole = is_folder(path)
         self._is_packed = not is_whole and path.suffix not in _LOOSE
         if self._is_packed:
-            self.folder = unpacked(path).folder
+            self.folder = unpack(path).folder
         else:
             self.folder = path.resolve() if is_whole else path.resolve().parent
 

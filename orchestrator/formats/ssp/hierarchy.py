@@ -12,7 +12,7 @@ from orchestrator.formats.ssp.archive import Archive
 from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import listed
-from orchestrator.system.units import BASES, Unit, Units, unit_of_port
+from orchestrator.system.units import BASE_UNITS, Unit, Units, unit_of_port
 from orchestrator.system.values import FMI2_NAMES, items_of, type_of
 
 #: An enumeration's values by the names of its items.
@@ -56,7 +56,7 @@ def definitions_of(archive: Archive, root: Element, outer: Definitions) -> Defin
         if base is not None:
             units[name] = Unit(
                 name,
-                tuple(archive.integer(base, of) for of in BASES),
+                tuple(archive.integer(base, of) for of in BASE_UNITS),
                 archive.number(base, "factor", 1.0),
                 archive.number(base, "offset", 0.0),
             )

@@ -22,7 +22,7 @@ from orchestrator.formats.ssp.hierarchy import (
 )
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.names import listed
-from orchestrator.system.units import Linear, Mapped, Transformation, Unit, chained
+from orchestrator.system.units import Linear, Mapped, Transformation, Unit, combine
 from orchestrator.system.values import BOOLEANS, finite
 
 _TABLES = (
@@ -120,13 +120,13 @@ class Segment:
         """
         step = self.stated
         if self.converts:
-            step = chained(archive.conversion(unit, self.unit), step)
+            step = combine(archive.conversion(unit, self.unit), step)
             # What a transformation makes of a value is in the target's unit, or unknown.
             unit = self.unit or (unit if self.stated is None else None)
         else:
             # Said even where it changes nothing: the units at its ends may differ.
             step, unit = step or Linear(), self.unit
-        return chained(whole, step), unit
+        return combine(whole, step), unit
 
 
 def segments_of(archive: Archive, top: Group) -> dict[Node, Segment]:
@@ -240,7 +240,7 @@ class Given:
             stated = _transformation(self.entry, self.items, target.items)
             if not _converts_units(self.entry):
                 return stated
-        return chained(archive.conversion(self.unit, target.unit), stated)
+        return combine(archive.conversion(self.unit, target.unit), stated)
 
 
 #: What is given to nodes, and what is known of each of these.

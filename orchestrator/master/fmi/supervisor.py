@@ -23,7 +23,7 @@ from subprocess import PIPE, Popen, TimeoutExpired
 from time import monotonic
 from typing import Any
 
-from orchestrator.machine.errors import plain
+from orchestrator.machine.errors import escape_unprintable
 from orchestrator.master.fmi.isolated import FAREWELL
 from orchestrator.master.fmi.worker import serve
 from orchestrator.system.component import Component
@@ -182,7 +182,7 @@ class _Captured:
         with suppress(BlockingIOError):
             text = os.read(self._descriptor, _PIPE)
             if self._left > 0:
-                shown = plain(self._decoded(text[: self._left]), "\n\t")
+                shown = escape_unprintable(self._decoded(text[: self._left]), "\n\t")
                 _show(shown.encode())
                 self._left -= len(text)
                 if self._left <= 0:

@@ -40,7 +40,7 @@ def _functions() -> Iterator[Callable[..., object]]:
 _take_default, _get, _set = _functions()
 
 
-def put_back() -> None:
+def restore_mode() -> None:
     """Take on the default mode after a call of an FMU, if numbers are others in the present one.
 
     To look is a third of what it costs to take it on.
@@ -134,7 +134,7 @@ class Surroundings:
 
 
 @contextmanager
-def within(folder: Path) -> Iterator[None]:
+def within_folder(folder: Path) -> Iterator[None]:
     """Make a folder the current one for a while; the one before may have been deleted."""
     if not hasattr(os, "fchdir"):
         with chdir(folder):

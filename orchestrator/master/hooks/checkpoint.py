@@ -25,9 +25,9 @@ from uuid import uuid4
 
 import numpy as np
 
-from orchestrator.machine.disk import sealed, to_disk, unsealed, write_whole
+from orchestrator.machine.disk import sealed, sync_to_disk, unsealed, write_whole
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.ledger import moved_aside
+from orchestrator.machine.ledger import move_aside
 from orchestrator.master.fmi.instance import Log
 from orchestrator.master.hooks.hook import NEVER, Lasting, Run
 from orchestrator.master.observers.observer import Ending, Header, NotKept
@@ -141,7 +141,7 @@ class RowLog:
     def to_disk(self) -> str:
         """Have all rows outlast the process, and a power cut; their digest is given back."""
         self._file.flush()
-        to_disk(self._path)
+        sync_to_disk(self._path)
         return self._digest.hexdigest()
 
     def close(self) -> None:
@@ -259,7 +259,7 @@ class Checkpoints:
                 raise
             for path in (self.folder / _STATE, self.folder / _ROWS):
                 if os.path.lexists(path):
-                    moved_aside(path)
+                    move_aside(path)
             return None
         return found
 

@@ -9,8 +9,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import completed, simulate
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan, simulate_to_end
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 from support.linear import SINE, Part, linear, system_of
@@ -47,7 +47,7 @@ class Watching:
 
 def test_rows_are_those_of_the_solution_from_the_start_to_the_end(system: System):
     table = Table()
-    ending = simulate(planned(system, EXPERIMENT), [table])
+    ending = simulate_plan(make_plan(system, EXPERIMENT), [table])
     assert (ending.failure, ending.messages, len(table)) == (None, (), 9)
     np.testing.assert_array_equal(table.time, 0.125 * np.arange(9))
     np.testing.assert_allclose(table["sine.y0"], np.sin(table.time), atol=1e-12)
@@ -57,7 +57,7 @@ def test_rows_are_those_of_the_solution_from_the_start_to_the_end(system: System
 
 def test_observers_are_told_header_rows_and_end(system: System):
     told: list[object] = []
-    ending = simulate(planned(system, EXPERIMENT), [Watching(told)])
+    ending = simulate_plan(make_plan(system, EXPERIMENT), [Watching(told)])
     header, *blocks, last = told
     assert header.parameters[port_name("sine.x1")] == 1.0
     assert header.experiment == EXPERIMENT
@@ -68,7 +68,7 @@ def test_observers_are_told_header_rows_and_end(system: System):
 def test_an_observer_that_fails_keeps_no_other_from_its_end(system: System):
     told: list[object] = []
     with pytest.raises(ValueError, match="no room"):
-        simulate(planned(system, EXPERIMENT), [Watching(told), Watching([], fails=True)])
+        simulate_plan(make_plan(system, EXPERIMENT), [Watching(told), Watching([], fails=True)])
     header, ending = told
     assert isinstance(header, Header) and mentions(ending.failure, "no room")
 
@@ -76,8 +76,8 @@ def test_an_observer_that_fails_keeps_no_other_from_its_end(system: System):
 def test_a_value_that_is_not_finite_ends_the_run_before_its_row(system: System):
     table = Table()
     grows = system.with_parameters({port_name("sine.A00"): 1e308, port_name("sine.x0"): 1.0})
-    ending = simulate(planned(grows, EXPERIMENT), [table])
+    ending = simulate_plan(make_plan(grows, EXPERIMENT), [table])
     assert mentions(ending.failure, "0.125 sine.y0")
     assert len(table) == 1
     with pytest.raises(InputError, match="sine"):
-        completed(planned(grows, EXPERIMENT))
+        simulate_to_end(make_plan(grows, EXPERIMENT))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.loading import load, loaded
+from orchestrator.runs.loading import load, load_scenario
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import (
@@ -174,7 +174,7 @@ def test_a_value_beside_the_table_is_refused(tmp_path):
         read_table(tmp_path, "time,plant.tau.u\n0,1\n", given=[U])
     # On the command line it wins over what the scenario has.
     inputs = tmp_path / "inputs.csv"
-    prepared = prepare(*loaded("fig3a", "native"), Request(kind="native", inputs=inputs))
+    prepared = prepare(*load_scenario("fig3a", "native"), Request(kind="native", inputs=inputs))
     assert prepared.system.parameters[U] == 1.0
     assert np.array_equal(prepared.input_table.values, [[1.0]])
 

@@ -1,4 +1,4 @@
-"""What a component defines, in one as small as can be, dx/dt = gain a, seen as b; and its class."""
+"""A slave of a component as small as can be, dx/dt = gain a, seen as b; and how slaves are made."""
 
 from __future__ import annotations
 
