@@ -46,7 +46,7 @@ _PLACE = re.compile(r"\[\d+\]\.")
 _NATIVE = """\
 ## What it is made of
 
-This FMU holds libraries and needs nothing but the C library of its platform, no Python. They were
+This FMU holds libraries and needs only the C library of its platform, no Python. They were
 compiled from the C sources in its folder `sources`, which any importer can compile for another
 platform: one file that includes all others. The equations in them were translated from the Python
 text that the FMU's twin runs, so both give the same numbers."""
