@@ -147,8 +147,8 @@ class Store:
             for *row, checksum in self._database.execute("SELECT * FROM outcomes ORDER BY number"):
                 if checksum != self._checksum(*row):
                     raise InputError(
-                        f"{self._path}: damaged: run {row[0]} is not as it was written; move it, "
-                        "or let --force move the study aside and begin anew"
+                        f"{self._path}: damaged: run {row[0]} was changed since it was written; "
+                        "move it, or let --force move the study aside and start over"
                     )
                 yield row[0], row[1], row[2]
 
@@ -323,7 +323,7 @@ class StudyResult(Mapping[str, np.ndarray]):
         self.folder = folder
         for path in (folder / TABLE, folder / RECORD):
             if not located(path).is_file():
-                raise InputError(f"{folder}: holds no study that is done: no {path.name}")
+                raise InputError(f"{folder}: holds no finished study: no {path.name}")
             if is_changed(path):
                 raise InputError(f"{path}: damaged, or changed since the study wrote it")
 
