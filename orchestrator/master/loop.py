@@ -98,7 +98,9 @@ def chosen(wanted: str, experiment: Experiment, isolation: Isolation | None = No
         raise InputError(f"loop {wanted!r}: use one of {', '.join(LOOPS)}")
     if wanted == "compiled":
         if isolation:
-            raise InputError("the compiled loop steps no isolated FMUs: leave one of the two out")
+            raise InputError(
+                "the compiled loop cannot step isolated FMUs: leave one of the two out"
+            )
         return _compiled(kept() or made())
     if wanted == "auto" and not isolation and experiment.rows > _SET_UP:
         if library := kept():
