@@ -50,7 +50,7 @@ def unsealed(text: str) -> dict[str, Any]:
     """
     content = json.loads(text)
     if not isinstance(content, dict) or _SEAL not in content:
-        raise ValueError("it has no checksum of its own")
+        raise ValueError("it has no checksum")
     if content.pop(_SEAL) != _checksum(content) or sealed(content) != text:
         raise ValueError("it is damaged: its checksum differs")
     return content

@@ -228,7 +228,7 @@ class Ledger:
         if found is None and os.path.lexists(path) and path.lstat().st_size:
             if not self._force:
                 raise Taken(
-                    f"{path} is damaged, or not by auv-fmu: which files it wrote cannot be told; "
+                    f"{path} is damaged, or not by auv-fmu: its own files are unknown; "
                     "choose another place (--out), or let --force move it aside"
                 )
             moved_aside(path)

@@ -246,7 +246,7 @@ def archive_of(archive: Path, digest: str) -> bytes:
 
 def _check_same(archive: Path, now: str, digest: str) -> None:
     if now != digest:
-        raise InputError(f"{archive}: has changed since it was read; begin anew")
+        raise InputError(f"{archive}: has changed since it was read; start over")
 
 
 def _unpacked(archive: Path, file: BufferedReader) -> Unpacked:
@@ -315,7 +315,7 @@ def _check_room(whole: _Whole, files: int, size: int) -> None:
     if (together := sum(others.values()) + size) > _MOST_OF_A_PROCESS:
         raise ValueError(
             f"it unpacks to {size:,} bytes, and all archives of this process to {together:,}, more "
-            f"than {_MOST_OF_A_PROCESS:,}: run them in processes of their own"
+            f"than {_MOST_OF_A_PROCESS:,}: run them in separate processes"
         )
 
 
