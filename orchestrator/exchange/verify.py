@@ -197,7 +197,7 @@ def _first_difference(
         accepted = tolerance * max(1.0, float(np.abs(expected).max()))
         # What is shown before the first step depends on how a tool exchanges initial values.
         with np.errstate(over="ignore"):
-            # A value that is no number differs.
+            # A value that is not a number differs.
             wrong = np.flatnonzero(~(np.abs(column - expected) <= accepted) & (time > 0.0))
         if len(wrong) and (first is None or time[wrong[0]] < first[0]):
             k = wrong[0]

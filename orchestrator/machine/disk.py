@@ -45,7 +45,7 @@ def unsealed(text: str) -> dict[str, Any]:
     """The content of a record that is as it was written.
 
     Raises:
-        ValueError: it is not, or is no such record.
+        ValueError: it is not, or is not such a record.
 
     """
     content = json.loads(text)

@@ -62,7 +62,7 @@ def values_with_units(values: Sequence[float], units: Iterable[str]) -> str:
 
 def plain(text: str) -> str:
     """A text of one line in which Markdown sees no mark."""
-    # An underscore within a name is none.
+    # An underscore within a name is not emphasis.
     marks = r"[\\`*{}\[\]<>#|&]|(?<![^\W_])_|_(?![^\W_])"
     return re.sub(marks, r"\\\g<0>", " ".join(text.split()))
 

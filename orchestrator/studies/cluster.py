@@ -48,7 +48,7 @@ def cluster(address: str, engine: Engine) -> Iterator[Crew]:
 
     """
     with silence_logging_cmgr(CRITICAL), _connected(address) as client:
-        # Under a name of its own: another client may be at the same study.
+        # Under a unique name: another client may be at the same study.
         name = f"auv-fmu-{client.id}"
         try:
             client.register_plugin(_Share(engine), name)

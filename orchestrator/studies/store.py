@@ -196,7 +196,7 @@ def store(
         folder: of the study, made if it does not exist.
         record: of the study; what it says under `made_of` must be what was done there before.
         indices: the columns of what comes out of a run.
-        force: move aside what is there otherwise, and begin anew.
+        force: move aside anything else that is there, and start over.
 
     Raises:
         InputError: the folder holds another study, cannot be written, or is being written into.

@@ -44,7 +44,7 @@ from orchestrator.vehicle.indices import index_columns
 #: What a figure may be called: its files are.
 _NAME = re.compile(r"[\w-]+")
 
-#: The table that is no figure.
+#: The table that is not a figure.
 LABELS = "labels"
 
 #: What is shown of a study whose file does not say it: of each vehicle, and of all together.
