@@ -68,7 +68,7 @@ def shape_of(kind: Any) -> Shape:
         hints = get_type_hints(kind)
         parts = tuple((f".{name}", shape_of(hint)) for name, hint in hints.items())
         return Structure(kind.__name__, parts, kind)
-    raise TypeError(f"{kind} is no type of the language of equations")
+    raise TypeError(f"{kind} is not a type in the language of equations")
 
 
 def structure(items: list[Shape], name: str | None = None) -> Structure:
@@ -189,7 +189,7 @@ class Program:
             shape = DOUBLE if type(value) is float else INTEGER
             text = repr(value)
         else:
-            raise Untranslatable(f"{name} is no number")
+            raise Untranslatable(f"{name} is not a number")
         self.constants.setdefault(name, f"static const {shape.name} {name} = {text};")
         return shape
 

@@ -17,7 +17,7 @@ _HEAD = """\
  *
  * Translated from the Python text of its equations, function by function, in the order in which
  * they need each other. A name begins with the module that the function stands in. The numbers in
- * brackets are those of the equations in "Three-dimensional tracking control of autonomous
+ * brackets are the equation numbers of "Three-dimensional tracking control of autonomous
  * underwater vehicles with limited torque and without velocity sensors".
  */
 #include "arithmetic.h"

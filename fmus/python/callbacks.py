@@ -154,7 +154,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
             self.log("", status, ANSWER)
 
     def say(self, message: str, status: Fmi2Status, key: str | None = None) -> None:
-        """Log a message, the first time only that its key, or else its text, comes up.
+        """Log a message only the first time that its key, or else its text, occurs.
 
         The host adds the name of the instance.
         """
@@ -266,7 +266,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
 
 def describe_error(error: BaseException) -> str:
-    """Say in one line what speaks against something; what is no refusal of ours with its class."""
+    """Give the reason in an exception; one that is not a Refusal is named by its type."""
     if isinstance(error, Refusal):
         return str(error)
     return f"{place(error)}{type(error).__name__}: {error}"

@@ -1,4 +1,4 @@
-"""`auv-fmu export`, `hosts` and `verify`: what is exchanged with other tools."""
+"""`auv-fmu export`, `hosts` and `verify`: exchange systems and results with other tools."""
 
 from __future__ import annotations
 
@@ -60,39 +60,40 @@ def add_export(parser: argparse.ArgumentParser) -> None:
 def add_hosts(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu hosts`."""
     parser.add_argument(
-        "host", nargs="*", metavar="HOST", help=f"of {', '.join(HOSTS)}; default: all"
+        "host", nargs="*", metavar="HOST", help=f"one of {', '.join(HOSTS)}; default: all"
     )
     _add_scenario(parser)
     add_options(parser, Request, "kind")
     parser.add_argument(
-        "--steps", type=int, default=5000, metavar="N", help="how many; default: 5000"
+        "--steps", type=int, default=5000, metavar="N", help="number of steps; default: 5000"
     )
     parser.set_defaults(action=_hosts)
 
 
 def add_verify(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu verify`."""
-    parser.add_argument("table", type=Path, metavar="RESULT.csv", help="with a column `time`")
+    parser.add_argument("table", type=Path, metavar="RESULT.csv", help="table with a column `time`")
     _add_scenario(parser)
     parser.add_argument(
         "--tolerance",
         type=float,
         default=1e-6,
-        help="relative to the larger of one and the port's largest value; default: 1e-6",
+        help="largest deviation, relative to the larger of 1 and the port's largest value; "
+        "default: 1e-6",
     )
     parser.add_argument(
         "--order",
         type=read_order,
         metavar=f"{'|'.join(ORDERS)}|NAME,...",
-        help="in which the tool steps the components, or the names of all of them; default: "
-        f"{' and '.join(ORDERS)}, the one that fits",
+        help="order in which the tool steps the components, or the names of all of them; default: "
+        f"the better match of {' and '.join(ORDERS)}",
     )
     parser.add_argument(
         "--initial",
         choices=_INITIAL,
         default=_INITIAL[0],
-        help="whether the tool exchanges values in initialisation mode, or not before the first "
-        f"step; default: {_INITIAL[0]}",
+        help="full: the tool exchanges values in initialisation mode; none: only just before the "
+        f"first step; default: {_INITIAL[0]}",
     )
     parser.add_argument(
         "--verbose", action="store_true", help="name every column that was not compared"

@@ -45,7 +45,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         metavar="RESULT|PATTERN",
         help="folders or tables of runs, drawn over each other, and patterns such as plant.y.*; "
-        "default: errors, commands and estimates",
+        "default patterns: errors, commands and estimates",
     )
     _add_file(parser, "a .png, .svg or .pdf; default: plot.png", Path("plot.png"))
     parser.set_defaults(action=_plot)

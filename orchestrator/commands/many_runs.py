@@ -34,13 +34,13 @@ def add_report(parser: argparse.ArgumentParser) -> None:
         "scenarios",
         nargs="*",
         metavar="FILE.toml",
-        help="a scenario file to be in the report beside those of `auv-fmu list`",
+        help="a scenario file to include in the report, besides the ones of `auv-fmu list`",
     )
     parser.add_argument(
         "--studies",
         action="store_true",
-        help="hold the printed table against every reading as well, and make the ready studies, "
-        "or what is missing of them",
+        help="also compare the printed table with every reading, and make the missing runs of the "
+        "ready studies",
     )
     add_options(parser, Request, "kind")
     add_out(parser, Path("results", "report"))
@@ -63,7 +63,7 @@ def _sweep(options: argparse.Namespace) -> int:
             study, from_options(Means, options), folder, options.command, say, progress=True
         )
     except KeyboardInterrupt:
-        say(f"interrupted; {folder} keeps what is done: the same command goes on from there")
+        say(f"interrupted; {folder} keeps the finished runs: the same command goes on from there")
         return INTERRUPTED
     show(f"{study.name}: {result.runs:,} runs, of which {result.failed:,} failed")
     show(f"written to {folder}{os.sep}")

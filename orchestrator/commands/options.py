@@ -1,4 +1,4 @@
-"""Options that several commands have, what they stand for, and what is said of a run's end."""
+"""Options that several commands share, their meaning, and the report of a run's end."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def add_system(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "scenario",
         metavar="SCENARIO|FILE|DIR",
-        help="a scenario of `auv-fmu list`, a scenario file, an SSP or the folder of one that is "
-        "unpacked, an FMU, or libcosim's OspSystemStructure.xml",
+        help="a scenario of `auv-fmu list`, a scenario file, an SSP or the folder of an unpacked "
+        "one, an FMU, or libcosim's OspSystemStructure.xml",
     )
     add_variant(parser)
 
@@ -50,7 +50,7 @@ def add_options(parser: argparse.ArgumentParser, declared: type[Any], *names: st
 
 
 def from_options(declared: type[T], options: argparse.Namespace) -> T:
-    """Make a dataclass from the options that are its fields; what has none keeps its default."""
+    """Make a dataclass from the options that are its fields; other fields keep their defaults."""
     given = vars(options)
     return declared(**{name: given[name] for name in option_fields(declared) if name in given})
 
@@ -89,7 +89,7 @@ def add_out(parser: argparse.ArgumentParser, default: Path | str) -> None:
 
 
 def read_system(options: argparse.Namespace, fmi: str = FMI_VERSIONS[0]) -> tuple[Scenario, System]:
-    """Read what is run; what is not as it should be, and does no harm, becomes a warning."""
+    """Read the scenario and system to run; harmless flaws become warnings."""
     findings = Findings(options.strict)
     found = load_scenario(options.scenario, options.kind, fmi, options.variant, findings)
     for note in findings.notes:
@@ -98,7 +98,7 @@ def read_system(options: argparse.Namespace, fmi: str = FMI_VERSIONS[0]) -> tupl
 
 
 def status(name: str, ending: Ending) -> int:
-    """Exit status of a run, after saying what has happened, and what went wrong in it."""
+    """Exit status of a run, after saying what happened and what went wrong in it."""
     failure = ending.failure or ""
     for message in ending.messages:
         if not failure.endswith(f": {message}"):

@@ -61,7 +61,7 @@ def _run(options: argparse.Namespace) -> int:
                 show(f"  {note}")
         show(f"written to {finished[0].folder}{os.sep}")
         if finished[0].folder != folder:
-            say(f"{folder} keeps the whole result that was there before")
+            say(f"{folder} keeps the complete result from before")
     return max(status(run.name, run.ending) for run in finished)
 
 

@@ -1,4 +1,4 @@
-"""What the command line says: lines, and its exit status; streams may be closed or full."""
+"""What the command line says: lines, and its exit status. Streams may be closed or full."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LONGEST = 4000
 
 
 class Unheard(Exception):
-    """Standard output cannot be written, which has been said."""
+    """Standard output cannot be written, and the user has been told."""
 
 
 def fill_streams() -> None:

@@ -68,7 +68,7 @@ def compile_host(
     options = ["-std=c99", "-ffp-contract=off", "-Os" if is_windows else "-O2", f"-I{folder}"]
     options += ["-o", str(program), str(HOST_SOURCE)]
     if not is_windows:
-        options.append("-ldl")  # until glibc 2.34, dlopen is in a library of its own
+        options.append("-ldl")  # until glibc 2.34, dlopen is in a separate library
     try:
         process = run_compiler([*found, *options], LIMIT_OF_ZIG if command else None)
     except OSError as error:

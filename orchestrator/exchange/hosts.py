@@ -1,7 +1,7 @@
-"""Other co-simulation tools as hosts of the bundle, held against our own Jacobi master.
+"""Other co-simulation tools as hosts of the bundle, compared with our own Jacobi master.
 
-Every host runs in a process of its own, `python -m orchestrator.exchange.hosts HOST FOLDER STEPS
-STEP`: some leave threads behind or end the process when something is wrong.
+Every host runs in a separate process, `python -m orchestrator.exchange.hosts HOST FOLDER STEPS
+STEP`: some leave threads running or end the process when something is wrong.
 """
 
 from __future__ import annotations

@@ -197,7 +197,7 @@ class _Scene:
         ]  # fmt: skip
 
     def artists(self, row: int) -> list[Any]:
-        """What is to be drawn at a row, from back to front."""
+        """What to draw at a row, from back to front."""
         middle, width = self._middle[row], float(self._width[row, 0])
         camera = _Camera.at(middle, width)
         spacing = self._show_ground(camera, middle, width)

@@ -41,7 +41,7 @@ _STYLES = (*STYLES, (0, (7, 2)), (0, (3, 1, 1, 1, 1, 1)))
 
 
 class Plot(Figure):
-    """A figure that a notebook shows by itself."""
+    """A figure that a notebook shows without a call."""
 
     def _repr_png_(self) -> bytes:
         image = BytesIO()

@@ -158,7 +158,7 @@ FIGURES: Mapping[str, Mapping[str, Rows]] = {
     "comparison-errors": {"": ((ERRORS, LOGARITHMIC_ERRORS),)},
     # Fig. 7 in one: any number of runs.
     "overlay": {"": ((ERRORS, COMMANDS),)},
-    # Fig. 3(a): the vehicle alone.
+    # Fig. 3(a): only the vehicle.
     "open-loop-surge": {
         "": (
             (PATH,),

@@ -45,8 +45,8 @@ _ROW, _SQUARE, _LINE, _AROUND = 2.3, 4.0, 0.27, 0.5
 #: the band lies, and panels in a row, where there is one x.
 _BINS, _LOWER, _UPPER, _ABREAST = 30, 0.1, 0.9, 2
 
-#: Maps: cells along each axis of runs that are no grid; the colours end where all but a share of
-#: the cells do, for a few that are far off shall dim no others.
+#: Maps: cells along each axis of runs that do not form a grid; the colours end where all but a
+#: share of the cells do, so that a few outliers do not dim the others.
 _CELLS, _FAR = 24, 0.01
 
 #: Colours that stay apart for colour-blind eyes and in print, the one of a cell without runs, and
@@ -68,7 +68,7 @@ _TICKS, _FEW = 6, 2.5
 
 @dataclass(frozen=True)
 class FigureEntry:
-    """A figure that is to be drawn, as a study file has it.
+    """A figure to draw, as a study file has it.
 
     Attributes:
         name: of its files.
@@ -342,7 +342,7 @@ def draw_figures(
     """Draw the figures of a study, as PNG and SVG.
 
     Args:
-        plans: what is to be drawn.
+        plans: the figures to draw.
         title: heading; empty where there is one beside the figures.
         columns: of runs.parquet.
         folder: to write into.

@@ -19,7 +19,7 @@ from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import STANDARD, Loop, Needs
 
 #: Okabe and Ito's colours, which stay apart for colour-blind eyes, darkest first; every line
-#: also has a style of its own, for print.
+#: also has its own style, for print.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 STYLES = ("-", "--", "-.", ":")
 REFERENCE = "#555555"

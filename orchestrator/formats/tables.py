@@ -33,7 +33,7 @@ def read_columns(path: Path) -> tuple[str, ...]:
     """Return the names of the columns after the time.
 
     Raises:
-        InputError: the file is no table of a run.
+        InputError: the file is not the table of a run.
 
     """
     with explain_errors(path, _NO_RUN):
@@ -52,7 +52,7 @@ def read_rows(path: Path, strings: Collection[str] = ()) -> Iterator[np.ndarray]
         strings: columns that hold texts, and are left out.
 
     Raises:
-        InputError: the file is no table of a run.
+        InputError: the file is not the table of a run.
 
     """
     with explain_errors(path, _NO_RUN):
@@ -131,7 +131,7 @@ def _records(reader: Any, width: int) -> Iterator[Record]:
         line += 1
         if reader.line_num != line:
             # A lone quote, and the next one some rows later: what is between would be one value.
-            raise ValueError(f"line {line}: a value in quotes goes on in the next line")
+            raise ValueError(f"line {line}: a value in quotes continues on the next line")
         if values and len(values) != width:
             raise ValueError(f"line {line} has {len(values)} values below {width} names")
         if values:

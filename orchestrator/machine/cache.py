@@ -1,8 +1,8 @@
-"""What is made once and kept in the user's cache folder: libraries, machine code, FMUs.
+"""Libraries, machine code and FMUs, made once and kept in the user's cache folder.
 
 All of it is run, so it is taken only from folders and files that nobody but the user can write,
-and only as it was kept: the digests of its files are in a folder of their own. Nothing there is
-ever overwritten or removed. What is not as it was kept is made anew, under another name.
+and only if unchanged since it was kept: the digests of its files are in a separate folder. Nothing
+there is ever overwritten or removed. Anything that has changed is made anew, under another name.
 """
 
 from __future__ import annotations
@@ -216,7 +216,7 @@ def _keeps_others_out(status: os.stat_result, above: bool) -> bool:
     """
     mine = _is_mine(status, or_roots=above)
     open_to_others = status.st_mode & _OTHERS_WRITE and not (above and status.st_mode & S_ISVTX)
-    # What should be a folder and is none is said when it is written into.
+    # A file in place of a folder is reported when something is written into it.
     return mine and not open_to_others and (above or S_ISDIR(status.st_mode))
 
 

@@ -64,7 +64,7 @@ def run_module(
         module: as after `python -m`.
         arguments: of its command line.
         folder: that it runs in; None: the current one.
-        timeout: how long it may take [s]; None: as long as it wants.
+        timeout: how long it may take [s]; None: without limit.
 
     Raises:
         TimeoutExpired: it took longer, and was ended.
@@ -132,7 +132,7 @@ def run_compiler(command: Sequence[str], limit: float | None = None) -> Complete
 
     Args:
         command: with its arguments.
-        limit: how long it may take [s]; None: as long as this machine's.
+        limit: how long it may take [s]; None: the limit of this machine's.
 
     Raises:
         OSError: it does, or it cannot be started.

@@ -45,12 +45,12 @@ def unsealed(text: str) -> dict[str, Any]:
     """The content of a record that is as it was written.
 
     Raises:
-        ValueError: it is not, or is no such record.
+        ValueError: it is not, or is not such a record.
 
     """
     content = json.loads(text)
     if not isinstance(content, dict) or _SEAL not in content:
-        raise ValueError("it has no checksum of its own")
+        raise ValueError("it has no checksum")
     if content.pop(_SEAL) != _checksum(content) or sealed(content) != text:
         raise ValueError("it is damaged: its checksum differs")
     return content

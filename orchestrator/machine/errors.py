@@ -25,7 +25,7 @@ def reason(error: BaseException) -> str:
     if isinstance(error, MemoryError):
         return "memory is short"
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    more = [f"and {len(lines) - _MOST_LINES} lines more"] * (len(lines) > _MOST_LINES)
+    more = [f"and {len(lines) - _MOST_LINES} more lines"] * (len(lines) > _MOST_LINES)
     said = (shortened(line, _LONGEST_LINE) for line in (*lines[:_MOST_LINES], *more))
     return "; ".join(said).replace(":; ", ": ") or repr(error)
 
@@ -42,7 +42,7 @@ def unforeseen(error: Exception) -> str:
         return reason(error)
     return (
         f"{type(error).__name__}: {reason(error)}; if an FMU has changed this process, --isolate "
-        "gives it one of its own"
+        "gives it a separate one"
     )
 
 

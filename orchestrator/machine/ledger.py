@@ -43,7 +43,7 @@ Digests = dict[str, str]
 
 
 class Taken(InputError):
-    """A name that is to be written belongs to a file of the user's."""
+    """A file to be written has the name of a file of the user's."""
 
 
 class Ledger:
@@ -187,7 +187,7 @@ class Ledger:
         return {self._files.get(name), self._moving.get(name)} - {None}
 
     def _taken(self, name: str) -> Path | None:
-        """What belongs to the user where a file is to be written."""
+        """The user's files that are in the way of files to be written."""
         path = self.folder
         for part in Path(name).parts[:-1]:
             path /= part
@@ -228,7 +228,7 @@ class Ledger:
         if found is None and os.path.lexists(path) and path.lstat().st_size:
             if not self._force:
                 raise Taken(
-                    f"{path} is damaged, or not by auv-fmu: which files it wrote cannot be told; "
+                    f"{path} is damaged, or not by auv-fmu: its own files are unknown; "
                     "choose another place (--out), or let --force move it aside"
                 )
             move_aside(path)

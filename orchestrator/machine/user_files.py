@@ -43,7 +43,7 @@ _MOST_OF_A_PROCESS = 2**33
 #: Files of an archive that are read into memory, and how long they may be [bytes].
 _DESCRIPTIONS, _MOST_OF_A_DESCRIPTION = (".xml", ".ssd", ".ssv", ".ssm"), 100_000_000
 
-#: How a file begins that Git has left in the place of another one.
+#: The beginning of a file that Git has left in place of another one.
 _POINTER = b"version https://git-lfs.github.com/spec/"
 
 #: Runs in several threads share what is unpacked.
@@ -92,7 +92,7 @@ def explain_errors(path: Path, what: str) -> Iterator[None]:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether there is such a folder; what cannot be the name of one is none."""
+    """Whether there is such a folder; False also for an impossible name."""
     with suppress(OSError, ValueError):
         return path.is_dir()
     return False
@@ -143,7 +143,7 @@ def open_lines(path: Path, newline: str | None = None) -> Iterator[Iterator[str]
 
     Raises:
         InputError: there is no such file.
-        ValueError: while lines are taken, if it is no text, or a line has no end.
+        ValueError: while lines are taken, if it is not text, or a line has no end.
 
     """
     check_file(path)
@@ -212,7 +212,7 @@ def unpack(archive: Path) -> Unpacked:
             return _unpacked(archive, file)
     except InputError:
         raise
-    # What is wrong with an archive, each of Python's decompressors says in exceptions of its own.
+    # Each of Python's decompressors has its own exceptions for a broken archive.
     except Exception as error:
         raise InputError(f"{archive}: cannot be opened: {reason(error)}") from error
 
@@ -246,7 +246,7 @@ def read_archive(archive: Path, digest: str) -> bytes:
 
 def _check_same(archive: Path, now: str, digest: str) -> None:
     if now != digest:
-        raise InputError(f"{archive}: has changed since it was read; begin anew")
+        raise InputError(f"{archive}: has changed since it was read; start over")
 
 
 def _unpacked(archive: Path, file: BufferedReader) -> Unpacked:
@@ -315,7 +315,7 @@ def _check_room(whole: _Whole, files: int, size: int) -> None:
     if (together := sum(others.values()) + size) > _MOST_OF_A_PROCESS:
         raise ValueError(
             f"it unpacks to {size:,} bytes, and all archives of this process to {together:,}, more "
-            f"than {_MOST_OF_A_PROCESS:,}: run them in processes of their own"
+            f"than {_MOST_OF_A_PROCESS:,}: run them in separate processes"
         )
 
 

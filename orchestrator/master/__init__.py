@@ -1,4 +1,4 @@
-"""How a system is stepped: `simulation` runs the loop, observers take what it computes.
+"""How a system is stepped: `simulation` runs the loop, observers take its rows.
 
 The loop, in :func:`.simulation.simulate_plan`::
 

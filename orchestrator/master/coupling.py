@@ -230,7 +230,7 @@ class Coupling:
         """Find the rings.
 
         Args:
-            plan: what is run, and how rings are closed.
+            plan: the system, and how rings are closed.
             instances: of its components.
             row: that they are tied to.
             log: takes where a ring is delayed.
@@ -290,7 +290,7 @@ class Coupling:
         return found, [stage.gather for stage in found] + own
 
     def delayed_ports(self) -> list[PortName]:
-        """The inputs that a ring feeds by itself, of rings that are not solved as a whole."""
+        """The inputs that a ring feeds itself, for rings that are not solved as a whole."""
         solved = [set(ring.names) for ring in self._solved]
         left = [ring.names for ring in self._rings if set(ring.names) not in solved]
         ring_of = {name: i for i, names in enumerate(left) for name in names}
@@ -353,7 +353,7 @@ class Coupling:
             self._enter(name, list(ports))
 
     def _enter(self, name: str, ports: Sequence[str]) -> None:
-        """Enter into the row what an FMU holds."""
+        """Enter the values that an FMU holds into the row."""
         held = self._instances[name].read(ports)
         self._row.enter({PortName(name, port): value for port, value in held.items()})
 

@@ -100,7 +100,9 @@ def choose_loop(
         raise InputError(f"loop {wanted!r}: use one of {', '.join(LOOPS)}")
     if wanted == "compiled":
         if isolation:
-            raise InputError("the compiled loop steps no isolated FMUs: leave one of the two out")
+            raise InputError(
+                "the compiled loop cannot step isolated FMUs: leave one of the two out"
+            )
         return _compiled(load_stepper() or compile_stepper())
     if wanted == "auto" and not isolation and experiment.rows > _SET_UP:
         if library := load_stepper():

@@ -80,7 +80,7 @@ def make_plan(system: System, experiment: Experiment) -> Plan:
     whole = experiment.full_steps // period * period
     if not rigid or whole == experiment.rows - 1:
         return Plan(system, experiment, found)
-    why = f"{', '.join(rigid)}: takes steps of one length only, so"
+    why = f"{', '.join(rigid)}: takes only steps of a fixed length, so"
     if whole == 0:
         shortest = period * experiment.step
         raise InputError(f"{why} the run must last at least one step, {shortest:g} s")
@@ -105,7 +105,7 @@ def _check_linear(system: System) -> None:
             )
     if system.steps:
         raise InputError(
-            f"coupling linear: {', '.join(system.steps)}: takes steps of its own; leave them out"
+            f"coupling linear: {', '.join(system.steps)}: takes longer steps; leave them out"
         )
 
 
@@ -139,7 +139,7 @@ def _check_names(system: System, order: Sequence[str]) -> None:
     for names, what in ((twice, "twice"), (missing, "not at all")):
         if names:
             raise InputError(
-                f"order {','.join(order)}: names {', '.join(names)} {what}; it takes every "
+                f"order {','.join(order)}: names {', '.join(names)} {what}; it must name every "
                 "component once"
             )
 
@@ -199,7 +199,7 @@ def gathered_connections(
         if start in ring_of and ring_of[start] == ring_of.get(end):
             continue
         source, target = stage_of[start], stage_of[end]
-        # What is no feedthrough is a state, and must be taken before any component advances.
+        # An output without feedthrough is a state, and must be read before any component advances.
         at_once = latest or (order != JACOBI and has_feedthrough(system, connection))
         late = at_once and source < target
         found[target if late else 0].append(connection)

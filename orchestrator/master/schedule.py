@@ -4,7 +4,7 @@ Rings of feedthroughs that are solved have stages of their own. Each is closed b
 are stepped, with their states of t_k, after that, with those of t_k+1 and the latest of what feeds
 it, and again when all have been stepped: every row shows its solution.
 
-A component may take n communication steps in one of its own. It is stepped at every n-th t_k, with
+A component may span n communication steps in one step. It is stepped at every n-th t_k, with
 the inputs of that time, which it holds. What it computes waits in hidden columns of the row: from
 there outputs with direct feedthrough, which hold from t_k on, are shown at once, unless the order
 is `jacobi`; all others when the time has come that they belong to.
@@ -41,7 +41,7 @@ class Member(NamedTuple):
 
 
 class StageCall:
-    """What is in the place of an instance where a stage acts, and steps no component."""
+    """Takes the place of an instance in a stage that acts but steps no component."""
 
     name, is_here = "", True
 
@@ -86,10 +86,10 @@ class StageCall:
 
 
 class Decimation(NamedTuple):
-    """When a slow component is stepped, or what it has computed is shown.
+    """When a slow component is stepped, or its outputs are shown.
 
     Attributes:
-        every: how many communication steps one of its own takes.
+        every: how many communication steps one of its steps spans.
         at_end: whether in the last of them, not in the first.
 
     """

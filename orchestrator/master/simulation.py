@@ -42,7 +42,7 @@ def simulate_plan(
     Args:
         plan: what to run, as :func:`.plan.make_plan` gives it.
         observers: take the rows.
-        isolation: run each FMU in a process of its own; None: all in this one.
+        isolation: run each FMU in a separate process; None: all in this one.
         loop: makes the steps.
         hooks: act between them, in this order.
         exchange: of values.
@@ -138,8 +138,8 @@ def _possible_loop(loop: Stepping, instances: Mapping[str, Instance], log: Log) 
     if not apart or loop == PYTHON_LOOP:
         return loop
     log.remark(
-        f"{', '.join(apart)}: runs in a process of its own, for the FMU allows one instance a "
-        "process; steps are made in Python"
+        f"{', '.join(apart)}: runs in a separate process, since the FMU allows one instance "
+        "per process; steps are made in Python"
     )
     return PYTHON_LOOP
 
@@ -147,7 +147,7 @@ def _possible_loop(loop: Stepping, instances: Mapping[str, Instance], log: Log) 
 def _parameters(
     system: System, instances: Mapping[str, Instance], log: Log
 ) -> dict[PortName, object]:
-    """Values of all parameters as the FMUs hold them; where one is not what was set, the log says.
+    """Values of all parameters as the FMUs hold them; the log names any that were not kept.
 
     Some FMUs overwrite values without a word.
     """

@@ -1,4 +1,4 @@
-"""What the paper leaves open of the runs behind its printed table, and how it can be filled in.
+"""What the paper leaves open about the runs of its printed table, and the possible choices.
 
 Section 4.2 prints twelve numbers. What made them is not all said: each :class:`Choice` is one thing
 that is not, or that is printed so that another meaning can be thought of. Where an option

@@ -1,4 +1,4 @@
-"""Every printed number and claim of section 4 that a simulation can be held against.
+"""Every printed number and claim of section 4 that a simulation can check.
 
 A claim is a function of the kept runs that are named beside it. The report makes these
 runs, calls every claim, and prints what it finds in the order of this file.

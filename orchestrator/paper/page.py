@@ -62,7 +62,7 @@ def values_with_units(values: Sequence[float], units: Iterable[str]) -> str:
 
 def escape_markdown(text: str) -> str:
     """Escape the marks of Markdown in a text, and make one line of it."""
-    # An underscore within a name is none.
+    # An underscore within a name is not emphasis.
     marks = r"[\\`*{}\[\]<>#|&]|(?<![^\W_])_|_(?![^\W_])"
     return re.sub(marks, r"\\\g<0>", " ".join(text.split()))
 

@@ -43,13 +43,13 @@ _TITLE = "# The paper's section 4, run again"
 
 _INTRODUCTION = """\
 *Three-dimensional tracking control of autonomous underwater vehicles with limited torque and \
-without velocity sensors*, simulated from FMI 2.0 components. Where results differ from the paper \
-it is said so; no parameter was chosen to bring them closer. The paper gives neither the level of \
-its measurement noise nor the end times of its figures: those of the scenarios are ours, and all \
-but Fig. 4 run without noise, so that roughness in a signal is the controller's own doing. Ours in \
-every run are further the righting moment of roll, 5 N·m (reading 1), and, where there is noise, \
-its seed. The readings, points where the paper is silent or contradicts itself, are explained \
-[at the end](#readings)."""
+without velocity sensors*, simulated from FMI 2.0 components. Differences from the paper are \
+stated; no parameter was chosen to bring the results closer. The paper gives neither the level of \
+its measurement noise nor the end times of its figures: the scenarios have ours, and all but Fig. \
+4 run without noise, so that roughness in a signal comes from the controller itself. In every run \
+the righting moment of roll, 5 N·m (reading 1), and the seed of any noise are ours as well. The \
+readings, points where the paper is silent or contradicts itself, are explained [at the \
+end](#readings)."""
 
 _WHY_NUMBERS_DIFFER = """\
 Why the numbers differ: efforts and final errors depend on the end time and the noise, which are \

@@ -158,7 +158,7 @@ def settings_of(folder: Path) -> dict[str, str]:
 def run_fmus(module: str, folder: Path, *options: str) -> list[Path]:
     """Run a module of the package fmus that writes into a folder.
 
-    In a process of its own: what PythonFMU imports to build must not stay in this one.
+    In a separate process: modules that PythonFMU imports to build must not stay in this one.
 
     Returns:
         The files written.
@@ -201,7 +201,7 @@ def current_fmus(kind: str = PYTHON, fmi: str = FMI_VERSIONS[0]) -> Path:
     except OSError as error:
         raise InputError(
             f"cannot keep FMUs in {users_folder()}: {reason(error)}; set XDG_CACHE_HOME to a "
-            "folder that can be written"
+            "writable folder"
         ) from error
 
 
@@ -243,7 +243,7 @@ def new_controller(
         "README.md": "README.md",
     }
     if folder.is_dir() and any(folder.iterdir()):
-        raise InputError(f"{folder}: is not empty, and nothing in it is replaced")
+        raise InputError(f"{folder}: is not empty; choose a new or empty folder")
     with replace_files(folder, contents) as unfinished:
         for target, template in contents.items():
             text = (_TEMPLATES / template).read_text(encoding="utf-8")
@@ -298,5 +298,5 @@ def _names(name: str) -> tuple[str, str]:
     words = [word for word in module.split("_") if word]
     class_name = name if name[0].isupper() else "".join(word.capitalize() for word in words)
     if keyword.iskeyword(module) or keyword.iskeyword(class_name) or find_spec(module):
-        raise InputError(f"{name!r}: {module} is taken in Python; choose another name")
+        raise InputError(f"{name!r}: {module} is already a module of Python; choose another name")
     return module, class_name

@@ -1,4 +1,4 @@
-"""A run that is ready to be made, with the changes of the user, and what it is compared with."""
+"""A run that is ready to be made, with the user's changes, and its companion."""
 
 from __future__ import annotations
 

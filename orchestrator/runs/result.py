@@ -86,14 +86,14 @@ class Result(Table):
     """
 
     def __init__(self, prepared: Prepared) -> None:
-        """Take the rows of what is run."""
+        """Take the rows of a run."""
         super().__init__()
         self._prepared = prepared
         self._clock = Stopwatch()
         self.resumed_at: float | None = None
 
     def __repr__(self) -> str:
-        """One line: what was run, and how far it came."""
+        """One line: the scenario, and how far it came."""
         end = f", {self.failure}" if self.failure else ""
         first, last = (self.time[0], self.time[-1]) if len(self) else (0.0, 0.0)
         return (
@@ -233,9 +233,9 @@ def simulate(
         strict: refuse what otherwise is a warning.
         steps: of components that take longer ones of their own [s], multiples of the communication
             step; they win over the scenario's.
-        events: what happens during the run, in the place of the scenario's own: tables as a
+        events: what happens during the run, instead of the scenario's own: tables as a
             scenario file has them, such as `{"at": 20.0, "lose": "controller.tau.r"}`.
-        inputs: a table of inputs over time, in the place of the scenario's own: a .csv or .parquet
+        inputs: a table of inputs over time, instead of the scenario's own: a .csv or .parquet
             file.
         coupling: how rings of direct feedthroughs are closed: `solve`, at every communication
             point, `delay`, by a delay of one step, or `linear`, solved, with inputs that change
@@ -295,7 +295,7 @@ def simulate(
         ending = prepared.run([*observers, *kept], kept)
         leave_checkpoints(kept, ending.failure is None)
     for number in ending.signals:
-        # Held back while the FMUs computed; now it does what it does elsewhere.
+        # Held back while the FMUs computed; now it acts as usual.
         signal.raise_signal(number)
     return result
 

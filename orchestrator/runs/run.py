@@ -54,7 +54,7 @@ from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.proof import CertificatesFile
 from orchestrator.vehicle.signals import Loop, suffixes
 
-#: A file that keeps room for what is written last, so that a full disk does not cost the record.
+#: A file that keeps room for the files written last, so that a full disk does not cost the record.
 _SPARE, _SPARE_BYTES = ".spare", 65536
 
 #: Exit status of a process that a run has to end with.
@@ -170,7 +170,7 @@ def run_into(
             first.ending = replace(first.ending, failure=first.ending.failure or failure)
         if not unfinished.is_dir():
             raise InputError(
-                f"{folder} was moved or deleted while it was written, and what was computed went "
+                f"{folder} was moved or deleted while it was written, and the results went "
                 f"with it, in {unfinished.name}"
             )
         spare.unlink()
@@ -185,7 +185,7 @@ def run_into(
 
 
 class _Running:
-    """A run and the observers of its rows, and what has come of it once it has ended."""
+    """A run, the observers of its rows, and its results once it has ended."""
 
     def __init__(
         self,
@@ -260,7 +260,7 @@ def _give_up(
     clock: Stopwatch,
     say: Callable[[str], None],
 ) -> None:
-    """Keep what is there and end the process; the thread that steps the FMUs never will."""
+    """Keep what is there and end the process; the thread that steps the FMUs never returns."""
     try:
         (unfinished / _SPARE).unlink()
         run.give_up()
@@ -275,7 +275,7 @@ def _give_up(
 
 
 def _write_ends(done: Sequence[_Running], command: Sequence[str], clock: Stopwatch) -> None:
-    """Write what is written last; the record of the first names the files of all."""
+    """Write the last files; the record of the first run names the files of all."""
     for run in reversed(done):
         write_metrics(run.folder, run.metrics)
         header = run.seen.header
@@ -285,7 +285,7 @@ def _write_ends(done: Sequence[_Running], command: Sequence[str], clock: Stopwat
 def _draw(
     scenario: Scenario, done: Sequence[_Running], folder: Path, interrupts: Interrupts
 ) -> list[str]:
-    """Draw all figures or, where one of them cannot be written, none; notes on what is left out."""
+    """Draw all figures or, if one cannot be written, none; returns notes on omissions."""
     drawn = [
         Drawn(run.prepared.scenario.legend, run.seen, scenario.z_up, run.prepared.loops)
         for run in done

@@ -182,7 +182,7 @@ def read_inputs(
         given: ports that have values from where the table is named: it must not name them, too.
 
     Raises:
-        InputError: the table cannot be read, or a column is no input that is to be had.
+        InputError: the table cannot be read, or a column is not an available input.
 
     """
     file = inputs.file
@@ -192,7 +192,7 @@ def read_inputs(
         _check_rows(rows, targets)
         for target, column in zip(targets, rows[:, 1:].T, strict=True):
             if target in map(system.named, given):
-                raise InputError(f"{target} is given a value of its own beside the table")
+                raise InputError(f"{target} is given both a value and a column of the table")
             _check_column(system, target, column)
         linear = [_is_linear(system, target, inputs.between) for target in targets]
         input_table = InputTable(targets, rows[:, 0], rows[:, 1:], np.array(linear))
@@ -211,9 +211,9 @@ def _check_rows(rows: np.ndarray, targets: tuple[PortName, ...]) -> None:
     if not np.isfinite(rows).all():
         raise InputError("all times and values must be finite")
     if (rows[1:, 0] < rows[:-1, 0]).any():
-        raise InputError("times must not fall")
+        raise InputError("times must not decrease")
     if rows[-1, 0] / 2 - rows[0, 0] / 2 > _FARTHEST / 2:
-        raise InputError(f"times must lie less than {_FARTHEST:g} s apart")
+        raise InputError(f"times must be less than {_FARTHEST:g} s apart")
 
 
 def _check_column(system: System, target: PortName, column: np.ndarray) -> None:
@@ -222,7 +222,7 @@ def _check_column(system: System, target: PortName, column: np.ndarray) -> None:
     if variable.causality != "input":
         raise InputError(f"{target} is of causality {variable.causality}, not input")
     if type_of(variable) == "String":
-        raise InputError(f"{target} is a String: a table has numbers")
+        raise InputError(f"{target} is a String: a table holds only numbers")
     for connection in system.connections:
         if connection.target == target:
             raise InputError(f"{target} is fed by {connection.source} and cannot be set")
@@ -238,7 +238,7 @@ def _number(value: float) -> str:
 
 def _is_linear(system: System, target: PortName, between: str) -> bool:
     variable = system.component(target.component).variable(target.port)
-    # FMI has it that what is discrete changes at events only.
+    # In FMI, discrete variables change only at events.
     return (type_of(variable), variable.variability, between) == ("Real", "continuous", "linear")
 
 

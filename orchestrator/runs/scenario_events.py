@@ -160,7 +160,7 @@ def _ports(
             f"{port} is of causality {variable.causality}, not {' or '.join(causalities)}"
         )
     if type_of(variable) == "String" and "parameter" not in causalities:
-        raise InputError(f"{port} is a String: events act on numbers and truth values")
+        raise InputError(f"{port} is a String: events act only on numbers and Booleans")
     return [port]
 
 
@@ -170,7 +170,7 @@ def _routes(system: System, port: PortName) -> list[Connection | None]:
         return [None]
     found: list[Connection | None] = [c for c in system.connections if c.source == port]
     if not found:
-        raise InputError(f"{port} feeds nothing here: no event can alter what others take of it")
+        raise InputError(f"{port} feeds nothing here: an event would change nothing")
     return found
 
 
@@ -269,7 +269,7 @@ def _set(values: Mapping[str, Any], system: System) -> Action:
 def _reset(names: Any, system: System) -> Action:
     for name in _things(names):
         if system.steps.get(system.component(name).name, system.step) != system.step:
-            raise InputError(f"{name} takes longer steps of its own: it cannot begin in one")
+            raise InputError(f"{name} takes longer steps: it cannot be reset within one")
     return Reset(tuple(_things(names)))
 
 

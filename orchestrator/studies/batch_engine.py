@@ -268,7 +268,7 @@ def _why(job: _Job, k: int = 0, before: Moment | None = None) -> str:
     }
     for name, state in states.items():
         if not is_bounded(state):
-            return f"{name}: the state is not finite, or beyond {LARGEST_STATE:g}"
+            return f"{name}: the state is not finite, or exceeds {LARGEST_STATE:g}"
     return "an output is not finite"
 
 

@@ -147,8 +147,8 @@ class Store:
             for *row, checksum in self._database.execute("SELECT * FROM outcomes ORDER BY number"):
                 if checksum != self._checksum(*row):
                     raise InputError(
-                        f"{self._path}: damaged: run {row[0]} is not as it was written; move it, "
-                        "or let --force move the study aside and begin anew"
+                        f"{self._path}: damaged: run {row[0]} was changed since it was written; "
+                        "move it, or let --force move the study aside and start over"
                     )
                 yield row[0], row[1], row[2]
 
@@ -196,7 +196,7 @@ def open_store(
         folder: of the study, made if it does not exist.
         record: of the study; what it says under `made_of` must be what was done there before.
         indices: the columns of what comes out of a run.
-        force: move aside what is there otherwise, and begin anew.
+        force: move aside anything else that is there, and start over.
 
     Raises:
         InputError: the folder holds another study, cannot be written, or is being written into.
@@ -323,7 +323,7 @@ class StudyResult(Mapping[str, np.ndarray]):
         self.folder = folder
         for path in (folder / STUDY_TABLE, folder / STUDY_RECORD):
             if not locate(path).is_file():
-                raise InputError(f"{folder}: holds no study that is done: no {path.name}")
+                raise InputError(f"{folder}: holds no finished study: no {path.name}")
             if is_changed(path):
                 raise InputError(f"{path}: damaged, or changed since the study wrote it")
 

@@ -44,7 +44,7 @@ from orchestrator.vehicle.indices import index_columns
 #: What a figure may be called: its files are.
 _NAME = re.compile(r"[\w-]+")
 
-#: The table that is no figure.
+#: The table that is not a figure.
 LABELS = "labels"
 
 #: What is shown of a study whose file does not say it: of each vehicle, and of all together.
@@ -74,27 +74,25 @@ _Texts = Annotated[dict[str, Any], _each(lambda text: isinstance(text, str)), "t
 class RangeTable(TomlTable):
     """A range under `[sample.range]`."""
 
-    low: float = needed("Where it begins.", "1.0", key="from")
-    high: float = needed("Where it ends; it may go either way.", "10.0", key="to")
+    low: float = needed("Start of the range.", "1.0", key="from")
+    high: float = needed("End of the range; it may be below the start.", "10.0", key="to")
     spacing: Annotated[str, OneOf(SPACINGS)] = entry(
-        "How values lie between the ends.", f"`{SPACINGS[0]}`"
+        "Spacing of the values between the ends.", f"`{SPACINGS[0]}`"
     )
 
 
 class GridTable(RangeTable):
     """A range under `[vary]`."""
 
-    n: Annotated[int, Field(ge=1, le=_MOST_VALUES)] = needed("How many values it has.", "7")
+    n: Annotated[int, Field(ge=1, le=_MOST_VALUES)] = needed("Number of values.", "7")
 
 
 class SampleTable(TomlTable):
     """Points drawn at random: `[sample]`."""
 
-    method: Annotated[str, OneOf(METHODS)] = entry("How points are drawn.", f"`{METHODS[0]}`")
-    n: Annotated[int, Field(ge=1, le=MOST_RUNS)] = needed("How many points.", "64")
-    seed: Annotated[int, Field(ge=0, le=_LARGEST_SEED)] = entry(
-        "Makes the points what they are.", "`0`"
-    )
+    method: Annotated[str, OneOf(METHODS)] = entry("How to draw points.", f"`{METHODS[0]}`")
+    n: Annotated[int, Field(ge=1, le=MOST_RUNS)] = needed("Number of points.", "64")
+    seed: Annotated[int, Field(ge=0, le=_LARGEST_SEED)] = entry("Fixes the points.", "`0`")
     range: dict[str, Any] = needed(
         "What is drawn: `component.parameter = [low, high]` or `{ from = 1.0, to = 10.0, spacing = "
         '"log" }`.',
@@ -105,28 +103,28 @@ class SampleTable(TomlTable):
 class StopTimeTable(TomlTable):
     """`stop_time` as a sum."""
 
-    base: float = needed("Of the sum [s].", "60.0")
-    per: _Numbers = needed("Seconds for each of a value that varies.", "{ plant.eta0.z = 1.2 }")
+    base: float = needed("Constant part [s].", "60.0")
+    per: _Numbers = needed("Seconds per unit of a value that varies.", "{ plant.eta0.z = 1.2 }")
 
 
 class FigureTable(TomlTable):
     """A figure: `[figures.NAME]`."""
 
     kind: Annotated[str, OneOf(tuple(FIGURE_KINDS))] = needed(
-        "What it is.", " or ".join(f'"{kind}"' for kind in FIGURE_KINDS)
+        "Kind of figure.", " or ".join(f'"{kind}"' for kind in FIGURE_KINDS)
     )
     x: Names = entry(
-        "Value along the horizontal axis; of `bands` also several, a column of panels each; of "
-        "`influence` what moves the others."
+        "Value along the horizontal axis; for `bands` also several, a column of panels each; for "
+        "`influence` the values that move the others."
     )
     y: Name = entry("Value along the vertical axis.")
-    show: Names = entry("What is shown, a row each.")
+    show: Names = entry("Values to show, a row each.")
     by: Names = entry(
-        "Columns that tell runs apart, by colours or in panels of their own; `[]` for none.",
+        "Columns that tell runs apart, by colours or in separate panels; `[]` for none.",
         "the scenario, if there are several",
     )
-    where: dict[str, Any] = entry("Only runs of which these columns have these values.", "none")
-    limits: _Numbers = entry("Lines at values of what is shown.", "none")
+    where: dict[str, Any] = entry("Only runs in which these columns have these values.", "none")
+    limits: _Numbers = entry("Lines at these values of the columns shown.", "none")
 
     @model_validator(mode="after")
     def _has_what_its_kind_has(self) -> Self:
@@ -147,7 +145,7 @@ class FiguresTable(TomlTable):
     __pydantic_extra__: dict[str, FigureTable]
     named: ClassVar = FigureTable
 
-    labels: _Texts = entry("What figures call columns.", "their names")
+    labels: _Texts = entry("Names of columns in figures.", "their names")
 
 
 class StudyFile(TomlTable):
@@ -155,14 +153,14 @@ class StudyFile(TomlTable):
 
     scenario: Name | Annotated[list[Name], Field(min_length=1)] = needed(
         "What is run: a scenario of `auv-fmu list`, or the path of a .toml, .ssp, .ssd or .fmu "
-        "file, or of an OspSystemStructure.xml, relative to this one. Of several, each is run at "
-        "every point, with the parameters that it has.",
+        "file, or of an OspSystemStructure.xml, relative to this one. If there are several, "
+        "each is run at every point, with the parameters that it has.",
         '"fig5"',
     )
     title: str = entry("Heading of the figures.", "none")
     remark: str = entry("What the report says below the figures, in Markdown.", "none")
     engine: Annotated[str, OneOf(ENGINES)] = entry(
-        "What makes the runs: the FMUs, or the equations compiled, which know only the standard "
+        "What makes the runs: the FMUs, or the compiled equations, which cover only the standard "
         "closed loop and give the same numbers.",
         f"`{ENGINES[0]}`",
     )
@@ -172,9 +170,7 @@ class StudyFile(TomlTable):
         "the scenario's",
     )
     step: float = entry("Communication step [s].", "the scenario's")
-    order: Annotated[str, OneOf(ORDERS)] = entry(
-        "In which components are stepped.", "the scenario's"
-    )
+    order: Annotated[str, OneOf(ORDERS)] = entry("Order of the steps.", "the scenario's")
     parameters: dict[str, Any] = entry(
         "Parameters of all runs, as in a scenario.", "the scenario's"
     )
@@ -185,11 +181,11 @@ class StudyFile(TomlTable):
         "nothing",
     )
     sample: SampleTable = entry(
-        "Points drawn at random, at every combination of `vary`: `n` of them, by a `method` out "
-        f"of {', '.join(METHODS)}, with a `seed`, and under `[sample.range]` "
+        "Points drawn at random, at every combination of `vary`: `n` of them, by a `method`, "
+        f"one of {', '.join(METHODS)}, with a `seed`, and under `[sample.range]` "
         '`component.parameter = [low, high]` or `{ from = 1.0, to = 10.0, spacing = "log" }`. '
         '`"|a, b, c|" = [low, high]` draws the norm of two or three numbers, and every direction '
-        "with the same chance.",
+        "with equal probability.",
         "none",
     )
     figures: FiguresTable = entry("What is drawn: see below.", "what moves what")
@@ -342,7 +338,7 @@ def read_figures(
         with findings.collecting():
             if not _NAME.fullmatch(name):
                 raise InputError(
-                    f"{where}: figures: {name!r} is no name of a file: letters, digits, -"
+                    f"{where}: figures: {name!r} cannot be the name of a file: letters, digits, -"
                 )
             _check_figure(f"{where}: figures: {name}", table, (*numbers, *indices), (*varied, *by))
         plans.append(

@@ -60,7 +60,7 @@ class Means:
     engine: Annotated[
         str | None,
         CliOption(
-            "that makes the runs: the FMUs, or the compiled equations, with the same numbers; "
+            "what makes the runs: the FMUs, or the compiled equations, with the same numbers; "
             "default: the study's own",
             choices=ENGINES,
         ),
@@ -70,14 +70,14 @@ class Means:
     scheduler: Annotated[
         str | None,
         CliOption(
-            "of a Dask scheduler whose workers make the runs, for example tcp://10.0.0.1:8786; "
-            "default: processes on this machine",
+            "address of a Dask scheduler whose workers make the runs, for example "
+            "tcp://10.0.0.1:8786; default: processes on this machine",
             metavar="ADDRESS",
         ),
     ] = None
     workers: Annotated[
         int | None,
-        CliOption("processes on this machine; default: its cores", type=int, metavar="N"),
+        CliOption("number of processes on this machine; default: its cores", type=int, metavar="N"),
     ] = None
     force: Force = False
 
@@ -104,8 +104,8 @@ def sweep(
         engine: that makes the runs, `fmu` or `batch`; None: the study's own.
         kind: of the bundle's FMUs, `python` or `native`.
         loop: that makes their steps: `python`, `compiled` or `auto`.
-        scheduler: address of a Dask scheduler whose workers make the runs; None: processes of this
-            machine.
+        scheduler: address of a Dask scheduler whose workers make the runs; None: processes of
+            this machine.
         workers: how many of these; None: one for each core.
         out: folder of the study; what was done there before is not done again. None:
             `results/NAME`.
@@ -195,12 +195,12 @@ def _engine(name: str, prepared: Mapping[str, Prepared], means: Means) -> Engine
         raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
     for scenario, one in prepared.items():
         if one.input_table is not None:
-            raise InputError(f"{scenario}: has a table of inputs, which no study can follow")
+            raise InputError(f"{scenario}: has a table of inputs, which studies do not support")
         if name == BATCH and one.events:
-            raise InputError(f"{scenario}: has events, which engine {BATCH!r} cannot have happen")
+            raise InputError(f"{scenario}: has events, which engine {BATCH!r} does not support")
         if name == BATCH and (more := _unknown_to_batch(one.experiment)):
             raise InputError(
-                f"{scenario}: has {more}, which engine {BATCH!r} does not know; use --engine {FMU}"
+                f"{scenario}: has {more}, which engine {BATCH!r} lacks; use --engine {FMU}"
             )
     if name == FMU:
         return FmuEngine(prepared, means.loop)
@@ -291,8 +291,7 @@ def making_runs(
 
         if workers is not None:
             raise InputError(
-                "--workers is for processes of this machine: those of a scheduler are started with "
-                "it"
+                "--workers is for processes of this machine: a scheduler has its own workers"
             )
         crew = cluster(scheduler, engine)
     else:

@@ -92,7 +92,7 @@ def in_stages(
 ) -> list[list[str]]:
     """An order in stages: no component takes what another one of its stage has just computed.
 
-    Solved rings have stages of their own, each in the place of its component that comes first.
+    Solved rings have their own stages, each in the place of its first component.
     """
     ring_of = {name: ring for ring in map(list, solved) for name in ring}
     units: dict[str, list[str]] = {}
@@ -190,7 +190,7 @@ def _in_levels(sources: _Sources, last: Collection[str]) -> list[str]:
 
 
 def _opened(ring: Sequence[str], sources: _Sources, place: Mapping[str, int]) -> list[str]:
-    """A ring in the order in which it is opened: its first, then what is left, part by part.
+    """A ring in the order in which it is opened: its first, then the rest, part by part.
 
     What is left of a ring may be rings again, and so on inwards. They are found from the inmost
     outwards: components are added to a graph, the last first, and each of them becomes one with

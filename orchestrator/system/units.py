@@ -58,7 +58,7 @@ def combine(first: Transformation | None, then: Transformation | None) -> Transf
             together they are too long a table.
 
     """
-    # One that says that nothing happens is kept where there is no other.
+    # An identity is kept only if there is no other.
     for nothing in (None, Linear()):
         if first == nothing:
             return then
@@ -69,7 +69,7 @@ def combine(first: Transformation | None, then: Transformation | None) -> Transf
         vanishes = not both.factor and first.factor and then.factor
         if vanishes or not (isfinite(both.factor) and isfinite(both.offset)):
             raise InputError(
-                f"linear transformations follow each other that come to the factor "
+                f"successive linear transformations combine to the factor "
                 f"{both.factor:g} and the offset {both.offset:g}"
             )
         return both

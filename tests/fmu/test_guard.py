@@ -122,7 +122,7 @@ def refused(library: Library, **arguments: Any) -> Message:
         ("has no name", {"name": None}),
         *(("name of the instance is not UTF-8", {"name": b"a" + bad}) for bad in NOT_UTF8),
         ("GUID is not UTF-8", {"guid": b"\xff"}),
-        ("is not that of this FMU", {"guid": b"{}"}),
+        ("is not the one of this FMU", {"guid": b"{}"}),
         ("co-simulation only", {"kind": MODEL_EXCHANGE}),
         ("co-simulation only", {"kind": 77}),
     ],
@@ -228,7 +228,7 @@ def test_resource_that_is_no_file_is_not_waited_for(python, resources, name: str
     else:
         path.mkdir()
     message = refused(python, location=resources.as_uri().encode())
-    assert f"{path} is no regular file" in message.text or kind == "folder"
+    assert f"{path} is not a regular file" in message.text or kind == "folder"
 
 
 def test_library_beside_the_loader_is_found_where_the_loader_was(python, tmp_path, monkeypatch):

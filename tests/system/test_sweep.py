@@ -148,7 +148,7 @@ CHANGES = {
     'stop_time = 1.0\norder = "jacobi"': "",
     'stop_time = 1.0\n[components]\ncontroller = "PdController"\n[wires]\n'
     '"controller.dy" = "plant.dy"': "",
-    "stop_time = 1.0\n[steps]\ncontroller = 0.2": "its controller has a step of its own",
+    "stop_time = 1.0\n[steps]\ncontroller = 0.2": "its controller has a longer step",
     'stop_time = 1.0\norder = ["plant", "disturbance", "planner", "controller"]': "has order = ",
     'stop_time = 1.0\n[[events]]\nat = 0.5\nfreeze = "plant.y"': "has events",
 }

@@ -78,7 +78,7 @@ def _value(table: str, entry: Element, end: str, items: Items) -> float:
             raise ValueError(f"{end} {text!r} of a mapping is not in its enumeration")
         return float(items[text])
     if (value := finite(text, end)) != int(value):
-        raise ValueError(f"{end} {text!r} of a mapping is no integer")
+        raise ValueError(f"{end} {text!r} of a mapping is not an integer")
     return value
 
 
@@ -310,7 +310,7 @@ class Bindings:
         if element.get("sourceBase", "SSD") != "SSD":
             if not isinstance(owner, Leaf) or owner.component is None:
                 named = ".".join(owner.way)
-                raise InputError(f"a file of {named!r}, which is no component with an FMU")
+                raise InputError(f"a file of {named!r}, which is not a component with an FMU")
             base = owner.component.folder
         file = self._archive.file(source, where, base)
         return None if file is None else self._archive.read(file)
@@ -343,7 +343,7 @@ class Bindings:
                 self._archive.problem(f"{where}: {name}: arrays are not supported")
                 continue
             if name in found:
-                self._archive.note(f"{where}: {name} stands twice in a parameter set")
+                self._archive.note(f"{where}: {name} appears twice in a parameter set")
             found[name] = Given(text, known.unit(value), known.items(value))
         return found
 

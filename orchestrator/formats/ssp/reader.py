@@ -127,7 +127,7 @@ class _Arrival:
     Attributes:
         start: where it sets out: at a component's port, or where it is given; None: there is none.
         leaf: the component that it comes from; None: it is given.
-        whole: what has happened to it since.
+        whole: its transformation since.
         unit: that it has.
         error: why it cannot come so far.
 

@@ -78,7 +78,7 @@ class FMU2OfOthers(FMU2Slave):  # type: ignore[misc]
             result = super()._call(fname, *args)
         finally:
             restore_mode()
-        # fmpy takes what is below all of FMI's statuses for a good one.
+        # fmpy takes anything below FMI's statuses for success.
         if self._functions[fname].restype is fmi2Status and result < 0:
             raise FMICallException(fname, result)
         return result
@@ -119,7 +119,7 @@ class Library:
     """
 
     def __init__(self, component: Component, folder: Path) -> None:
-        """Load what has been unpacked into a folder.
+        """Load an FMU that has been unpacked into a folder.
 
         Raises:
             InputError: it cannot be loaded.
@@ -174,8 +174,8 @@ def check_place(folder: Path) -> None:
         and (odd := re.sub(r"[\w./~-]| ", "", str(folder), flags=re.ASCII))
     ):
         raise InputError(
-            f"temporary folder {str(folder)!r}: PythonFMU takes no {odd[0]!r} in it; set TMPDIR to "
-            "another, or build the FMU with --loader native"
+            f"temporary folder {str(folder)!r}: PythonFMU cannot handle {odd[0]!r} in it; set "
+            "TMPDIR to another, or build the FMU with --loader native"
         )
 
 
@@ -229,7 +229,7 @@ def check_binary(component: Component, folder: Path) -> None:
         for path in sorted(binary.parent.iterdir()):
             if path.is_file() and _is_cut_short(path):
                 raise InputError(
-                    f"{name_with_fmu(component)}: its {path.name} is cut short: get it anew"
+                    f"{name_with_fmu(component)}: its {path.name} is truncated: download it again"
                 )
         return
     if _sources_of(component, folder):
@@ -375,8 +375,8 @@ def _compiled(component: Component, sources: Sources) -> bytes:
     run = find_compiler()
     assert run is not None
     warnings.warn(
-        f"{component.fmu.name} has no binary for this machine, {fmpy.platform}: its C sources are "
-        "compiled now, and kept",
+        f"{component.fmu.name} has no binary for this machine, {fmpy.platform}: its C sources "
+        "are compiled now, and kept",
         stacklevel=2,
     )
     cpp = ["-lstdc++"] * any(file.suffix != ".c" for file in sources.files)

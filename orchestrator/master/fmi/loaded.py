@@ -214,7 +214,7 @@ class LoadedInstance:
         self._set(values)
 
     def reset(self) -> None:
-        """Be what it was before the initialisation."""
+        """Return to the state before the initialisation."""
         self._call("reset")
 
     def keep(self) -> None:
@@ -242,7 +242,7 @@ class LoadedInstance:
         self._worst = 0
         with self._held("deSerializeFMUstate", state) as read:
             self._call("setFMUstate", read)
-        # Some say only in a message that it is none of theirs.
+        # Some say only in a message that it is not theirs.
         if self._worst >= fmi2Discard:
             raise ComponentFailed(self._complaints[-1])
 
@@ -250,7 +250,7 @@ class LoadedInstance:
     def _held(self, method: str, *arguments: Any) -> Iterator[Any]:
         """A state that one of fmpy's methods gives, in the FMU's memory, freed at the end."""
         if not self._gives_state:
-            raise ComponentFailed(f"{self.name}: its FMU does not give its state away")
+            raise ComponentFailed(f"{self.name}: its FMU does not provide its state")
         state = self._call(method, *arguments)
         try:
             yield state
@@ -259,7 +259,7 @@ class LoadedInstance:
                 self._call("freeFMUstate", state)
 
     def terminate(self) -> None:
-        """Let the FMU end what it has begun."""
+        """Let the FMU finish what it has begun."""
         if not self._library.corrupted:
             self._call("terminate")
 
@@ -339,8 +339,8 @@ def load_instance(
     """Load an instance of a component into this process, freed at the end.
 
     Args:
-        component: what is instantiated.
-        listener: takes what it says.
+        component: to instantiate.
+        listener: takes its messages.
         folder: into which its FMU is unpacked; None: this process unpacks it.
 
     Raises:

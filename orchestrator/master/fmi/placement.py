@@ -29,14 +29,14 @@ def place_instances(
     isolation: Isolation | None,
     interrupts: Interrupts,
 ) -> Iterator[dict[str, Instance]]:
-    """Place instances of components, by name: all in this process, or each in one of its own.
+    """Place instances of components, by name: all in this process, or each in a separate one.
 
-    One more of an FMU that allows one instance a process goes into one of its own in any case.
+    A further instance of an FMU that allows one per process always gets a separate process.
 
     Args:
         components: by their names.
         log: takes what the FMUs say.
-        isolation: how long isolated FMUs may take; None: all are to be in this process.
+        isolation: how long isolated FMUs may take; None: all are in this process.
         interrupts: that end the wait for an FMU.
 
     Raises:
@@ -82,7 +82,7 @@ def _has_room(component: Component) -> Iterator[bool]:
 def isolate_instances(
     components: Mapping[str, Component], log: Log, isolation: Isolation, interrupts: Interrupts
 ) -> Iterator[dict[str, Instance]]:
-    """Place instances, each in a process of its own; all end with it."""
+    """Place instances, each in a separate process; all end with it."""
     with ExitStack() as stack:
         try:
             pairs = [socket.socketpair() for _ in components]

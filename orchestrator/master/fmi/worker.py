@@ -93,7 +93,7 @@ class Channel:
 
         Raises:
             EOFError, OSError: the other end is closed.
-            ValueError, RecursionError, MemoryError: it is no message.
+            ValueError, RecursionError, MemoryError: it is not a message.
 
         """
         self._move(self._connection.recv_into, self._received_bytes)
@@ -107,7 +107,7 @@ class Channel:
         return json.loads(text, object_hook=_from_text)
 
     def close(self) -> None:
-        """Let the other end know that there is no more."""
+        """Tell the other end that nothing more follows."""
         self._connection.close()
 
     def _move(self, move: Callable[[memoryview], int], data: memoryview) -> None:

@@ -34,7 +34,7 @@ class _Output(RawIOBase):
         """Check that it is still where it was made.
 
         Raises:
-            OSError: what is written would go nowhere.
+            OSError: the output would go nowhere.
 
         """
         try:

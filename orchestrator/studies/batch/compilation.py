@@ -1,8 +1,8 @@
 """The kernel and the equations, compiled by numba once for each controller and kept.
 
-It is the same text, except what refusals say: numba makes no texts, so what compiled equations
-raise has none. The rest is Python's: each operation is rounded by itself, nothing is contracted or
-reordered, and sine and the like come from the same library.
+It is the same code, except for the texts of refusals: numba makes no texts, so exceptions of
+compiled equations have none. As in Python, each operation is rounded separately, nothing is
+contracted or reordered, and sine and the like come from the same library.
 """
 
 from __future__ import annotations
@@ -160,9 +160,9 @@ def compile_run(gains: type[Any]) -> Callable[..., Moment]:
 
 
 class _Kept:
-    """What numba asks for code that was compiled earlier, in the place of its own cache.
+    """What numba asks for code that was compiled earlier, instead of its own cache.
 
-    Numba's own is where its configuration says, and takes whatever is there.
+    Numba's cache is where its configuration says, and takes whatever is there.
     """
 
     cache_path = None

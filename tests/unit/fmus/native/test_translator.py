@@ -104,20 +104,20 @@ def test_each_function_has_its_docstring_above_it(package):
     [
         ("def begin(parameters: A) -> A:\n    return begin(parameters)\n", "begin calls itself"),
         ("def begin(t: int, h: int) -> A:\n    return A(t / h)\n", "a division of whole numbers"),
-        ("def begin(parameters: A) -> A:\n    return A(parameters.y)\n", "10: y is no field here"),
+        ("def begin(parameters: A) -> A:\n    return A(parameters.y)\n", "10: y is not a field"),
         ("def begin(parameters: A) -> A:\n    return A(1.0, 2.0)\n", "10: 2 values for 1 fields"),
         ("def begin(state: A) -> A:\n    x, y = state\n    return A(x)\n", "2 names for 1 values"),
         ("def begin(parameters: A) -> A:\n    return A(max(1.0, 2.0))\n", "10: the name max"),
         ("def begin(t: int, h: int) -> A:\n    t, h = h, t\n    return A(1.0)\n", "10: h is given"),
         (
             "def begin(parameters: A, t: int) -> A:\n    return A(parameters[t])\n",
-            "10: a computed subscript of what is no tuple of equal parts",
+            "10: a computed subscript of something other than a tuple of parts of one type",
         ),
         (
             "def begin(state: tuple[float, float], t: float) -> A:\n    return A(state[t])\n",
-            "10: a subscript that is no whole number",
+            "10: a subscript that is not a whole number",
         ),
-        ("def begin(parameters: list[float]) -> A:\n    return A(1.0)\n", "is no type"),
+        ("def begin(parameters: list[float]) -> A:\n    return A(1.0)\n", "is not a type"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_translated_is_named(tmp_path: Path, text, why):

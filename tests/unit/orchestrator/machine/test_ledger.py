@@ -71,7 +71,7 @@ def test_links_lead_nowhere(tmp_path: Path, name):
 )
 def test_a_list_that_is_none_of_ours_proves_nothing(tmp_path: Path, content):
     (tmp_path / LEDGER).write_text(content)
-    with pytest.raises(Taken, match="which files it wrote cannot be told"):
+    with pytest.raises(Taken, match="its own files are unknown"):
         Ledger(tmp_path)
     Ledger(tmp_path, force=True)
     assert (tmp_path / f"{LEDGER}.~1~").read_text() == content

@@ -101,7 +101,7 @@ def test_result_gives_columns_and_suggests_names(tmp_path):
     assert repr(result) == f"<StudyResult {tmp_path.name}: 2 runs, 1 failed>"
     with pytest.raises(KeyError, match="no column 'late_eror'; did you mean late_error"):
         result["late_eror"]
-    with pytest.raises(InputError, match="holds no study that is done"):
+    with pytest.raises(InputError, match="holds no finished study"):
         StudyResult(tmp_path / "elsewhere")
 
 

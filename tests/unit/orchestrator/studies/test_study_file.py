@@ -241,7 +241,7 @@ def test_mistakes_are_told_in_a_line(figure, complaint):
 
 
 def test_a_figure_is_named_as_a_file_can_be():
-    with pytest.raises(InputError, match="is no name of a file"):
+    with pytest.raises(InputError, match="cannot be the name of a file"):
         plans(**{"../mine": BANDS})
 
 

@@ -116,7 +116,7 @@ def test_what_tables_come_to_is_bounded():
 
 @pytest.mark.parametrize("size", [1e200, 1e-200])
 def test_transformations_that_no_number_holds_do_not_follow_each_other(size):
-    with pytest.raises(InputError, match="linear transformations follow each other that come to"):
+    with pytest.raises(InputError, match="successive linear transformations combine to"):
         combine(Linear(size), Linear(size))
     # A factor of zero says what it does.
     assert combine(Linear(size), Linear(0.0, 1.0)) == Linear(0.0, 1.0)

@@ -77,7 +77,9 @@ def test_an_fmu_that_gives_no_state_is_named(tmp_path: Path, place: str):
     assert not component.gives_state
     with ready(System("one", {"stubborn": component}, ()), place) as (instance, _):
         for call in (instance.state, lambda: instance.restore(b"")):
-            with pytest.raises(ComponentFailed, match="stubborn: its FMU does not give its state"):
+            with pytest.raises(
+                ComponentFailed, match="stubborn: its FMU does not provide its state"
+            ):
                 call()
 
 
