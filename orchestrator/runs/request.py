@@ -15,8 +15,10 @@ from typing import Annotated, Any, get_type_hints
 from fmus.kinds import KINDS, PYTHON
 from orchestrator.master.experiment import COUPLINGS, ORDERS, Order, order_of, written_order
 from orchestrator.master.fmi.isolated import STEP_TIMEOUT
+from orchestrator.master.hooks.checkpoint import check_every
 from orchestrator.master.loop import LOOPS
 from orchestrator.master.observers.files import FORMATS
+from orchestrator.master.observers.observer import check_interval
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.values import literal
 
@@ -187,7 +189,12 @@ class Request:
 
 @dataclass(frozen=True)
 class Files:
-    """What is kept of a run."""
+    """What is kept of a run.
+
+    Raises:
+        InputError: an interval makes no sense.
+
+    """
 
     interval: Annotated[
         float | None,
@@ -218,6 +225,12 @@ class Files:
         bool, CliOption("go on from the last checkpoint in DIR/checkpoint", action="store_true")
     ] = False
     force: Force = False
+
+    def __post_init__(self) -> None:
+        if self.interval is not None:
+            check_interval(self.interval)
+        if self.checkpoint_every is not None:
+            check_every(self.checkpoint_every)
 
 
 def _text(value: Any) -> str:

@@ -20,7 +20,7 @@ from orchestrator.master.loop import LOOPS
 from orchestrator.master.observers.files import FORMATS
 from orchestrator.master.observers.observer import Observer, Occurrence, Progress
 from orchestrator.master.observers.table import Table
-from orchestrator.runs.folder import locked, replaced
+from orchestrator.runs.folder import locked, made, replaced
 from orchestrator.runs.loading import check_brings_its_own, loaded, warned
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.record import (
@@ -312,8 +312,7 @@ def _checkpoints(
         raise InputError("checkpoints need checkpoint=, and checkpoint_every= or resume=")
     place = Path(folder)
     try:
-        place.mkdir(parents=True, exist_ok=True)
-        with locked(place):
+        with made(place), locked(place):
             yield checkpoints_of([prepared], [place], every, resume)
     except OSError as error:
         raise InputError(f"cannot write into {place}: {reason(error)}") from error

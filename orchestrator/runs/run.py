@@ -30,7 +30,6 @@ from orchestrator.master.observers.observer import (
     Observer,
     Progress,
     Selection,
-    check_interval,
     matches,
     matching,
 )
@@ -101,8 +100,6 @@ def run_into(
         InputError: a run cannot be made, or its files cannot be written.
 
     """
-    if files.interval is not None:
-        check_interval(files.interval)
     tables = [
         selected_columns(prepared.system, files.columns, is_companion=i > 0)
         for i, prepared in enumerate(runs)
