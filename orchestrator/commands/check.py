@@ -19,7 +19,6 @@ from orchestrator.runs.preparation import SOME_TIME, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import impossible_paths
 from orchestrator.studies.study import is_study
-from orchestrator.studies.study_file import read_study
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.graph import rings
 
@@ -63,6 +62,9 @@ def _check(options: argparse.Namespace) -> int:
 
 def _study(options: argparse.Namespace, findings: Findings) -> list[str]:
     """Look at the file of a study, and not at what it runs; there is nothing more to be known."""
+    # For this alone it takes pydantic, a quarter of a second.
+    from orchestrator.studies.study_file import read_study  # noqa: PLC0415
+
     with findings.collecting():
         read_study(options.file)
     return []

@@ -11,8 +11,9 @@ from typing import Any
 from orchestrator.commands.options import add_options, add_set, add_system, read, request, status
 from orchestrator.commands.streams import OK, say, show
 from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
+from orchestrator.figures.drawing import save
 from orchestrator.figures.plot import plot, wanted
-from orchestrator.figures.style import Drawn, save
+from orchestrator.figures.style import Drawn
 from orchestrator.figures.view import page
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError

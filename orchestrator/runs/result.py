@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fmus.kinds import PYTHON
-from orchestrator.figures.plot import plot
 from orchestrator.machine.errors import InputError, did_you_mean, reason
 from orchestrator.master.experiment import Order, written_order
 from orchestrator.master.hooks.checkpoint import Checkpoints
@@ -146,6 +145,8 @@ class Result(Table):
             ValueError: a pattern matches no column.
 
         """
+        from orchestrator.figures.plot import plot  # noqa: PLC0415
+
         return plot([(self._prepared.scenario.name, self)], patterns)
 
     def save(

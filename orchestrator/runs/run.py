@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.figures.run_figures import draw, figure_files
+from orchestrator.figures.run_figures import figure_files
 from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.disk import process_folder
@@ -86,6 +86,7 @@ def run_into(
     files: Files,
     command: Sequence[str],
     say: Callable[[str], None],
+    draw: Callable[..., list[str]] | None,
 ) -> list[Finished]:
     """Run a scenario, and those it is compared with, and write the files of all.
 
@@ -95,6 +96,7 @@ def run_into(
         files: what to keep.
         command: for the record.
         say: takes notes for the user while it goes on.
+        draw: the figures, :func:`.drawing.draw`; None: there are none.
 
     Raises:
         InputError: a run cannot be made, or its files cannot be written.
@@ -155,8 +157,8 @@ def run_into(
                 if interrupts:
                     break
             ended_at_once = done[0].ending.failure is not None and len(done[0].seen.rows) == 1
-            if not files.no_figures and not interrupts.urgent and not ended_at_once:
-                for note in _draw(runs[0].scenario, done, unfinished, interrupts):
+            if draw and not interrupts.urgent and not ended_at_once:
+                for note in _draw(draw, runs[0].scenario, done, unfinished, interrupts):
                     say(note)
         except (OSError, MemoryError) as error:
             if not done:
@@ -280,7 +282,11 @@ def _write_ends(done: Sequence[_Running], command: Sequence[str], clock: Stopwat
 
 
 def _draw(
-    scenario: Scenario, done: Sequence[_Running], folder: Path, interrupts: Interrupts
+    draw: Callable[..., list[str]],
+    scenario: Scenario,
+    done: Sequence[_Running],
+    folder: Path,
+    interrupts: Interrupts,
 ) -> list[str]:
     """Draw all figures or, where one of them cannot be written, none; notes on what is left out."""
     drawn = [
