@@ -139,12 +139,14 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
-    """What `auv-fmu` says of arguments that it refuses: one line that can be read, and no more."""
+def refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Callable[..., str]:
+    """What `auv-fmu` says of arguments that it refuses: a line that can be read, and no file."""
 
     def said(*arguments: str, status: int = 2) -> str:
         capsys.readouterr()
+        before = {*tmp_path.rglob("*")}
         assert main([*arguments]) == status
+        assert {*tmp_path.rglob("*")} == before
         out, line = capsys.readouterr()
         assert out == ""
         assert line.startswith("auv-fmu: ") and line.endswith("\n")

@@ -35,7 +35,6 @@ REASONS = {
     "fmus/ports/vehicle.py": "in the FMUs of plant and planners only",
     "fmus/python/own.py": "a program of its own: python -m fmus.python.own",
     "orchestrator/commands/many_runs.py": "imports studies, which other commands must not wait for",
-    "orchestrator/commands/run_command.py": "must not import studies or the paper",
     "orchestrator/commands/streams.py": "all commands need it before they import anything large",
     "orchestrator/paper/claims.py": "a function for each claim of the paper",
 }

@@ -19,7 +19,6 @@ from orchestrator.runs.preparation import FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import impossible_paths
 from orchestrator.studies.study import is_study
-from orchestrator.studies.study_file import read_study
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.graph import rings
 
@@ -65,6 +64,9 @@ def _check(options: argparse.Namespace) -> int:
 
 def _study(options: argparse.Namespace, findings: Findings) -> list[str]:
     """Check the file of a study, but not what it runs; there is nothing else to know."""
+    # For this alone it takes pydantic, a quarter of a second.
+    from orchestrator.studies.study_file import read_study  # noqa: PLC0415
+
     with findings.collecting():
         read_study(options.file)
     return []

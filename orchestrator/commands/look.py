@@ -18,8 +18,9 @@ from orchestrator.commands.options import (
 )
 from orchestrator.commands.streams import OK, say, show
 from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
+from orchestrator.figures.drawing import save
 from orchestrator.figures.plot import plot, wanted_columns
-from orchestrator.figures.style import Drawn, save
+from orchestrator.figures.style import Drawn
 from orchestrator.figures.view import view_page
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError

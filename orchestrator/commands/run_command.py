@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -52,9 +52,10 @@ def _run(options: argparse.Namespace) -> int:
         say(f"warning: {note}")
     folder = options.out or Path("results", runs[0].scenario.stem)
     files = from_options(Files, options)
+    draw = None if files.no_figures else _drawing()
     # Until all is written: a user who stops a run several times wants to know where its rows are.
     with held_interrupts(_answer, is_last=True):
-        finished = run_into(folder, runs, files, options.command, say)
+        finished = run_into(folder, runs, files, options.command, say, draw)
         for run in finished:
             _print_summary(run.metrics)
             for note in run.notes:
@@ -63,6 +64,13 @@ def _run(options: argparse.Namespace) -> int:
         if finished[0].folder != folder:
             say(f"{folder} keeps the complete result from before")
     return max(status(run.name, run.ending) for run in finished)
+
+
+def _drawing() -> Callable[..., list[str]]:
+    """What draws: it takes as long to import as all else, and not when there are rows to lose."""
+    from orchestrator.figures.drawing import draw  # noqa: PLC0415
+
+    return draw
 
 
 def _answer(interrupts: Interrupts) -> None:

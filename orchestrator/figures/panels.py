@@ -1,35 +1,26 @@
-"""Figures of panels, and panels that several figures have: path, tracking errors, commands.
+"""Panels, and the ones that several figures have: path, tracking errors, commands.
 
-What no run has the signals for is left out, with a note.
+They fill axes that they are given: matplotlib is imported by :mod:`.drawing`, which gives them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from math import lcm
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.gridspec import SubplotSpec
-from matplotlib.ticker import LogLocator, MaxNLocator
-from matplotlib.transforms import Transform
 
 from fmus.ports.quantities import TAU
 from orchestrator.figures.style import (
     COLOURS,
-    FIGURE_WIDTH,
     REFERENCE,
     STYLES,
     Drawn,
     earth_axes,
     escape_math,
-    heading,
     printed_unit,
     runs_with,
-    styled,
 )
 from orchestrator.figures.visible import draw_signal, mean_window
 from orchestrator.master.observers.table import Table
@@ -43,8 +34,11 @@ from orchestrator.vehicle.signals import (
     true_control_point,
 )
 
-#: Room for a heading [in].
-_HEADING = 0.3
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.gridspec import SubplotSpec
+    from matplotlib.transforms import Transform
 
 #: An axis of a path is at least this share of the longest: a straight line lies in a box.
 _FLATTEST = 0.3
@@ -90,7 +84,7 @@ class Cell:
         for axes in stack:
             if axes is not stack[-1]:
                 axes.tick_params(labelbottom=False)
-            axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+            axes.locator_params("y", nbins=4, steps=[1, 2, 5, 10])
         return stack
 
 
@@ -113,52 +107,6 @@ class Panel(NamedTuple):
 
 #: The rows of a figure.
 Rows = Sequence[Sequence[Panel]]
-
-
-def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | None, list[str]]:
-    """A figure of all that can be drawn.
-
-    Args:
-        title: heading; empty for none.
-        rows: of the figure.
-        runs: the first is the one the figure is about.
-
-    Returns:
-        The figure, and what was left out of it, and why; or None, and what is missing.
-
-    """
-    runs = [run for run in runs if len(run.result) > 1]
-    if not runs:
-        return None, ["step"]
-    panels = [panel for row in rows for panel in row]
-    shown = [panel for panel in panels if any(not run.lacks(panel.needs) for run in runs)]
-    drawn = [kept for row in rows if (kept := [panel for panel in row if panel in shown])]
-    if not drawn:
-        return None, runs[0].lacks(panels[0].needs)
-    heights = [max(panel.height for panel in row) for row in drawn]
-    with styled():
-        figure = Figure(figsize=(FIGURE_WIDTH, sum(heights) + _HEADING * bool(title)))
-        if title:
-            figure.suptitle(heading(title), wrap=True)
-        columns = lcm(*map(len, drawn))
-        grid = figure.add_gridspec(len(drawn), columns, height_ratios=heights)
-        for i, row in enumerate(drawn):
-            width = columns // len(row)
-            for j, panel in enumerate(row):
-                panel.draw(Cell(figure, grid[i, j * width : (j + 1) * width]), runs)
-    return figure, [note for panel in panels for note in _left_out(panel, runs)]
-
-
-def _left_out(panel: Panel, runs: Sequence[Drawn]) -> list[str]:
-    """What a panel does not show, and why."""
-    missing = {run.label: run.lacks(panel.needs) for run in runs}
-    if all(missing.values()):
-        return [f"{panel.name} left out: no {missing[runs[0].label][0]}"]
-    return [
-        f"{panel.name} of {label} left out: no {names[0]}"
-        for label, names in missing.items()
-        if names
-    ]
 
 
 def _path(cell: Cell, runs: Sequence[Drawn]) -> None:
@@ -204,7 +152,7 @@ def _frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
     zoom = min(0.95 - 0.1 * flat, 0.68 * float(np.linalg.norm(box) / box[2]))
     axes.set_box_aspect(box, zoom=zoom)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.set_major_locator(MaxNLocator(4))
+        axis.get_major_locator().set_params(nbins=4, steps=None)
     axes.tick_params(labelsize="small", pad=0)
     # Below a flat box the names of the axes would lie upon their numbers, and beside it far away.
     axes.xaxis.labelpad = axes.yaxis.labelpad = 8 * flat - 2
@@ -305,7 +253,7 @@ def _errors(cell: Cell, runs: Sequence[Drawn], logarithmic: bool = False) -> Non
         axes.set_ylabel(f"$|e_{k}|$ [m]" if logarithmic else f"$e_{k}$ [m]")
         if logarithmic:
             axes.set_yscale("log")
-            axes.yaxis.set_major_locator(LogLocator(numticks=5))
+            axes.yaxis.get_major_locator().set_params(numticks=5)
             if axes.get_ylim()[1] > _SMALLEST_ERROR:
                 axes.set_ylim(bottom=max(_SMALLEST_ERROR, axes.get_ylim()[0]))
     title(panels[0], "tracking errors" + ", logarithmic" * logarithmic)

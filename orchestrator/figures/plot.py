@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from orchestrator.figures.drawing import styled
 from orchestrator.figures.panels import over_time
 from orchestrator.figures.style import (
     COLOURS,
@@ -20,7 +21,6 @@ from orchestrator.figures.style import (
     Drawn,
     escape_math,
     printed_unit,
-    styled,
 )
 from orchestrator.figures.visible import draw_signal
 from orchestrator.machine.errors import InputError

@@ -1,17 +1,14 @@
-"""Figures of a run by the names that scenarios have for them, drawn into files.
+"""Figures of a run by the names that scenarios have for them; :mod:`.drawing` draws them.
 
 A new one is an entry of :data:`FIGURES`, of the panels here and in :mod:`.panels`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
-from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
-from tqdm import tqdm
 
 from fmus.ports.quantities import NU, THETA
 from orchestrator.figures.panels import (
@@ -22,7 +19,6 @@ from orchestrator.figures.panels import (
     Cell,
     Panel,
     Rows,
-    compose,
     draw_all_errors,
     draw_lines,
     over_time,
@@ -35,15 +31,11 @@ from orchestrator.figures.style import (
     earth_axes,
     printed_unit,
     runs_with,
-    save,
 )
 from orchestrator.figures.visible import draw_signal
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import AXES, STANDARD, Loop, Needs, suffixes, true_control_point
-
-#: Seconds before a bar appears on a terminal.
-_PATIENCE = 2.0
 
 
 def _all_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
@@ -179,23 +171,6 @@ FIGURES: Mapping[str, Mapping[str, Rows]] = {
 }
 
 
-def overlay(heading: str, runs: Sequence[Drawn]) -> Figure:
-    """Tracking errors and commands of several runs in the same panels.
-
-    Args:
-        heading: of the figure; empty for none.
-        runs: with labels that tell them apart.
-
-    Raises:
-        InputError: no run has anything to show.
-
-    """
-    figure, missing = compose(heading, FIGURES["overlay"][""], runs)
-    if figure is None:
-        raise InputError(f"no figure: the runs have no {missing[0]}")
-    return figure
-
-
 def check_figure(kind: str) -> None:
     """Check before a run that its figure is known.
 
@@ -209,7 +184,7 @@ def check_figure(kind: str) -> None:
 
 
 def figure_files(kind: str, stem: str, loops: Sequence[Loop] = (STANDARD,)) -> list[str]:
-    """The files that :func:`draw` may write.
+    """The files that :func:`.draw` may write.
 
     Args:
         kind: key of :data:`FIGURES`.
@@ -223,69 +198,3 @@ def figure_files(kind: str, stem: str, loops: Sequence[Loop] = (STANDARD,)) -> l
         for suffix in FIGURES[kind]
         for ending in FIGURE_FORMATS
     ]
-
-
-def draw(
-    kind: str,
-    title: str,
-    runs: Sequence[Drawn],
-    folder: Path,
-    stem: str,
-    stop: Callable[[], bool] = lambda: False,
-) -> list[str]:
-    """Draw the figures of a scenario, as PNG and SVG, as far as the runs have what they show.
-
-    Of several vehicles each has its own, together with the vehicle of that name in the other runs.
-
-    Args:
-        kind: key of :data:`FIGURES`.
-        title: heading; empty where there is one beside the figure.
-        runs: the run of the scenario, and those it is compared with.
-        folder: to write into.
-        stem: of the file names.
-        stop: asked before each figure whether to leave it out.
-
-    Returns:
-        What was left out, and why.
-
-    """
-    notes: list[str] = []
-    for i, (loop, vehicle) in enumerate(suffixes(runs[0].loops).items()):
-        of_vehicle = [run._replace(loops=[_same(run, loop, i)]) for run in runs]
-        name = ", ".join(filter(None, (title, loop.vehicle if vehicle and title else "")))
-        notes += _drawn(kind, name, of_vehicle, folder, f"{stem}{vehicle}", stop)
-    return notes
-
-
-def _same(run: Drawn, loop: Loop, i: int) -> Loop:
-    """The loop of a run that is drawn beside another's: the one of the same vehicle."""
-    named = [own for own in run.loops if own.vehicle == loop.vehicle]
-    return next(iter([*named, *run.loops[i : i + 1], *run.loops]))
-
-
-def _drawn(
-    kind: str,
-    title: str,
-    runs: Sequence[Drawn],
-    folder: Path,
-    stem: str,
-    stop: Callable[[], bool],
-) -> list[str]:
-    """Draw the figures of one vehicle, and say what was left out."""
-    notes: list[str] = []
-    bar = tqdm(FIGURES[kind].items(), desc="drawing", delay=_PATIENCE, disable=None, leave=False)
-    for suffix, rows in bar:
-        if stop():
-            break
-        figure, left_out = compose(title, rows, runs)
-        if figure is not None:
-            try:
-                save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in FIGURE_FORMATS))
-                notes += left_out
-            except InputError as error:
-                notes.append(f"{stem}{suffix} left out: {error}")
-        elif not suffix:
-            return [f"no figure: the run has no {left_out[0]}"]
-        else:
-            notes.append(f"{stem}{suffix} left out: no {left_out[0]}")
-    return notes

@@ -1,15 +1,14 @@
 """Figures of a study from its runs: a study file says which.
 
-A new one is a function and an entry of :data:`FIGURE_KINDS`.
+A new one is a function here, which :data:`_DRAW` names, and an entry of :data:`.FIGURE_KINDS`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import cycle, product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,24 +16,18 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
+from orchestrator.figures.drawing import save, styled
 from orchestrator.figures.study_values import (
     VERDICTS,
     Bins,
     Columns,
+    FigureEntry,
     Values,
     bins_of,
     grouped,
     is_logarithmic,
 )
-from orchestrator.figures.style import (
-    COLOURS,
-    FIGURE_FORMATS,
-    FIGURE_WIDTH,
-    STYLES,
-    heading,
-    save,
-    styled,
-)
+from orchestrator.figures.style import COLOURS, FIGURE_FORMATS, FIGURE_WIDTH, STYLES, heading
 from orchestrator.system.names import file_name
 
 #: Heights of a row of panels, of a panel by itself, and of a row of a matrix and what surrounds
@@ -66,30 +59,10 @@ _HEADING, _NAMES = 0.3, 0.45
 _TICKS, _FEW = 6, 2.5
 
 
-@dataclass(frozen=True)
-class FigureEntry:
-    """A figure to draw, as a study file has it.
-
-    Attributes:
-        name: of its files.
-
-    """
-
-    name: str
-    kind: str
-    x: Sequence[str] = ()
-    y: str = ""
-    show: Sequence[str] = ()
-    by: Sequence[str] = ()
-    where: Mapping[str, Any] = field(default_factory=dict)
-    limits: Mapping[str, float] = field(default_factory=dict)
-    labels: Mapping[str, str] = field(default_factory=dict)
-
-
 def make_panels(
     title: str, rows: int, columns: int, height: float, **how: Any
 ) -> tuple[Figure, Any]:
-    """Make a figure with panels.
+    """A figure with panels.
 
     Args:
         title: heading; empty for none.
@@ -310,20 +283,12 @@ def _correlation(x: np.ndarray, y: np.ndarray) -> float:
     return float(spearmanr(x[both], y[both]).statistic)
 
 
-class FigureKind(NamedTuple):
-    """A kind of figure: what draws it, what it needs, and what it may have beside."""
-
-    draw: Callable[[FigureEntry, str, Values], Figure]
-    needs: Sequence[str]
-    may: Sequence[str]
-
-
-#: The kinds of figures, by the names that study files have for them.
-FIGURE_KINDS: Mapping[str, FigureKind] = {
-    "bands": FigureKind(bands, ("x", "show"), ("by", "where", "limits")),
-    "maps": FigureKind(maps, ("x", "y", "show"), ("by", "where", "limits")),
-    "front": FigureKind(front, ("x", "y"), ("by", "where")),
-    "influence": FigureKind(influence, ("x", "show"), ("by", "where")),
+#: What draws the figures of a kind.
+_DRAW: Mapping[str, Callable[[FigureEntry, str, Values], Figure]] = {
+    "bands": bands,
+    "maps": maps,
+    "front": front,
+    "influence": influence,
 }
 
 
@@ -363,5 +328,5 @@ def draw_figures(
             yield f"figure {plan.name} left out: by tells {parts} parts of the runs apart"
             continue
         with styled():
-            figure = FIGURE_KINDS[plan.kind].draw(plan, title, runs)
+            figure = _DRAW[plan.kind](plan, title, runs)
         save(figure, *(folder / f"{file_name(plan.name)}.{ending}" for ending in FIGURE_FORMATS))

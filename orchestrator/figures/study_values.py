@@ -1,13 +1,13 @@
-"""The runs of a study as columns: what figures call their values, and bins of them."""
+"""What figures of a study show: kinds of figures, the runs as columns, and bins of their values."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import reduce
 from math import isnan
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -30,6 +30,42 @@ _LARGE, _WIDE = 0.95, 10.0
 
 _NORM = re.compile(r"\|(.+)\|")
 _UNIT = re.compile(r" \[([^\]]*)\]$")
+
+
+class FigureKind(NamedTuple):
+    """What a kind of figure needs, and what it may have beside."""
+
+    needs: Sequence[str]
+    may: Sequence[str]
+
+
+#: The kinds of figures, by the names that study files have for them.
+FIGURE_KINDS: Mapping[str, FigureKind] = {
+    "bands": FigureKind(("x", "show"), ("by", "where", "limits")),
+    "maps": FigureKind(("x", "y", "show"), ("by", "where", "limits")),
+    "front": FigureKind(("x", "y"), ("by", "where")),
+    "influence": FigureKind(("x", "show"), ("by", "where")),
+}
+
+
+@dataclass(frozen=True)
+class FigureEntry:
+    """A figure that is to be drawn, as a study file has it.
+
+    Attributes:
+        name: of its files.
+
+    """
+
+    name: str
+    kind: str
+    x: Sequence[str] = ()
+    y: str = ""
+    show: Sequence[str] = ()
+    by: Sequence[str] = ()
+    where: Mapping[str, Any] = field(default_factory=dict)
+    limits: Mapping[str, float] = field(default_factory=dict)
+    labels: Mapping[str, str] = field(default_factory=dict)
 
 
 def _failed(columns: Columns) -> np.ndarray:

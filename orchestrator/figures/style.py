@@ -1,20 +1,12 @@
-"""How figures look: colours that stay apart, settings, headings, and files without a date."""
+"""How figures look, and what they are told of a run; nothing here needs matplotlib."""
 
 from __future__ import annotations
 
-import logging
 import re
-import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from itertools import cycle
-from pathlib import Path
 from typing import Any, NamedTuple
 
-import matplotlib as mpl
-from matplotlib.figure import Figure
-
-from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import STANDARD, Loop, Needs
 
@@ -65,13 +57,6 @@ _SYMBOL = re.compile(rf"(?<![\w\\.])({'|'.join(_GREEK)}|[A-Za-z])_([A-Za-z0-9]+)
 
 #: What figures are written as.
 FIGURE_FORMATS = ("png", "svg")
-
-#: What a file would say of its time and tool, by its ending.
-_NO_DATE: dict[str, Any] = {
-    ".png": {"Software": None},
-    ".svg": {"Date": None},
-    ".pdf": {"CreationDate": None},
-}
 
 
 class Drawn(NamedTuple):
@@ -134,41 +119,3 @@ def _set(symbol: re.Match[str]) -> str:
     base, index = symbol.groups()
     letter = rf"\{_GREEK[base]}" if base in _GREEK else base
     return rf"$\hat{{{letter}}}$" if index == "hat" else rf"${letter}_{{{index}}}$"
-
-
-@contextmanager
-def styled() -> Iterator[None]:
-    """Draw with :data:`SETTINGS` and nothing that a matplotlibrc says, wherever that may be.
-
-    What matplotlib thinks of it is not for the user.
-    """
-    log = logging.getLogger("matplotlib")
-    level = log.level
-    log.setLevel(logging.ERROR)
-    try:
-        with mpl.rc_context(), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            mpl.rcdefaults()
-            mpl.rcParams.update(SETTINGS)
-            yield
-    finally:
-        log.setLevel(level)
-
-
-def save(figure: Figure, *paths: Path) -> None:
-    """Write a figure without the time and the tool, so that the same run gives the same file.
-
-    Raises:
-        InputError: values are too large for its axes.
-
-    """
-    with styled(), mpl.rc_context({"figure.constrained_layout.use": False}):
-        # Laid out once for all files.
-        if (engine := figure.get_layout_engine()) is not None:
-            try:
-                engine.execute(figure)
-            except (ValueError, OverflowError) as error:
-                raise InputError("values lie too far apart to be drawn") from error
-        figure.set_layout_engine(None)
-        for path in paths:
-            figure.savefig(path, metadata=_NO_DATE[path.suffix])

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 from numpy.lib.stride_tricks import sliding_window_view
 
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import STANDARD
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 #: Runs of no more rows than this are kept whole.
 _WHOLE = 20_000

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 
 from auv_fmu.euler import STEP
 from auv_fmu.output_feedback import Gains
+from orchestrator.figures.drawing import overlay, save, styled
 from orchestrator.figures.panels import draw_commands
-from orchestrator.figures.run_figures import overlay
-from orchestrator.figures.style import COLOURS, FIGURE_WIDTH, STYLES, Drawn, save, styled
+from orchestrator.figures.style import COLOURS, FIGURE_WIDTH, STYLES, Drawn
 from orchestrator.paper.claims import FIVE, FIVE_PD, QUIET, SEVEN
 from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.measures import EFFORT_PD, EFFORT_PROPOSED

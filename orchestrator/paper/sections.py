@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from fmus.kinds import PYTHON
-from orchestrator.figures.run_figures import FIGURES, draw
+from orchestrator.figures.drawing import draw
+from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.paper.kept_runs import KeptRun, KeptRuns

@@ -73,18 +73,32 @@ def open_ledger(folder: Path, force: bool = False) -> Iterator[Ledger]:
         InputError: the folder cannot be written, or another run is writing into it.
 
     """
-    made = not os.path.exists(folder)  # noqa: PTH110  # Path.exists raises without permission
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with lock_folder(folder):
+        with make_folder(folder), lock_folder(folder):
             yield Ledger(folder, force)
     except OSError as error:
         raise InputError(_cannot_write(folder, error)) from error
+
+
+@contextmanager
+def make_folder(folder: Path) -> Iterator[None]:
+    """Make a folder and those above it; at the end the new ones go again that are empty.
+
+    Raises:
+        OSError: it cannot be made.
+
+    """
+    whole = folder.absolute()
+    # Path.exists raises without permission.
+    new = [path for path in (whole, *whole.parents) if not os.path.exists(path)]  # noqa: PTH110
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
     finally:
-        if made:
-            with suppress(OSError):
-                # Fails where there is something in it.
-                folder.rmdir()
+        with suppress(OSError):
+            # Fails where there is something in it.
+            for path in new:
+                path.rmdir()
 
 
 def inner_folder(folder: Path, *names: str) -> Path:

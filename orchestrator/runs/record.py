@@ -25,12 +25,13 @@ from orchestrator.machine.ledger import RECORD, is_changed, locate
 from orchestrator.machine.user_files import explain_errors, read_text
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.binary import runs_python
-from orchestrator.master.hooks.checkpoint import Checkpoints, check_gives_states, interval_in
+from orchestrator.master.hooks.checkpoint import Checkpoints, interval_in
 from orchestrator.master.observers.files import TABLE_FORMATS
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.master.plan import PACKAGES, digest_of
 from orchestrator.runs.preparation import Prepared
 from orchestrator.system.names import port_name
+from orchestrator.system.structure import System
 from orchestrator.vehicle.signals import STANDARD, Loop
 
 #: The indices of a run.
@@ -324,6 +325,21 @@ def checkpoints_of(
     if resume and not any(times):
         say(f"there is nothing to resume in {folders[0]}: begins at the start")
     return found
+
+
+def check_gives_states(system: System) -> None:
+    """Check that the states of all FMUs can be had.
+
+    Raises:
+        InputError: of one they cannot.
+
+    """
+    for name, component in system.components.items():
+        if not component.gives_state:
+            raise InputError(
+                f"{name}: its FMU {component.fmu.name} does not provide its state "
+                "(canGetAndSetFMUstate and canSerializeFMUstate): a run with it has no checkpoints"
+            )
 
 
 def leave_checkpoints(

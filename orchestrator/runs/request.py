@@ -15,8 +15,10 @@ from typing import Annotated, Any, get_type_hints
 from fmus.kinds import KINDS, PYTHON
 from orchestrator.master.experiment import COUPLINGS, ORDERS, Order, format_order, read_order
 from orchestrator.master.fmi.isolated import STEP_TIMEOUT
+from orchestrator.master.hooks.checkpoint import check_every
 from orchestrator.master.loop import LOOPS
 from orchestrator.master.observers.files import TABLE_FORMATS
+from orchestrator.master.observers.observer import check_interval
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.values import literal
 
@@ -187,7 +189,12 @@ class Request:
 
 @dataclass(frozen=True)
 class Files:
-    """What a run leaves in its folder."""
+    """What a run leaves in its folder.
+
+    Raises:
+        InputError: an interval makes no sense.
+
+    """
 
     interval: Annotated[
         float | None,
@@ -221,6 +228,12 @@ class Files:
         bool, CliOption("go on from the last checkpoint in DIR/checkpoint", action="store_true")
     ] = False
     force: Force = False
+
+    def __post_init__(self) -> None:
+        if self.interval is not None:
+            check_interval(self.interval)
+        if self.checkpoint_every is not None:
+            check_every(self.checkpoint_every)
 
 
 def _text(value: Any) -> str:

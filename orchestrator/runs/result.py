@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fmus.kinds import PYTHON
-from orchestrator.figures.plot import plot
 from orchestrator.machine.errors import InputError, did_you_mean, reason
 from orchestrator.master.experiment import Order, format_order
 from orchestrator.master.hooks.checkpoint import Checkpoints
@@ -20,7 +19,7 @@ from orchestrator.master.loop import LOOPS
 from orchestrator.master.observers.files import TABLE_FORMATS
 from orchestrator.master.observers.observer import Observer, Occurrence, Progress
 from orchestrator.master.observers.table import Table
-from orchestrator.runs.folder import lock_folder, replace_files
+from orchestrator.runs.folder import lock_folder, make_folder, replace_files
 from orchestrator.runs.loading import check_brings_its_own, load_scenario, notes_as_warnings
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.record import (
@@ -146,6 +145,8 @@ class Result(Table):
             ValueError: a pattern matches no column.
 
         """
+        from orchestrator.figures.plot import plot  # noqa: PLC0415
+
         return plot([(self._prepared.scenario.name, self)], patterns)
 
     def save(
@@ -312,8 +313,7 @@ def _checkpoints(
         raise InputError("checkpoints need checkpoint=, and checkpoint_every= or resume=")
     place = Path(folder)
     try:
-        place.mkdir(parents=True, exist_ok=True)
-        with lock_folder(place):
+        with make_folder(place), lock_folder(place):
             yield checkpoints_of([prepared], [place], every, resume)
     except OSError as error:
         raise InputError(f"cannot write into {place}: {reason(error)}") from error

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.figures.run_figures import draw, figure_files
+from orchestrator.figures.run_figures import figure_files
 from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.disk import process_folder
@@ -30,7 +30,6 @@ from orchestrator.master.observers.observer import (
     Observer,
     Progress,
     Selection,
-    check_interval,
     matches,
     matching,
 )
@@ -87,6 +86,7 @@ def run_into(
     files: Files,
     command: Sequence[str],
     say: Callable[[str], None],
+    draw: Callable[..., list[str]] | None,
 ) -> list[Finished]:
     """Run a scenario, and those it is compared with, and write the files of all.
 
@@ -96,13 +96,12 @@ def run_into(
         files: what to keep.
         command: for the record.
         say: takes notes for the user while it goes on.
+        draw: the figures, :func:`.drawing.draw`; None: there are none.
 
     Raises:
         InputError: a run cannot be made, or its files cannot be written.
 
     """
-    if files.interval is not None:
-        check_interval(files.interval)
     tables = [
         selected_columns(prepared.system, files.columns, is_companion=i > 0)
         for i, prepared in enumerate(runs)
@@ -158,8 +157,8 @@ def run_into(
                 if interrupts:
                     break
             ended_at_once = done[0].ending.failure is not None and len(done[0].seen.rows) == 1
-            if not files.no_figures and not interrupts.urgent and not ended_at_once:
-                for note in _draw(runs[0].scenario, done, unfinished, interrupts):
+            if draw and not interrupts.urgent and not ended_at_once:
+                for note in _draw(draw, runs[0].scenario, done, unfinished, interrupts):
                     say(note)
         except (OSError, MemoryError) as error:
             if not done:
@@ -283,7 +282,11 @@ def _write_ends(done: Sequence[_Running], command: Sequence[str], clock: Stopwat
 
 
 def _draw(
-    scenario: Scenario, done: Sequence[_Running], folder: Path, interrupts: Interrupts
+    draw: Callable[..., list[str]],
+    scenario: Scenario,
+    done: Sequence[_Running],
+    folder: Path,
+    interrupts: Interrupts,
 ) -> list[str]:
     """Draw all figures or, if one cannot be written, none; returns notes on omissions."""
     drawn = [

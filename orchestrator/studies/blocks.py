@@ -89,8 +89,6 @@ def local_workers(n: int | None, engine: Engine) -> Iterator[Crew]:
         InputError: none can be started.
 
     """
-    if n is not None and n < 1:
-        raise InputError(f"--workers {n}: must be at least 1")
     with workers_of(n, partial(_set_up, engine)) as workers:
         try:
             workers.done([first := workers.submit(bool)])

@@ -12,7 +12,7 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from functools import cached_property
 from hashlib import sha256
 from importlib import import_module
@@ -94,6 +94,14 @@ class Store:
         if not self.is_done:
             self._database.close()
 
+    def withdraw(self) -> None:
+        """Leave nothing of the study in the folder, if no run is done."""
+        with suppress(OSError, sqlite3.Error):
+            if not (self.is_done or len(self)):
+                self.close()
+                self._remove_database()
+                self.ledger.remove([STUDY_RECORD])
+
     def missing(self, n: int) -> Iterator[int]:
         """The numbers, of those below n, of runs that were not done when the store was opened."""
         for before, after in pairwise([-1, *self._done, n]):
@@ -130,7 +138,8 @@ class Store:
 
     def write_record(self, record: Mapping[str, Any]) -> None:
         """Write the record of the study, if it is another than before."""
-        path, text = self._folder / STUDY_RECORD, _json(record) + "\n"
+        # A date is a text, as it is where a parameter is one.
+        path, text = self._folder / STUDY_RECORD, json.dumps(record, indent=2, default=str) + "\n"
         if path.exists() and path.read_text(encoding="utf-8") == text:
             return
         with self.ledger.changing() as unfinished:
@@ -214,7 +223,11 @@ def open_store(
                         move_aside(folder / name)
                 found = Store(ledger, record, indices)
         with closing(found):
-            yield found
+            try:
+                yield found
+            except InputError:
+                found.withdraw()
+                raise
 
 
 @contextmanager
@@ -228,13 +241,8 @@ def explain_write_errors(folder: Path) -> Iterator[None]:
         ) from error
 
 
-def _json(content: Mapping[str, Any]) -> str:
-    # A date is a text, as it is where a parameter is one.
-    return json.dumps(content, indent=2, default=str)
-
-
 def read_study_record(folder: Path) -> dict[str, Any]:
-    """Read the record of a study.
+    """The record of a study.
 
     Raises:
         InputError: there is none.
@@ -257,8 +265,8 @@ def _check_same(ledger: Ledger, record: Mapping[str, Any]) -> None:
             raise InputError(f"{folder}: has runs, but no {STUDY_RECORD}; choose another folder")
         return
     before = dict(read_study_record(folder)["made_of"])
-    # As it is read again: JSON knows no tuples.
-    now = json.loads(_json(record["made_of"]))
+    # As it is read again: JSON knows no tuples and no dates.
+    now = json.loads(json.dumps(record["made_of"], default=str))
     different = [key for key in {**now, **before} if now.get(key) != before.get(key)]
     if different:
         raise InputError(

@@ -14,8 +14,7 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
-from orchestrator.figures.study_figures import FIGURE_KINDS, FigureEntry
-from orchestrator.figures.study_values import SCENARIO, is_known
+from orchestrator.figures.study_values import FIGURE_KINDS, SCENARIO, FigureEntry, is_known
 from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.machine.user_files import explain_errors, find_toml, read_text
@@ -128,7 +127,7 @@ class FigureTable(TomlTable):
 
     @model_validator(mode="after")
     def _has_what_its_kind_has(self) -> Self:
-        _, needs, may = FIGURE_KINDS[self.kind]
+        needs, may = FIGURE_KINDS[self.kind]
         if missing := [key for key in needs if not getattr(self, key)]:
             raise ValueError(f"lacks {' and '.join(missing)}")
         if more := self.model_fields_set - {"kind", *needs, *may}:

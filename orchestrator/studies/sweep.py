@@ -55,7 +55,12 @@ _NAMELESS = "study"
 
 @dataclass(frozen=True)
 class Means:
-    """How the runs of a study are made."""
+    """How the runs of a study are made.
+
+    Raises:
+        InputError: its entries do not go together.
+
+    """
 
     engine: Annotated[
         str | None,
@@ -80,6 +85,15 @@ class Means:
         CliOption("number of processes on this machine; default: its cores", type=int, metavar="N"),
     ] = None
     force: Force = False
+
+    def __post_init__(self) -> None:
+        if self.workers is not None and self.workers < 1:
+            raise InputError(f"--workers {self.workers}: must be at least 1")
+        if self.workers is not None and self.scheduler is not None:
+            raise InputError(
+                "--workers is for processes of this machine: those of a scheduler are started with "
+                "it"
+            )
 
 
 def sweep(
@@ -289,10 +303,6 @@ def making_runs(
         # Dask takes a second to be imported, and need not be there.
         from orchestrator.studies.cluster import cluster  # noqa: PLC0415
 
-        if workers is not None:
-            raise InputError(
-                "--workers is for processes of this machine: a scheduler has its own workers"
-            )
         crew = cluster(scheduler, engine)
     else:
         crew = local_workers(workers, engine)

@@ -31,12 +31,13 @@ from hypothesis import strategies as st
 
 from orchestrator.commands import many_runs
 from orchestrator.commands.main import main
+from orchestrator.figures import drawing
 from orchestrator.figures.run_figures import figure_files
 from orchestrator.machine.ledger import LEDGER
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.paper import report
 from orchestrator.paper.sections import Section
-from orchestrator.runs import bundle, run
+from orchestrator.runs import bundle
 from orchestrator.runs.bundle import MANIFEST, current_fmus
 from orchestrator.studies.engine import Engine, Outcome, Point
 from orchestrator.studies.store import Store
@@ -182,7 +183,7 @@ def quick(here: Path) -> Iterator[None]:
     with ExitStack() as stack:
         for what, name, instead in (
             (bundle, "run_fmus", copied),
-            (run, "draw", drawn),
+            (drawing, "draw", drawn),
             (report, "draw_section", shown),
             (report, "workers", lambda: nullcontext(InThisProcess())),
             (report, "CLAIMS", ()),

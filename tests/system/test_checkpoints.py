@@ -312,5 +312,6 @@ def test_from_python(left):
     assert not Path("r/checkpoint").exists()
     with pytest.raises(ValueError, match="nothing to resume in r/checkpoint"):
         simulate("fig4", checkpoint="r/checkpoint", resume=True)
+    assert not Path("r/checkpoint").exists()
     with pytest.raises(ValueError, match="checkpoints need checkpoint="):
         simulate("fig4", checkpoint_every=1.0)

@@ -17,6 +17,7 @@ from orchestrator.machine.ledger import LEDGER
 from orchestrator.runs import bundle
 from orchestrator.runs.scenario import SCENARIOS_FOLDER as SCENARIOS
 from orchestrator.runs.scenario import names, read_scenario
+from orchestrator.studies.study import STUDIES_FOLDER as STUDIES
 from support.texts import mentions, tells
 from support.tiers import slow
 
@@ -208,3 +209,33 @@ def test_command_is_installed(workplace):
     command = Path(sys.executable).with_name("auv-fmu")
     shown = subprocess.run([command, "--version"], capture_output=True, text=True, check=True)
     assert shown.stdout.strip()
+
+
+#: Runs the command line and answers which of some modules it has imported.
+_IMPORTED = """
+import sys
+from orchestrator.commands.main import main
+*arguments, unwanted = sys.argv[1:]
+main(arguments)
+print(sorted(sys.modules.keys() & {*unwanted.split(",")}), file=sys.stderr)
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "unwanted"),
+    [
+        ("run fig4 --kind native --no-figures --stop-time 0.1", "matplotlib"),
+        ("check fig4", "matplotlib"),
+        ("check PdController.fmu", "matplotlib,pydantic"),
+        ("check study.toml", "matplotlib"),
+        ("list", "matplotlib"),
+    ],
+)
+def test_what_draws_nothing_does_not_wait_for_matplotlib(native, workplace, arguments, unwanted):
+    shutil.copy(native / "PdController.fmu", workplace)
+    shutil.copy(STUDIES / "attraction.toml", "study.toml")
+    process = subprocess.run(
+        [sys.executable, "-c", _IMPORTED, *arguments.split(), unwanted],
+        check=True, capture_output=True, text=True,
+    )  # fmt: skip
+    assert process.stderr == "[]\n"

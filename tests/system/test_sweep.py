@@ -126,6 +126,7 @@ def test_command_makes_what_is_missing_and_nothing_twice(study, capfd):
     ("options", "words"),
     [
         ("--workers 0", "--workers 0"),
+        ("--workers 2 --scheduler nowhere", "--workers"),
         ("--scheduler nowhere", "nowhere" if find_spec("distributed") else "Dask"),
         ("--out mine.toml", "mine.toml"),
     ],

@@ -32,7 +32,6 @@ from orchestrator.master.fmi.instance import Log
 from orchestrator.master.hooks.hook import NEVER, Lasting, Run
 from orchestrator.master.observers.observer import Ending, Header, NotKept
 from orchestrator.master.plan import Identity
-from orchestrator.system.structure import System
 
 #: The file that grows, and the one that is replaced.
 _ROWS, _STATE = "rows.bin", "state.json"
@@ -175,19 +174,15 @@ class _Stored(NamedTuple):
     lasting: Sequence[Any] = ()
 
 
-def check_gives_states(system: System) -> None:
-    """Check that the states of all FMUs can be had.
+def check_every(every: float) -> None:
+    """Check before a run that there can be a checkpoint for so many seconds.
 
     Raises:
-        InputError: of one they cannot.
+        InputError: they are not positive, or not finite.
 
     """
-    for name, component in system.components.items():
-        if not component.gives_state:
-            raise InputError(
-                f"{name}: its FMU {component.fmu.name} does not provide its state "
-                "(canGetAndSetFMUstate and canSerializeFMUstate): a run with it has no checkpoints"
-            )
+    if not (isfinite(every) and every > 0.0):
+        raise InputError(f"a checkpoint every {every:g} s: must be positive and finite")
 
 
 class Checkpoints:
@@ -224,8 +219,7 @@ class Checkpoints:
             InputError: the checkpoint there is not asked for, or not the right one.
 
         """
-        if not (isfinite(every) and every > 0.0):
-            raise InputError(f"a checkpoint every {every:g} s: must be positive and finite")
+        check_every(every)
         self.folder, self._run, self._every = folder, identity, every
         self._found = self._look(resume, force)
         self._identity = self._found.identity if self._found else token or uuid4().hex

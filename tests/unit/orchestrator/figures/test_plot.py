@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from orchestrator.figures.drawing import save
 from orchestrator.figures.plot import plot
-from orchestrator.figures.style import save
 from orchestrator.machine.errors import InputError
 from support.tables import loop_table, table_of
 

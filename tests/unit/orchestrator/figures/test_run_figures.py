@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.figures.panels import compose
-from orchestrator.figures.run_figures import FIGURES, check_figure, draw, overlay
+from orchestrator.figures.drawing import compose, draw, overlay
+from orchestrator.figures.run_figures import FIGURES, check_figure
 from orchestrator.figures.style import Drawn
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.signals import STANDARD

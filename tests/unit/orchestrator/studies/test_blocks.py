@@ -12,7 +12,6 @@ from multiprocessing import active_children
 import pytest
 
 from orchestrator.machine import workers
-from orchestrator.machine.errors import InputError
 from orchestrator.studies import blocks as blocks_module
 from orchestrator.studies.blocks import FATAL
 from orchestrator.studies.sweep import making_runs
@@ -64,14 +63,6 @@ def test_a_run_that_ends_every_process_is_the_only_one_that_fails():
     assert sorted(made) == [run.number for run in runs]
     assert [n for n, made in made.items() if made.failure] == [17]
     assert made[17].failure == FATAL and not made[17].indices
-
-
-def test_no_worker_is_too_few():
-    with (
-        pytest.raises(InputError, match=r"^--workers 0: must be at least 1$"),
-        making_runs(Toy(), [], workers=0),
-    ):
-        pass
 
 
 def interrupted_after_the_first(runs):

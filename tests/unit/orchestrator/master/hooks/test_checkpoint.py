@@ -11,15 +11,11 @@ import pytest
 
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.hooks.checkpoint import (
-    Checkpoints,
-    RowLog,
-    check_gives_states,
-    interval_in,
-)
+from orchestrator.master.hooks.checkpoint import Checkpoints, RowLog, interval_in
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import make_plan
 from orchestrator.master.simulation import simulate_plan
+from orchestrator.runs.record import check_gives_states
 from orchestrator.system.structure import System
 from support.linear import SINE, Part, linear, system_of
 

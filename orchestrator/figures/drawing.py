@@ -1,0 +1,204 @@
+"""Figures drawn by matplotlib, with our settings and nobody else's, into files without a date.
+
+What only looks a figure up imports :mod:`.run_figures`: matplotlib takes as long as all the rest.
+"""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from math import lcm
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+from tqdm import tqdm
+
+from orchestrator.figures.panels import Cell, Panel, Rows
+from orchestrator.figures.run_figures import FIGURES
+from orchestrator.figures.style import FIGURE_FORMATS, FIGURE_WIDTH, SETTINGS, Drawn, heading
+from orchestrator.machine.errors import InputError
+from orchestrator.vehicle.signals import Loop, suffixes
+
+#: What a file would say of its time and tool, by its ending.
+_NO_DATE: dict[str, Any] = {
+    ".png": {"Software": None},
+    ".svg": {"Date": None},
+    ".pdf": {"CreationDate": None},
+}
+
+#: Room for a heading [in].
+_HEADING = 0.3
+
+#: Seconds before a bar appears on a terminal.
+_PATIENCE = 2.0
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw with :data:`.SETTINGS` and nothing that a matplotlibrc says, wherever that may be.
+
+    What matplotlib thinks of it is not for the user.
+    """
+    log = logging.getLogger("matplotlib")
+    level = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        with mpl.rc_context(), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            mpl.rcdefaults()
+            mpl.rcParams.update(SETTINGS)
+            yield
+    finally:
+        log.setLevel(level)
+
+
+def save(figure: Figure, *paths: Path) -> None:
+    """Write a figure without the time and the tool, so that the same run gives the same file.
+
+    Raises:
+        InputError: values are too large for its axes.
+
+    """
+    with styled(), mpl.rc_context({"figure.constrained_layout.use": False}):
+        # Laid out once for all files.
+        if (engine := figure.get_layout_engine()) is not None:
+            try:
+                engine.execute(figure)
+            except (ValueError, OverflowError) as error:
+                raise InputError("values lie too far apart to be drawn") from error
+        figure.set_layout_engine(None)
+        for path in paths:
+            figure.savefig(path, metadata=_NO_DATE[path.suffix])
+
+
+def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | None, list[str]]:
+    """A figure of all that can be drawn.
+
+    Args:
+        title: heading; empty for none.
+        rows: of the figure.
+        runs: the first is the one the figure is about.
+
+    Returns:
+        The figure, and what was left out of it, and why; or None, and what is missing.
+
+    """
+    runs = [run for run in runs if len(run.result) > 1]
+    if not runs:
+        return None, ["step"]
+    panels = [panel for row in rows for panel in row]
+    shown = [panel for panel in panels if any(not run.lacks(panel.needs) for run in runs)]
+    drawn = [kept for row in rows if (kept := [panel for panel in row if panel in shown])]
+    if not drawn:
+        return None, runs[0].lacks(panels[0].needs)
+    heights = [max(panel.height for panel in row) for row in drawn]
+    with styled():
+        figure = Figure(figsize=(FIGURE_WIDTH, sum(heights) + _HEADING * bool(title)))
+        if title:
+            figure.suptitle(heading(title), wrap=True)
+        columns = lcm(*map(len, drawn))
+        grid = figure.add_gridspec(len(drawn), columns, height_ratios=heights)
+        for i, row in enumerate(drawn):
+            width = columns // len(row)
+            for j, panel in enumerate(row):
+                panel.draw(Cell(figure, grid[i, j * width : (j + 1) * width]), runs)
+    return figure, [note for panel in panels for note in _left_out(panel, runs)]
+
+
+def _left_out(panel: Panel, runs: Sequence[Drawn]) -> list[str]:
+    """What a panel does not show, and why."""
+    missing = {run.label: run.lacks(panel.needs) for run in runs}
+    if all(missing.values()):
+        return [f"{panel.name} left out: no {missing[runs[0].label][0]}"]
+    return [
+        f"{panel.name} of {label} left out: no {names[0]}"
+        for label, names in missing.items()
+        if names
+    ]
+
+
+def overlay(heading: str, runs: Sequence[Drawn]) -> Figure:
+    """Tracking errors and commands of several runs in the same panels.
+
+    Args:
+        heading: of the figure; empty for none.
+        runs: with labels that tell them apart.
+
+    Raises:
+        InputError: no run has anything to show.
+
+    """
+    figure, missing = compose(heading, FIGURES["overlay"][""], runs)
+    if figure is None:
+        raise InputError(f"no figure: the runs have no {missing[0]}")
+    return figure
+
+
+def draw(
+    kind: str,
+    title: str,
+    runs: Sequence[Drawn],
+    folder: Path,
+    stem: str,
+    stop: Callable[[], bool] = lambda: False,
+) -> list[str]:
+    """Draw the figures of a scenario, as PNG and SVG, as far as the runs have what they show.
+
+    Of several vehicles each has its own, together with the vehicle of that name in the other runs.
+
+    Args:
+        kind: key of :data:`FIGURES`.
+        title: heading; empty where there is one beside the figure.
+        runs: the run of the scenario, and those it is compared with.
+        folder: to write into.
+        stem: of the file names.
+        stop: asked before each figure whether to leave it out.
+
+    Returns:
+        What was left out, and why.
+
+    """
+    notes: list[str] = []
+    for i, (loop, vehicle) in enumerate(suffixes(runs[0].loops).items()):
+        of_vehicle = [run._replace(loops=[_same(run, loop, i)]) for run in runs]
+        name = ", ".join(filter(None, (title, loop.vehicle if vehicle and title else "")))
+        notes += _drawn(kind, name, of_vehicle, folder, f"{stem}{vehicle}", stop)
+    return notes
+
+
+def _same(run: Drawn, loop: Loop, i: int) -> Loop:
+    """The loop of a run that is drawn beside another's: the one of the same vehicle."""
+    named = [own for own in run.loops if own.vehicle == loop.vehicle]
+    return next(iter([*named, *run.loops[i : i + 1], *run.loops]))
+
+
+def _drawn(
+    kind: str,
+    title: str,
+    runs: Sequence[Drawn],
+    folder: Path,
+    stem: str,
+    stop: Callable[[], bool],
+) -> list[str]:
+    """Draw the figures of one vehicle, and say what was left out."""
+    notes: list[str] = []
+    bar = tqdm(FIGURES[kind].items(), desc="drawing", delay=_PATIENCE, disable=None, leave=False)
+    for suffix, rows in bar:
+        if stop():
+            break
+        figure, left_out = compose(title, rows, runs)
+        if figure is not None:
+            try:
+                save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in FIGURE_FORMATS))
+                notes += left_out
+            except InputError as error:
+                notes.append(f"{stem}{suffix} left out: {error}")
+        elif not suffix:
+            return [f"no figure: the run has no {left_out[0]}"]
+        else:
+            notes.append(f"{stem}{suffix} left out: no {left_out[0]}")
+    return notes
