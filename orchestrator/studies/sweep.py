@@ -15,9 +15,9 @@ from typing import Annotated, Any
 
 from tqdm import tqdm
 
+from fmus.compilers import machines_compiler
 from fmus.kinds import PYTHON
 from orchestrator.figures.study_figures import draw_figures, figure_files
-from orchestrator.machine.children import machines_compiler
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.loop import LOOPS
