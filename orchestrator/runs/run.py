@@ -293,7 +293,7 @@ class _Unfinished:
         """Go on with the runs that are done, where another or the figures cannot be written."""
         if not self._done:
             raise error
-        if self._latest != self._done[-1].folder:
+        if self._latest != self._done[-1].folder and self._latest.is_dir():
             rmtree(self._latest)
         first, failure = self._done[0], f"could not be written in full: {reason(error)}"
         first.ending = replace(first.ending, failure=first.ending.failure or failure)
