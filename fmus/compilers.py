@@ -1,4 +1,7 @@
-"""C compilers, and what they make of the sources of an FMU."""
+"""C compilers, and what they make of the sources of an FMU.
+
+`orchestrator` runs compilers with it, too, so nothing here imports PythonFMU.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,6 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,8 +20,7 @@ from typing import NamedTuple
 
 from fmus.kinds import TARGETS, Platform, this_machine
 
-#: C compilers: the first one that there is, is taken. :mod:`orchestrator.machine.children` has the
-#: same.
+#: C compilers: the first one that there is, is taken.
 COMPILERS = ("cc", "gcc", "clang")
 
 #: How sources are compiled. Contracted or reordered operations would change numbers.
@@ -40,7 +41,7 @@ _ZIG = {machine: ("-target", target) for machine, target in TARGETS.items()}
 _APPLE = {"x86_64-darwin": ("-arch", "x86_64"), "aarch64-darwin": ("-arch", "arm64")}
 
 #: How long this machine's compiler may take [s], and ziglang, which makes a C library, too.
-_LIMIT, _LIMIT_OF_ZIG = 120.0, 900.0
+_LIMIT, LIMIT_OF_ZIG = 120.0, 900.0
 
 #: Universal binaries, as Apple calls libraries for several processors in one file.
 _MAGIC_FAT, _MAGIC_64 = 0xCAFEBABE, 0xFEEDFACF
@@ -75,19 +76,21 @@ def machines_compiler() -> str | None:
 
 
 def run_compiler(
-    command: Sequence[str], folder: Path | None, limit: float = _LIMIT
+    command: Sequence[str], folder: Path | None = None, limit: float | None = None
 ) -> subprocess.CompletedProcess[str]:
     """Run a C compiler, and end it with all that it has started if it takes too long.
 
     Args:
         command: with its arguments.
         folder: that it runs in; None: the current one.
-        limit: how long it may take [s].
+        limit: how long it may take [s]; None: as long as this machine's.
 
     Raises:
         OSError: it takes longer, or cannot be started.
 
     """
+    limit = _LIMIT if limit is None else limit
+    # Ctrl-C is for this process only.
     with subprocess.Popen(
         command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         errors="replace", start_new_session=True,
@@ -121,8 +124,11 @@ def compiler_for(platforms: Sequence[Platform]) -> Compiler:
         options = _LINUX if machine.endswith("-linux") else ()
         return Compiler(_version_of(own), [own, *options], targets)
     if find_spec("ziglang") is not None:
+        # Slow to import, and the command line always imports this module.
+        from importlib.metadata import version  # noqa: PLC0415
+
         command = [sys.executable, "-m", "ziglang", "cc"]
-        return Compiler(f"ziglang {version('ziglang')}", command, _ZIG, _LIMIT_OF_ZIG)
+        return Compiler(f"ziglang {version('ziglang')}", command, _ZIG, LIMIT_OF_ZIG)
     names = ", ".join(others or [platform.name for platform in platforms])
     remedy = "pip install 'auv-fmu[native]' brings one"
     if not others and machine.endswith("-linux"):
@@ -131,7 +137,7 @@ def compiler_for(platforms: Sequence[Platform]) -> Compiler:
 
 
 def _version_of(command: str) -> str:
-    process = run_compiler([command, "--version"], None)
+    process = run_compiler([command, "--version"])
     return process.stdout.partition("\n")[0] or command
 
 

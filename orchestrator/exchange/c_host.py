@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from fmpy.model_description import ScalarVariable
 
+from fmus.compilers import COMPILERS, LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.formats.tables import read_columns, read_rows
-from orchestrator.machine.children import COMPILERS, LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.binary import binary_of
@@ -70,7 +70,7 @@ def compile_host(
     if not is_windows:
         options.append("-ldl")  # until glibc 2.34, dlopen is in a separate library
     try:
-        process = run_compiler([*found, *options], LIMIT_OF_ZIG if command else None)
+        process = run_compiler([*found, *options], limit=LIMIT_OF_ZIG if command else None)
     except OSError as error:
         raise InputError(f"{HOST_SOURCE.name} does not compile: {reason(error)}") from error
     if process.returncode != 0:

@@ -9,27 +9,18 @@ from __future__ import annotations
 
 import os
 import runpy
-import shutil
-import signal
 import sys
 import threading
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from subprocess import PIPE, CompletedProcess, Popen, TimeoutExpired, run
+from subprocess import CompletedProcess, run
 from tempfile import TemporaryDirectory
 
+from fmus.compilers import LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import last_line
-
-#: C compilers: the first one that there is, is taken. :mod:`fmus.compilers` has the same, and runs
-#: them in the same way: neither of the two may import the other.
-COMPILERS = ("cc", "gcc", "clang")
-
-#: How long this machine's compiler may take [s], and ziglang, which makes a C library, too.
-_LIMIT, LIMIT_OF_ZIG = 60.0, 600.0
 
 #: A compiler: a call with its arguments.
 Compiler = Callable[..., CompletedProcess[str]]
@@ -106,11 +97,6 @@ def find_fast_compiler() -> Compiler | None:
     return None if command is None else lambda *arguments: run_compiler([command, *arguments])
 
 
-def machines_compiler() -> str | None:
-    """The command of this machine's C compiler; None: it has none."""
-    return next(filter(None, map(shutil.which, COMPILERS)), None)
-
-
 def compile_library(compiler: Compiler, *arguments: str) -> bytes:
     """Compile a library of sources and options, and give its bytes.
 
@@ -125,36 +111,6 @@ def compile_library(compiler: Compiler, *arguments: str) -> bytes:
             errors = (line for line in process.stderr.splitlines() if "error" in line)
             raise OSError(next(errors, last_line(process.stderr)))
         return path.read_bytes()
-
-
-def run_compiler(command: Sequence[str], limit: float | None = None) -> CompletedProcess[str]:
-    """Run a C compiler, and end it with all that it has started if it takes too long.
-
-    Args:
-        command: with its arguments.
-        limit: how long it may take [s]; None: the limit of this machine's.
-
-    Raises:
-        OSError: it does, or it cannot be started.
-
-    """
-    limit = _LIMIT if limit is None else limit
-    # Ctrl-C is for this process only.
-    with Popen(
-        command, stdout=PIPE, stderr=PIPE, text=True, errors="replace", start_new_session=True
-    ) as process:
-        try:
-            said, complaints = process.communicate(timeout=limit)
-        except BaseException as error:
-            if os.name == "posix":
-                # After Ctrl-C, Python has waited for it, and it may have ended.
-                with suppress(ProcessLookupError):
-                    os.killpg(process.pid, signal.SIGKILL)
-            process.kill()
-            if isinstance(error, TimeoutExpired):
-                raise TimeoutError(f"{command[0]} has not ended after {limit:g} s") from None
-            raise
-    return CompletedProcess(command, process.returncode, said, complaints)
 
 
 def _follow() -> None:

@@ -94,15 +94,7 @@ class Experiment:
                 object.__setattr__(self, name, float(value))
             except OverflowError:
                 raise InputError("times and step must be smaller than 1e308 s") from None
-        if not (isfinite(self.step) and self.step > 0.0):
-            raise InputError(f"step {self.step:g} s must be positive, and finite")
-        if not (isfinite(self._length) and self._length > 0.0):
-            than = f"after the start time, {self.start_time:g} s" if self.start_time else "positive"
-            raise InputError(f"stop time {self.stop_time:g} s must be {than}, and finite")
-        if self._length / self.step > MOST_STEPS:
-            raise InputError(
-                f"{self._length:g} s in steps of {self.step:g} s are more than {MOST_STEPS:,} steps"
-            )
+        self.check_step(self.step)
         if self.coupling not in (None, *COUPLINGS):
             raise InputError(f"coupling {self.coupling!r}: use one of {', '.join(COUPLINGS)}")
         if self.coupling == LINEAR and not isinstance(self.order, str):
@@ -112,6 +104,23 @@ class Experiment:
         elif self.order not in ORDERS:
             raise InputError(
                 f"order {self.order!r}: use one of {', '.join(ORDERS)}, or name every component"
+            )
+
+    def check_step(self, step: float) -> None:
+        """Check that it can be run in steps of a length [s].
+
+        Raises:
+            InputError: it cannot be.
+
+        """
+        if not (isfinite(step) and step > 0.0):
+            raise InputError(f"step {step:g} s must be positive, and finite")
+        if not (isfinite(self._length) and self._length > 0.0):
+            than = f"after the start time, {self.start_time:g} s" if self.start_time else "positive"
+            raise InputError(f"stop time {self.stop_time:g} s must be {than}, and finite")
+        if self._length / step > MOST_STEPS:
+            raise InputError(
+                f"{self._length:g} s in steps of {step:g} s are more than {MOST_STEPS:,} steps"
             )
 
     @property

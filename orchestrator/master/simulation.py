@@ -11,13 +11,14 @@ import numpy as np
 from orchestrator.machine.errors import InputError, StartError, reason, unforeseen
 from orchestrator.machine.interrupts import held_interrupts
 from orchestrator.master.coupling import Coupling, Growth
+from orchestrator.master.early_end import make_steps
 from orchestrator.master.experiment import OURS, Exchange
 from orchestrator.master.fmi.instance import ComponentFailed, Ended, Instance, Log
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.fmi.placement import place_instances
 from orchestrator.master.fmi.surroundings import Surroundings, default_mode
 from orchestrator.master.hooks.hook import Hook, Hooks, Run
-from orchestrator.master.loop import PYTHON_LOOP, Stepping, make_steps
+from orchestrator.master.loop import PYTHON_LOOP, Stepping
 from orchestrator.master.observers.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.plan import Plan
 from orchestrator.master.row import Overrides, Row

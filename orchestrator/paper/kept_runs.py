@@ -103,11 +103,12 @@ class KeptRuns:
             try:
                 prepared = prepare_request(wanted)
             except InputError as error:
-                self._keys[run] = self._labels[run.command_line] = key = run.command_line
+                self._keys[run] = key = repr(run)
+                self._labels[key] = run.label
                 self._kept_runs[key] = KeptRun({"failure": str(error)}, Table())
                 continue
             self._keys[run] = key = key_of(prepared)
-            label = wanted.command_line
+            label = wanted.label
             self._labels[key] = min(label, self._labels.get(key, label), key=len)
             ledger.check([_file(key)])
             if ledger.owns(_file(key)):

@@ -182,7 +182,7 @@ def _text(
     yield "## Versions and commands"
     versions = ", ".join(f"{package} {version(package)}" for package in RECORDED_PACKAGES)
     yield f"Python {platform.python_version()}, {versions}. Written by `{shlex.join(command)}`."
-    yield "Each of these commands makes a run of this report:"
+    yield "Each of these commands makes a run of this report; what has no option is in parentheses:"
     yield "```\n" + "\n".join(f"auv-fmu run {label}" for label in kept_runs.labels) + "\n```"
 
 

@@ -1,7 +1,7 @@
 """What a user asks for when making a run: each option is declared once.
 
 The command line makes its options of these fields (`commands/options.py`), `simulate` its keywords,
-and the report writes a request down as the command line that has it made.
+and the report calls a request by the command that makes it.
 """
 
 from __future__ import annotations
@@ -170,21 +170,25 @@ class Request:
         return {port_name(str(name)): value for name, value in self.parameters.items()}
 
     @property
-    def command_line(self) -> str:
-        """What a user types after `auv-fmu run`."""
+    def label(self) -> str:
+        """What it is called: words after `auv-fmu run`, and in parentheses what has no option."""
         words, untouched = [self.scenario], Request()
+        rest = {"steps": ", ".join(f"{name} = {_text(h)} s" for name, h in self.steps.items())}
         for name, one in option_fields(Request).items():
             value = getattr(self, name)
             if value == getattr(untouched, name):
+                continue
+            if name == "events" and not isinstance(value, str):
+                # Tables; the option takes the scenario that has them.
+                rest[name] = ", ".join(map(str, value)) or "none"
                 continue
             words.append(flag(name))
             if one.how.get("action") != "store_true":
                 words.append(format_order(value) if name == "order" else _text(value))
         for name, value in self.parameters.items():
             words += ["--set", f"{name}={_text(value)}"]
-        # There is no option for these.
-        steps = ", ".join(f"{name} = {_text(step)} s" for name, step in self.steps.items())
-        return shlex.join(words) + f" (steps: {steps})" * bool(steps)
+        told = "; ".join(f"{name}: {text}" for name, text in rest.items() if text)
+        return shlex.join(words) + f" ({told})" * bool(told)
 
 
 @dataclass(frozen=True)

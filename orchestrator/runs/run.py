@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import zip_longest
@@ -45,7 +45,6 @@ from orchestrator.runs.record import (
     write_record,
 )
 from orchestrator.runs.request import Files
-from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import file_name
 from orchestrator.system.structure import System
 from orchestrator.vehicle.cautions import cautions, cautions_after, cautions_beside, watched_columns
@@ -111,18 +110,11 @@ def run_into(
     np.linalg.inv(np.eye(1))
     clock = Stopwatch()
     done: list[_Running] = []
-    loops = runs[0].loops
-    figures = figure_files(runs[0].scenario.figure, runs[0].scenario.stem, loops)
-    folders = _folders(runs, figures)
-    names = [*figures, *(Path(below, name).as_posix() for below in folders for name in FILES)]
-    names += [
-        Path(below, _certificates(vehicle)).as_posix()
-        for prepared, below in zip(runs, folders, strict=True)
-        for vehicle in suffixes(prepared.loops).values()
-    ]
+    folders = _folders(runs)
+    names = _names(runs, folders)
     with (
         held_interrupts() as interrupts,
-        replace_files(folder, names, force=files.force, keep=lambda: bool(done)) as unfinished,
+        replace_files(folder, names, force=files.force, keep=lambda: bool(done)) as path,
     ):
         kept = checkpoints_of(
             runs,
@@ -133,48 +125,20 @@ def run_into(
             Ledger(folder).identity,
             say,
         )
-        spare = unfinished / _SPARE
-        # No zeros: some file systems need no room for them.
-        spare.write_bytes(os.urandom(_SPARE_BYTES))
+        unfinished = _Unfinished(path, folder, done, command, clock, say)
         try:
             for prepared, below, columns, checkpoints in zip_longest(runs, folders, tables, kept):
-                for caution in cautions(prepared.system, prepared.experiment):
-                    say(f"warning: {prepared.scenario.name}: {caution}")
-                target = unfinished / below
-                target.mkdir(exist_ok=True)
+                unfinished.caution(prepared, cautions(prepared.system, prepared.experiment))
+                target = unfinished.begin(below)
                 run = _Running(target, prepared, files, columns, checkpoints)
-                give_up = partial(_give_up, run, done, unfinished, folder, command, clock, say)
-                with interrupts.insistence(give_up):
-                    ending = prepared.run(run.observers, run.hooks)
-                run.end(ending)
-                done.append(run)
-                missed = [] if ending.failure else prepared.missed(ending)
-                said = [f"did not happen: {event}" for event in missed]
-                said += cautions_beside(run.seen, runs[0].scenario.name, done[0].seen, loops)
-                said += cautions_after(run.seen, prepared.loops)
-                for caution in said:
-                    say(f"warning: {prepared.scenario.name}: {caution}")
+                unfinished.make(run, interrupts)
                 if interrupts:
                     break
-            ended_at_once = done[0].ending.failure is not None and len(done[0].seen.rows) == 1
-            if draw and not interrupts.urgent and not ended_at_once:
-                for note in _draw(draw, runs[0].scenario, done, unfinished, interrupts):
-                    say(note)
+            if draw is not None:
+                unfinished.draw(draw, interrupts)
         except (OSError, MemoryError) as error:
-            if not done:
-                raise
-            if target != done[-1].folder:
-                rmtree(target)
-            first, failure = done[0], f"could not be written in full: {reason(error)}"
-            first.ending = replace(first.ending, failure=first.ending.failure or failure)
-        if not unfinished.is_dir():
-            raise InputError(
-                f"{folder} was moved or deleted while it was written, and the results went "
-                f"with it, in {unfinished.name}"
-            )
-        spare.unlink()
-        _write_ends(done, command, clock)
-        place = place_of(unfinished, folder)
+            unfinished.rescue(error)
+        place = unfinished.finish()
     is_whole = len(done) == len(runs) and all(run.ending.failure is None for run in done)
     leave_checkpoints(kept, is_whole, say)
     return [
@@ -250,68 +214,150 @@ class _Running:
         return [] if self._real_time is None else [str(self._real_time)]
 
 
-def _give_up(
-    run: _Running,
-    done: Sequence[_Running],
-    unfinished: Path,
-    folder: Path,
-    command: Sequence[str],
-    clock: Stopwatch,
-    say: Callable[[str], None],
-) -> None:
-    """Keep what is there and end the process; the thread that steps the FMUs never returns."""
-    try:
-        (unfinished / _SPARE).unlink()
-        run.give_up()
-        _write_ends([*done, run], command, clock)
-        place = publish(Ledger(folder))
-        say(f"{run.prepared.scenario.name} {run.ending.failure}; its rows are in {place}")
-        rmtree(process_folder(), ignore_errors=True)
-    except Exception as error:
-        say(f"ended: an FMU did not return; its rows are in {unfinished}: {reason(error)}")
-    finally:
-        os._exit(_FAILED)
+class _Unfinished:
+    """The folder that runs are made in, until its files take their places.
+
+    A step that never returns or a full disk costs what is not written yet, not what is.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        folder: Path,
+        done: list[_Running],
+        command: Sequence[str],
+        clock: Stopwatch,
+        say: Callable[[str], None],
+    ) -> None:
+        """Take the path that the folder has for now, and keep room there for the record."""
+        self._path, self._folder, self._done = path, folder, done
+        self._command, self._clock, self._say = command, clock, say
+        self._latest = path
+        self._spare = path / _SPARE
+        # No zeros: some file systems need no room for them.
+        self._spare.write_bytes(os.urandom(_SPARE_BYTES))
+
+    def caution(self, prepared: Prepared, said: Iterable[str]) -> None:
+        """Tell the user what to be wary of in a run."""
+        for caution in said:
+            self._say(f"warning: {prepared.scenario.name}: {caution}")
+
+    def begin(self, below: str) -> Path:
+        """Make the folder of the next run."""
+        self._latest = self._path / below
+        self._latest.mkdir(exist_ok=True)
+        return self._latest
+
+    def make(self, run: _Running, interrupts: Interrupts) -> None:
+        """Make a run, and tell what is to be said of it beside the first."""
+        prepared = run.prepared
+        with interrupts.insistence(partial(self._give_up, run)):
+            ending = prepared.run(run.observers, run.hooks)
+        run.end(ending)
+        self._done.append(run)
+        first, missed = self._done[0], [] if ending.failure else prepared.missed(ending)
+        said = [f"did not happen: {event}" for event in missed]
+        compared = first.prepared
+        said += cautions_beside(run.seen, compared.scenario.name, first.seen, compared.loops)
+        self.caution(prepared, said + cautions_after(run.seen, prepared.loops))
+
+    def draw(self, draw: Callable[..., list[str]], interrupts: Interrupts) -> None:
+        """Draw all figures or, where one of them cannot be written, none."""
+        first = self._done[0]
+        ended_at_once = first.ending.failure is not None and len(first.seen.rows) == 1
+        if interrupts.urgent or ended_at_once:
+            return
+        scenario = first.prepared.scenario
+        drawn = [
+            Drawn(run.prepared.scenario.legend, run.seen, scenario.z_up, run.prepared.loops)
+            for run in self._done
+        ]
+        try:
+            notes = draw(
+                scenario.figure,
+                scenario.title,
+                drawn,
+                self._path,
+                scenario.stem,
+                stop=lambda: interrupts.urgent,
+            )
+        except BaseException:
+            for name in _figures(first.prepared):
+                (self._path / name).unlink(missing_ok=True)
+            raise
+        for note in notes:
+            self._say(note)
+
+    def rescue(self, error: OSError | MemoryError) -> None:
+        """Go on with the runs that are done, where another or the figures cannot be written."""
+        if not self._done:
+            raise error
+        if self._latest != self._done[-1].folder and self._latest.is_dir():
+            rmtree(self._latest)
+        first, failure = self._done[0], f"could not be written in full: {reason(error)}"
+        first.ending = replace(first.ending, failure=first.ending.failure or failure)
+
+    def finish(self) -> Path:
+        """Write what is written last, and say where all will be.
+
+        Raises:
+            InputError: the folder is gone.
+
+        """
+        if not self._path.is_dir():
+            raise InputError(
+                f"{self._folder} was moved or deleted while it was written, and the results "
+                f"went with it, in {self._path.name}"
+            )
+        self._spare.unlink()
+        self._write_ends(self._done)
+        return place_of(self._path, self._folder)
+
+    def _give_up(self, run: _Running) -> None:
+        """Keep what is there and end the process; the thread that steps the FMUs never will."""
+        try:
+            self._spare.unlink()
+            run.give_up()
+            self._write_ends([*self._done, run])
+            place = publish(Ledger(self._folder))
+            self._say(f"{run.prepared.scenario.name} {run.ending.failure}; its rows are in {place}")
+            rmtree(process_folder(), ignore_errors=True)
+        except Exception as error:
+            self._say(
+                f"ended: an FMU did not return; its rows are in {self._path}: {reason(error)}"
+            )
+        finally:
+            os._exit(_FAILED)
+
+    def _write_ends(self, done: Sequence[_Running]) -> None:
+        """Write what is written last; the record of the first names the files of all."""
+        for run in reversed(done):
+            write_metrics(run.folder, run.metrics)
+            write_record(
+                run.folder, run.prepared, run.seen.header, run.ending, self._command, self._clock,
+                run.remarks,
+            )  # fmt: skip
 
 
-def _write_ends(done: Sequence[_Running], command: Sequence[str], clock: Stopwatch) -> None:
-    """Write the last files; the record of the first run names the files of all."""
-    for run in reversed(done):
-        write_metrics(run.folder, run.metrics)
-        header = run.seen.header
-        write_record(run.folder, run.prepared, header, run.ending, command, clock, run.remarks)
+def _figures(prepared: Prepared) -> list[str]:
+    """The files of the figures of a scenario."""
+    return figure_files(prepared.scenario.figure, prepared.scenario.stem, prepared.loops)
 
 
-def _draw(
-    draw: Callable[..., list[str]],
-    scenario: Scenario,
-    done: Sequence[_Running],
-    folder: Path,
-    interrupts: Interrupts,
-) -> list[str]:
-    """Draw all figures or, if one cannot be written, none; returns notes on omissions."""
-    drawn = [
-        Drawn(run.prepared.scenario.legend, run.seen, scenario.z_up, run.prepared.loops)
-        for run in done
-    ]
-    try:
-        return draw(
-            scenario.figure,
-            scenario.title,
-            drawn,
-            folder,
-            scenario.stem,
-            stop=lambda: interrupts.urgent,
-        )
-    except BaseException:
-        for name in figure_files(scenario.figure, scenario.stem, drawn[0].loops):
-            (folder / name).unlink(missing_ok=True)
-        raise
-
-
-def _folders(runs: Sequence[Prepared], figures: Sequence[str]) -> list[str]:
+def _folders(runs: Sequence[Prepared]) -> list[str]:
     """The folder of each run, from the first one's on."""
+    figures = _figures(runs[0])
     taken = [*FILES, _certificates(""), *figures, CHECKPOINTS, INCOMPLETE, LEDGER]
     return ["", *(file_name(prepared.scenario.name, taken) for prepared in runs[1:])]
+
+
+def _names(runs: Sequence[Prepared], folders: Sequence[str]) -> list[str]:
+    """The files that will be written, as far as they are known."""
+    names = _figures(runs[0])
+    for prepared, below in zip(runs, folders, strict=True):
+        certificates = map(_certificates, suffixes(prepared.loops).values())
+        names += [Path(below, name).as_posix() for name in (*FILES, *certificates)]
+    return names
 
 
 def _certificates(vehicle: str) -> str:

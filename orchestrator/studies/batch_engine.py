@@ -76,10 +76,7 @@ class BatchEngine:
             InputError: one of them is not what the equations make.
 
         """
-        for name, system in systems.items():
-            if why := unsupported(system, current_fmus(kind)):
-                raise InputError(f"{name}: {why}, which the batch engine cannot make; {_OTHER}")
-            system.check()
+        check_systems(systems, kind)
         self._systems = dict(systems)
 
     @property
@@ -142,6 +139,19 @@ class BatchEngine:
         }
         header = Header(tuple(compress(COLUMNS, there)), job.experiment, parameters)
         return Table.of(header, rows[: made + 1, [True, *there]], Ending(failure))
+
+
+def check_systems(systems: Mapping[str, System], kind: str = PYTHON) -> None:
+    """Check that systems, by their names, are what the equations make.
+
+    Raises:
+        InputError: one of them is not.
+
+    """
+    for name, system in systems.items():
+        if why := unsupported(system, current_fmus(kind)):
+            raise InputError(f"{name}: {why}, which the batch engine cannot make; {_OTHER}")
+        system.check()
 
 
 class _Job(NamedTuple):

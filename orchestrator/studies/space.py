@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from hashlib import sha256
 from itertools import chain
 from math import ceil, cos, floor, log2, pi, prod, sin, sqrt
@@ -123,7 +122,7 @@ class Space:
         )
         prepared = prepare(scenario, system, request)
         for step in self._ends(STEP) if STEP in self.columns else ():
-            replace(prepared.experiment, step=step)
+            prepared.experiment.check_step(step)
         return prepared
 
     def _ends(self, name: str) -> Sequence[float]:

@@ -15,9 +15,9 @@ from typing import Annotated, Any
 
 from tqdm import tqdm
 
+from fmus.compilers import machines_compiler
 from fmus.kinds import PYTHON
 from orchestrator.figures.study_figures import draw_figures, figure_files
-from orchestrator.machine.children import machines_compiler
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.loop import LOOPS
@@ -26,13 +26,14 @@ from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import CliOption, Force, Kind, LoopName
 from orchestrator.runs.scenario import Scenario
-from orchestrator.studies.batch_engine import BatchEngine
+from orchestrator.studies.batch_engine import BatchEngine, check_systems
 from orchestrator.studies.blocks import Making, local_workers
 from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import Store, StudyResult, open_store, read_study_record
 from orchestrator.studies.study import BATCH, ENGINES, FMU, Study
 from orchestrator.studies.study_file import read_figures, read_study, study_of
+from orchestrator.system.structure import System
 
 #: Packages whose versions the runs and their table depend on.
 _PACKAGES = (*PACKAGES, "numba", "pyarrow", "scipy")
@@ -204,7 +205,13 @@ def check_installed(needed: Sequence[str] = _NEEDED) -> None:
         raise InputError(f"studies need {', '.join(missing)}: pip install 'auv-fmu[studies]'")
 
 
-def _engine(name: str, prepared: Mapping[str, Prepared], means: Means) -> Engine:
+def _check_engine(name: str, prepared: Mapping[str, Prepared]) -> None:
+    """Check that there is such an engine, and that it does all that is asked of it in a run.
+
+    Raises:
+        InputError: it does not.
+
+    """
     if name not in ENGINES:
         raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
     for scenario, one in prepared.items():
@@ -216,9 +223,17 @@ def _engine(name: str, prepared: Mapping[str, Prepared], means: Means) -> Engine
             raise InputError(
                 f"{scenario}: has {more}, which engine {BATCH!r} lacks; use --engine {FMU}"
             )
+
+
+def _engine(name: str, prepared: Mapping[str, Prepared], means: Means) -> Engine:
+    _check_engine(name, prepared)
     if name == FMU:
         return FmuEngine(prepared, means.loop)
-    return BatchEngine({scenario: one.system for scenario, one in prepared.items()}, means.kind)
+    return BatchEngine(_systems(prepared), means.kind)
+
+
+def _systems(prepared: Mapping[str, Prepared]) -> dict[str, System]:
+    return {scenario: one.system for scenario, one in prepared.items()}
 
 
 def faster(space: Space, engine: Engine, means: Means) -> str:
@@ -229,7 +244,8 @@ def faster(space: Space, engine: Engine, means: Means) -> str:
         if means.kind == PYTHON and is_bundles and machines_compiler():
             option = "--kind native"
         with suppress(InputError):
-            _engine(BATCH, space.prepared, means)
+            _check_engine(BATCH, space.prepared)
+            check_systems(_systems(space.prepared), means.kind)
             option = f"--engine {BATCH}"
     return option and (
         f"{len(space):,} runs by FMUs of the {means.kind} kind; {option} gives the same numbers in "

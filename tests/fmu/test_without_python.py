@@ -14,11 +14,10 @@ import numpy as np
 import pytest
 from fmpy.build import build_platform_binary
 
-from fmus.compilers import FLAGS
+from fmus.compilers import FLAGS, machines_compiler
 from fmus.kinds import TARGETS
 from orchestrator.exchange import c_host
 from orchestrator.exchange.verify import verify
-from orchestrator.machine.children import machines_compiler
 from orchestrator.master.experiment import Experiment
 from orchestrator.runs import bundle
 from orchestrator.system.component import Component

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from fmus.compilers import machines_compiler
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.exchange.verify import verify
 from orchestrator.formats.ssp.writer import structure_xml
-from orchestrator.machine.children import machines_compiler
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import PortName

@@ -5,6 +5,7 @@ What was computed is kept, what was good stays good, and nothing half-written is
 
 from __future__ import annotations
 
+import errno
 import json
 import resource
 import signal
@@ -14,6 +15,7 @@ import time
 from datetime import datetime, timedelta, tzinfo
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -110,6 +112,22 @@ def test_full_disk_at_any_stage(workplace, capsys, size):
         names = contents(folder).keys()
         assert names >= {"run.json", "metrics.json", "result.csv"}
         assert not [name for name in names if name.startswith(".") or name.endswith("g")]
+
+
+def test_no_room_for_the_folder_of_a_companion(workplace, capsys, monkeypatch):
+    """What is compared with it stays, with its record."""
+    mkdir = Path.mkdir
+
+    def full(path: Path, *arguments: Any, **options: Any) -> None:
+        if path.name == "fig5-pd":
+            raise OSError(errno.ENOSPC, "No space left on device")
+        mkdir(path, *arguments, **options)
+
+    monkeypatch.setattr(Path, "mkdir", full)
+    assert main(["run", "fig5", "--stop-time", "0.1", "--no-figures", "--out", "r"]) == 1
+    assert mentions(capsys.readouterr().err, "could not be written in full: No space left")
+    assert len(rows(Path("r"))) == 6
+    assert "No space left" in failure(Path("r"))
 
 
 def test_full_temporary_folder_is_named(workplace):

@@ -8,9 +8,10 @@ from zipfile import ZipFile
 
 import pytest
 
+from fmus.compilers import machines_compiler
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.machine import children, user_files
+from orchestrator.machine import user_files
 from orchestrator.machine.errors import InputError
 from orchestrator.master.fmi import binary
 from support.relay import relay
@@ -48,7 +49,7 @@ WAYS = {
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A cache folder of its own; it is skipped where there is no compiler."""
-    if children.machines_compiler() is None:
+    if machines_compiler() is None:
         pytest.skip("there is no C compiler")
     folder = tmp_path_factory.mktemp("cache")
     folder.chmod(0o700)

@@ -34,7 +34,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(children.shutil, "which", lambda _: None)
+    monkeypatch.setattr(shutil, "which", lambda _: None)
     monkeypatch.setattr(children, "find_spec", lambda _: None)
 
 
@@ -130,7 +130,7 @@ def test_a_compiler_that_hangs_is_ended_with_what_it_has_started(tmp_path, monke
     compiler.write_text(f"#!/bin/sh\necho $$ > {tmp_path}/session\n{script}\necho\n")
     compiler.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
-    monkeypatch.setattr("orchestrator.machine.children._LIMIT", 0.5)
+    monkeypatch.setattr("fmus.compilers._LIMIT", 0.5)
     with pytest.raises(InputError, match=r"cannot be compiled: .*/cc has not ended after 0\.5 s$"):
         stepper.compile_stepper()
     session = int((tmp_path / "session").read_text())
@@ -165,7 +165,7 @@ def test_compilers_have_nothing_to_say(tmp_path, command):
 @pytest.mark.slow
 def test_zig_compiles_it_where_there_is_no_other(tmp_path, cache, monkeypatch):
     pytest.importorskip("ziglang", reason="ziglang is not installed")
-    monkeypatch.setattr(children.shutil, "which", lambda _: None)
+    monkeypatch.setattr(shutil, "which", lambda _: None)
     with pytest.raises(InputError):
         stepper.compile_stepper(in_no_time=True)
     assert stepper.compile_stepper().advance

@@ -28,10 +28,15 @@ QUIET = Request("fig4", {"plant.noise.std": 0.0})
          "fig4 --set plant.noise.std=1.23456789e-05"),
         (Request("my file.toml", order="jacobi", stop_time=2.5, step=0.01),
          "'my file.toml' --stop-time 2.5 --step 0.01 --order jacobi"),
+        (Request("fig4", events="fig6", steps={"controller": 0.2}),
+         "fig4 --events fig6 (steps: controller = 0.2 s)"),
+        (Request("fig4", events=[{"at": 1.0, "set": {"plant.noise.std": 0.0}}], loop="python"),
+         "fig4 --loop python (events: {'at': 1.0, 'set': {'plant.noise.std': 0.0}})"),
+        (Request("fig4", events=[]), "fig4 (events: none)"),
     ],
 )  # fmt: skip
-def test_label_is_what_the_user_types(run, label):
-    assert run.command_line == label
+def test_label_is_what_the_user_types_and_what_has_no_option(run, label):
+    assert run.label == label
 
 
 def companions(run):
@@ -62,7 +67,7 @@ def test_a_scenario_and_its_companion_are_run_as_it_says(tmp_path):
         assert one.system.steps == {"controller": 0.2}
     [as_one] = with_companion(prepare_request(run), run)[1:]
     assert prepare_request(companion).identity == as_one.identity
-    assert companion.command_line == (
+    assert companion.label == (
         "fig5-pd --stop-time 1 --order jacobi --set planner.eta0.z=-2 (steps: controller = 0.2 s)"
     )
 

@@ -35,7 +35,7 @@ class Known:
         return KeptRun(self._metrics[self._runs.index(run)], Table())
 
     def label(self, run):
-        return run.command_line
+        return run.label
 
 
 def stranger(folder: Path, name: str = "mine", **entries: str) -> str:
