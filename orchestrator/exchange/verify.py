@@ -24,7 +24,7 @@ from orchestrator.master.experiment import (
 )
 from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.observers.observer import Ending, Header
-from orchestrator.master.plan import planned, stages
+from orchestrator.master.plan import check_order, planned
 from orchestrator.master.simulation import completed
 from orchestrator.runs.preparation import DEFAULT_STEP
 from orchestrator.system.graph import rings
@@ -93,7 +93,7 @@ def verify(
     if not 0.0 <= tolerance < 1.0:
         raise InputError(f"tolerance {tolerance:g}: must not be negative, and less than 1")
     if order is not None:
-        stages(system, Experiment(DEFAULT_STEP, DEFAULT_STEP, order).order)
+        check_order(system, Experiment(DEFAULT_STEP, DEFAULT_STEP, order).order)
     outputs = {
         str(PortName(component.name, variable.name)): variable.type
         for component in system.components.values()
