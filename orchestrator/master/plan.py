@@ -256,6 +256,11 @@ def _parameters(system: System) -> dict[str, str]:
     }
 
 
+def differences(one: Identity, other: Identity) -> list[str]:
+    """What makes two runs two, by the names of an identity."""
+    return sorted(dict(one.items() ^ other.items()))
+
+
 def digest_of(*identities: Identity) -> str:
     """An identity, or several in their order, as a short text."""
     return sha256(json.dumps(identities, sort_keys=True).encode()).hexdigest()
